@@ -1,0 +1,1 @@
+"""NEP Studio, the desktop program."""

@@ -1,0 +1,1 @@
+"""Blocks as data, and the compiler that turns a workspace into a Python program."""

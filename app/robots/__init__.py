@@ -1,0 +1,1 @@
+"""Robots: their descriptions, and the kit that makes a driver from functions."""

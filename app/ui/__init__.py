@@ -1,0 +1,1 @@
+"""Widgets and the web view: the only package that imports PySide6."""

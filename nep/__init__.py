@@ -1,0 +1,1 @@
+"""NEP: messages between robots, programs and people."""
