@@ -1,0 +1,100 @@
+"""Lucide icons in the colour of the words beside them, sharp at every device pixel ratio.
+
+One SVG per icon, whatever the theme: an engine puts the colour of a role in place of ``currentColor`` when it
+paints. Delegates and painted widgets call `paint_icon`; controls that want a QIcon get one from `icon`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from functools import lru_cache
+
+from PySide6.QtCore import QByteArray, QPoint, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QIconEngine, QPainter, QPixmap
+from PySide6.QtSvg import QSvgRenderer
+
+from app import resources
+
+THIN_FROM_PX = 20
+DOT_SHARE = 10 / 16
+
+
+@lru_cache(maxsize=1)
+def names() -> frozenset[str]:
+    """The icons that Studio ships."""
+    return frozenset(path.stem for path in resources.path("icons").glob("*.svg"))
+
+
+@lru_cache(maxsize=256)
+def _source(name: str) -> str:
+    if name not in names():
+        near = difflib.get_close_matches(name, names(), 1)
+        hint = f"; did you mean '{near[0]}'?" if near else "; add its SVG to resources/icons"
+        raise KeyError(f"no icon '{name}'{hint}")
+    return resources.path("icons", f"{name}.svg").read_text("utf-8")
+
+
+@lru_cache(maxsize=512)
+def _renderer(name: str, colour: str, opacity: float, filled: bool, thin: bool) -> QSvgRenderer:
+    text = _source(name).replace("currentColor", colour)
+    if thin:
+        text = text.replace('stroke-width="2"', 'stroke-width="1.75"')
+    if filled:
+        text = text.replace('fill="none"', f'fill="{colour}"', 1)
+    if opacity < 1:
+        text = text.replace("<svg", f'<svg opacity="{opacity:.3f}"', 1)
+    return QSvgRenderer(QByteArray(text.encode("utf-8")))
+
+
+def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, filled: bool = False) -> None:
+    """Paint an icon into a square of logical pixels; ``dot`` is the filled disc of "runs now".
+
+    KeyError names the nearest icon when there is none of that name.
+    """
+    painter.save()
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    if name == "dot":
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(colour)
+        radius = min(rect.width(), rect.height()) * DOT_SHARE / 2
+        painter.drawEllipse(rect.center(), radius, radius)
+    else:
+        thin = rect.width() >= THIN_FROM_PX
+        _renderer(name, colour.name(), round(colour.alphaF(), 3), filled, thin).render(painter, rect)
+    painter.restore()
+
+
+class IconEngine(QIconEngine):
+    """Paints one icon in the colours of the moment: enabled, disabled, or chosen."""
+
+    def __init__(self, name: str, colour: Callable[[QIcon.Mode, QIcon.State], QColor]) -> None:
+        """An engine for ``name``; ``colour`` is asked at each painting: a new theme needs no new icon."""
+        super().__init__()
+        _source(name)
+        self._name = name
+        self._colour = colour
+
+    def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
+        side = min(rect.width(), rect.height())
+        square = QRectF(0, 0, side, side)
+        square.moveCenter(QRectF(rect).center())
+        paint_icon(painter, square, self._name, self._colour(mode, state))
+
+    def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
+        return self.scaledPixmap(size, mode, state, 1.0)
+
+    def scaledPixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State, scale: float) -> QPixmap:
+        pixmap = QPixmap(size)
+        pixmap.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(pixmap)
+        self.paint(painter, QRect(QPoint(0, 0), size), mode, state)
+        painter.end()
+        pixmap.setDevicePixelRatio(scale)
+        return pixmap
+
+    def key(self) -> str:
+        return f"nep:{self._name}"
+
+    def clone(self) -> QIconEngine:
+        return IconEngine(self._name, self._colour)

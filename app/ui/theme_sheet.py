@@ -1,0 +1,144 @@
+"""The application's one style sheet, made from the roles of a theme: rules by class and dynamic property.
+
+Labels take their font and colour from the properties ``kind`` and ``role`` (`app.ui.widgets.label`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, Protocol
+
+from app.ui.theme_tokens import TextKind
+
+LABEL_ROLES = (
+    "text", "textSecondary", "textTertiary", "textDisabled", "accentText", "ok", "warn", "error", "info",
+    "changed", "onAccent", "selectedText",
+)  # fmt: skip
+
+
+class Look(Protocol):
+    """What the sheet asks of a theme."""
+
+    @property
+    def dark(self) -> bool:
+        """Whether the colours are the dark ones."""
+
+    def hex(self, role: str) -> str:
+        """A role's colour."""
+
+    def radius(self, name: str) -> int:
+        """A corner's radius."""
+
+    def size(self, *path: str) -> int:
+        """A length."""
+
+    def scaled(self, pixels: float) -> float:
+        """Pixels that grow with the text."""
+
+    def text_kinds(self) -> Mapping[str, TextKind]:
+        """The kinds of text."""
+
+    def family(self, kind: Literal["text", "mono"]) -> str:
+        """A font's family."""
+
+
+SHEET = """
+QToolTip {{ background: {tooltip}; color: {tooltipText}; border: 1px solid {tooltip}; padding: 4px 6px; }}
+QMainWindow, QDialog {{ background: {window}; }}
+QMainWindow::separator {{ background: {window}; width: 8px; height: 8px; }}
+QMainWindow[density="compact"]::separator {{ width: 6px; height: 6px; }}
+QMainWindow::separator:hover {{ background: {pressed}; }}
+QSplitter::handle {{ background: {window}; }}
+
+QMenuBar {{ background: transparent; color: {textSecondary}; border: none; spacing: 0; }}
+QMenuBar::item {{ background: transparent; padding: 5px 10px; margin: 0; border-radius: {small}px; }}
+QMenuBar::item:selected {{ background: {hover}; color: {text}; }}
+QMenuBar::item:pressed {{ background: {pressed}; color: {text}; }}
+QMenu {{ background: {raised}; color: {text}; border: 1px solid {border}; padding: 4px; }}
+QMenu::item {{ padding: 6px 24px 6px 10px; border-radius: {small}px; min-width: 140px; }}
+QMenu::item:selected {{ background: {hover}; color: {text}; }}
+QMenu::item:disabled {{ color: {textDisabled}; }}
+QMenu::icon {{ padding-left: 8px; }}
+QMenu::separator {{ height: 1px; background: {border}; margin: 4px 6px; }}
+QMenu::indicator {{ width: 16px; height: 16px; padding-left: 8px; }}
+
+QLineEdit, QPlainTextEdit, QTextEdit {{
+    background: {field}; color: {text}; border: 1px solid {controlBorder}; border-radius: {control}px;
+    padding: 3px 8px; selection-background-color: {selected}; selection-color: {selectedText};
+}}
+QLineEdit[quiet="true"] {{ border-color: {borderStrong}; }}
+QLineEdit[wrong="true"] {{ border-color: {error}; }}
+QLineEdit:disabled {{ color: {textDisabled}; border-color: {border}; }}
+QPlainTextEdit[bare="true"], QTextEdit[bare="true"] {{ border: none; border-radius: 0; background: {panel}; }}
+QComboBox QAbstractItemView {{
+    background: {raised}; color: {text}; border: 1px solid {border}; padding: 4px; outline: none;
+    selection-background-color: {selected}; selection-color: {selectedText};
+}}
+
+QAbstractItemView {{
+    background: {panel}; color: {text}; border: none; outline: none; alternate-background-color: {sunken};
+    selection-background-color: {selected}; selection-color: {selectedText};
+}}
+QHeaderView {{ background: {panel}; border: none; }}
+QHeaderView::section {{
+    background: {panel}; color: {textTertiary}; border: none; border-bottom: 1px solid {border};
+    padding: 4px 6px; font-size: {small_text}px; font-weight: 500;
+}}
+QTableCornerButton::section {{ background: {panel}; border: none; border-bottom: 1px solid {border}; }}
+QScrollArea {{ background: transparent; border: none; }}
+QScrollArea > QWidget > QWidget[bare="true"] {{ background: transparent; }}
+
+QScrollBar:vertical {{ background: transparent; width: 10px; margin: 0; }}
+QScrollBar:horizontal {{ background: transparent; height: 10px; margin: 0; }}
+QScrollBar::handle {{ background: {borderStrong}; border-radius: 3px; margin: 2px; }}
+QScrollBar::handle:vertical {{ min-height: 28px; }}
+QScrollBar::handle:horizontal {{ min-width: 28px; }}
+QScrollBar::handle:hover {{ background: {controlBorder}; }}
+QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; border: none; background: none; }}
+QScrollBar::add-page, QScrollBar::sub-page {{ background: none; }}
+QAbstractScrollArea::corner {{ background: transparent; border: none; }}
+
+Workbench > QTabBar {{ border: none; background: transparent; qproperty-drawBase: 0; }}
+Workbench > QTabBar::tab {{ width: 0; height: 0; margin: 0; padding: 0; border: none; }}
+"""
+
+
+def _labels(look: Look) -> str:
+    rules = []
+    for name, kind in look.text_kinds().items():
+        family = look.family("mono" if name == "code" else "text")
+        rules.append(
+            f'QLabel[kind="{name}"] {{ font-family: "{family}"; font-weight: {kind.weight};'
+            f" font-size: {round(look.scaled(kind.size_px))}px; }}"
+        )
+    rules.append(
+        f'QLabel[kind="titleLarge"] {{ font-size: {round(look.scaled(14))}px; font-weight: 600; }}'
+        f'QLabel[kind="empty"] {{ font-size: {round(look.scaled(17))}px; font-weight: 600; }}'
+        f'QLabel[kind="card"] {{ font-size: {round(look.scaled(15))}px; font-weight: 600; }}'
+        f'QLabel[kind="lead"] {{ font-size: {round(look.scaled(15))}px; font-weight: 400; }}'
+    )
+    rules.extend(f'QLabel[role="{role}"] {{ color: {look.hex(role)}; }}' for role in LABEL_ROLES)
+    return "\n".join(rules)
+
+
+class _Roles(dict[str, str]):
+    """Looks every name up in the theme when the sheet asks for it."""
+
+    def __init__(self, look: Look) -> None:
+        super().__init__()
+        self._look = look
+
+    def __missing__(self, role: str) -> str:
+        return self._look.hex(role)
+
+
+def build(look: Look) -> str:
+    """The style sheet in the colours and sizes of ``look``."""
+    roles = _Roles(look)
+    roles.update(
+        small=str(look.radius("small")),
+        control=str(look.radius("control")),
+        field=look.hex("sunken") if look.dark else look.hex("panel"),
+        small_text=str(round(look.scaled(look.text_kinds()["small"].size_px))),
+    )
+    return SHEET.format_map(roles) + _labels(look)
