@@ -1,0 +1,144 @@
+"""What a panel is: one dockable view of the session, described by one `Panel`.
+
+A panel reads the session in `PanelWidget.refresh`, 30 times a second while it can be seen, and does nothing there
+when nothing changed. It never imports another panel; what concerns the window goes through `PanelContext`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QAction, QFont
+from PySide6.QtWidgets import QWidget
+
+from app.ui.theme import Theme
+
+if TYPE_CHECKING:
+    from app.core.session import Session
+
+Density = Literal["compact", "comfortable"]
+ANY_TYPE = "*"
+
+
+class Toast(Protocol):
+    """Says for some seconds what the person just did."""
+
+    def __call__(self, words: str) -> None:
+        """Show ``words``; "Copied robots.Pepper.pose.y"."""
+
+
+@dataclass(frozen=True, slots=True)
+class PanelContext:
+    """What a panel may use of the window.
+
+    ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run`` does
+    one of the window's commands by its name (`app.ui.actions`).
+    """
+
+    session: Session
+    theme: Theme
+    open_topic: Callable[[str], None]
+    toast: Toast
+    run: Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A panel's description.
+
+    ``name`` is its id in saved layouts, ``icon`` a Lucide name, ``accepts`` the codecs of the topics that it can
+    show ("image"), or `ANY_TYPE`; ``make`` builds one.
+    """
+
+    name: str
+    title: str
+    icon: str
+    accepts: tuple[str, ...]
+    make: Callable[[PanelContext], PanelWidget]
+
+
+class PanelWidget(QWidget):
+    """The inside of a panel, and what stands in its title.
+
+    The window shows in the title: `title` (or `title_widget` in its place), `subtitle` in mono, `chips` beside
+    them, `header` at the right, and `menu_actions` in "more". `title_changed` when title or subtitle did.
+    """
+
+    title_changed = Signal()
+
+    def __init__(self, context: PanelContext, title: str) -> None:
+        """A panel called ``title``."""
+        super().__init__()
+        self.context = context
+        self.session = context.session
+        self.theme = context.theme
+        self.density: Density = "compact"
+        self.title_widget: QWidget | None = None
+        self.chips: list[QWidget] = []
+        self.header: list[QWidget] = []
+        self._title = title
+        self._subtitle = ""
+        self.setAccessibleName(title)
+        self.theme.changed.connect(self.theme_changed)
+
+    @property
+    def title(self) -> str:
+        """Its name in the title."""
+        return self._title
+
+    @property
+    def subtitle(self) -> str:
+        """What it shows: a topic; empty when it shows one thing only."""
+        return self._subtitle
+
+    def set_title(self, title: str, subtitle: str | None = None) -> None:
+        """Change title and subtitle; nothing is told when they are the same."""
+        wanted = (title, self._subtitle if subtitle is None else subtitle)
+        if wanted != (self._title, self._subtitle):
+            self._title, self._subtitle = wanted
+            self.setAccessibleName(title)
+            self.title_changed.emit()
+
+    def refresh(self) -> None:
+        """Show what is in the session now; called 30 times a second while the panel can be seen."""
+
+    def set_density(self, density: Density) -> None:
+        """Comfortable rows and text in the Behaviour layout, compact ones in Developer."""
+        self.density = density
+        self.theme_changed()
+
+    def theme_changed(self) -> None:
+        """Colours, fonts or density changed."""
+        self.update()
+
+    def text_font(self) -> QFont:
+        """The font of the panel's words in its density."""
+        return self.theme.font("bodyLarge" if self.density == "comfortable" else "body")
+
+    def row_height(self) -> int:
+        """The height of a row in its density, grown with the text."""
+        return round(self.theme.scaled(self.theme.size("row", self.density)))
+
+    def show_topic(self, name: str) -> None:
+        """Show this topic, if the panel accepts topics."""
+
+    def focus_filter(self) -> bool:
+        """Go to the panel's filter (`/`); False when it has none."""
+        return False
+
+    def menu_actions(self) -> list[QAction]:
+        """What "more" offers beside floating and closing."""
+        return []
+
+    def save_state(self) -> dict[str, object]:
+        """What is to be as it was when the layout comes back."""
+        return {}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        """Take over what `save_state` gave; whatever does not fit is left out."""
+
+    def shut(self) -> None:
+        """The panel leaves the window: end its watches and streams."""

@@ -1,0 +1,137 @@
+"""What the virtual robot tells about itself, parsed once from its ``state`` topic for the drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+EYES = "#35B0FA"
+SHOULDERS = "#3AB5FF"
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """Something that stands or lies in the room: ``kind`` ball, face, marker, ..., its place in m."""
+
+    kind: str
+    x: float
+    y: float
+    name: str = ""
+    colour: str | None = None
+    size_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """The floor in m; the person looks from the side of ``x_max`` towards ``x_min``."""
+
+    x_min: float = -2.0
+    x_max: float = 2.0
+    y_min: float = -2.0
+    y_max: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """One drawable moment of a robot.
+
+    ``x``, ``y`` in m, ``theta_deg`` 0 looks at the person and grows to the robot's left. Head yaw grows to the
+    robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    theta_deg: float = 0.0
+    head_yaw_deg: float = 0.0
+    head_pitch_deg: float = 0.0
+    speech: str | None = None
+    eyes: str = EYES
+    shoulders: str = SHOULDERS
+    emotion: str = "neutral"
+    arm_left_deg: float = 0.0
+    arm_right_deg: float = 0.0
+    moving: bool = False
+    touched: tuple[str, ...] = ()
+    objects: tuple[Thing, ...] = ()
+    room: Room = field(default_factory=Room)
+
+    @classmethod
+    def parse(cls, data: Mapping[str, object]) -> RobotState:
+        """The state in a message; whatever is missing or of a wrong type keeps its default."""
+        speech = data.get("speech")
+        return cls(
+            x=_number(data.get("x")),
+            y=_number(data.get("y")),
+            theta_deg=_number(data.get("theta_deg")),
+            head_yaw_deg=_number(data.get("head_yaw_deg")),
+            head_pitch_deg=_number(data.get("head_pitch_deg")),
+            speech=speech if isinstance(speech, str) and speech.strip() else None,
+            eyes=_colour(data.get("eyes"), EYES),
+            shoulders=_colour(data.get("shoulders"), SHOULDERS),
+            emotion=str(data.get("emotion") or "neutral"),
+            arm_left_deg=_number(data.get("arm_left_deg")),
+            arm_right_deg=_number(data.get("arm_right_deg")),
+            moving=data.get("moving") is True,
+            touched=_touched(data.get("touched", data.get("touch"))),
+            objects=_things(data.get("objects")),
+            room=_room(data.get("room")),
+        )
+
+
+def _number(value: object, default: float = 0.0) -> float:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e6
+    return float(value) if good else default  # type: ignore[arg-type]
+
+
+def _colour(value: object, default: str) -> str:
+    if isinstance(value, str) and len(value) == 7 and value.startswith("#"):
+        return value if all(sign in "0123456789abcdefABCDEF" for sign in value[1:]) else default
+    return default
+
+
+def _touched(value: object) -> tuple[str, ...]:
+    if isinstance(value, str):
+        return (value,)
+    if isinstance(value, Mapping):
+        return tuple(str(place) for place, down in value.items() if down is True)
+    if isinstance(value, Sequence):
+        return tuple(str(place) for place in value)
+    return ()
+
+
+def _things(value: object) -> tuple[Thing, ...]:
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        return ()
+    return tuple(_thing(one) for one in value if isinstance(one, Mapping))
+
+
+def _thing(one: Mapping[str, object]) -> Thing:
+    colour = one.get("colour", one.get("color"))
+    size = one.get("radius", one.get("size"))
+    return Thing(
+        kind=str(one.get("kind") or "box"),
+        x=_number(one.get("x")),
+        y=_number(one.get("y")),
+        name=str(one.get("name") or ""),
+        colour=_colour(colour, "") or None,
+        size_m=_number(size) if size is not None else None,
+    )
+
+
+def _room(value: object) -> Room:
+    if not isinstance(value, Mapping):
+        return Room()
+    plain = Room()
+    if "x_min" in value or "x_max" in value:
+        made = Room(
+            _number(value.get("x_min"), plain.x_min),
+            _number(value.get("x_max"), plain.x_max),
+            _number(value.get("y_min"), plain.y_min),
+            _number(value.get("y_max"), plain.y_max),
+        )
+    else:
+        depth = _number(value.get("depth", value.get("length")), 4.0)
+        width = _number(value.get("width"), 4.0)
+        made = Room(-depth / 2, depth / 2, -width / 2, width / 2)
+    good = made.x_max - made.x_min > 0.1 and made.y_max - made.y_min > 0.1
+    return made if good else plain
