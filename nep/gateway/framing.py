@@ -1,0 +1,180 @@
+"""How the original NEP writes a datum into its one frame, and how to read it back. Pure functions.
+
+The originals never agreed on one form. Depending on the version and on the type of the topic, a frame is
+*prefixed* (`topic {"a":1}`) or *bare* (`{"a": 1}`). Inside, the bytes are those of a native codec, except for
+pictures, which the originals write as base64 of a JPEG. Translating is therefore taking the prefix away or
+putting it there, and nothing is decoded.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+Framing = Literal["prefixed", "bare"]
+
+PORT_A = 7000
+"""Where programs up to 0.5.4.5, nep-js and C# ask for a topic."""
+PORT_B = 50000
+"""Where programs from 0.5.4.6 on ask."""
+
+_CODECS = {
+    "json": "json",
+    "dictionary": "json",
+    "string": "string",
+    "bytes": "bytes",
+    "msgpack": "msgpack",
+    "image": "image",
+    "images": "image",
+}
+_BARE_EVERYWHERE = frozenset({"bytes", "msgpack", "images"})
+_PREFIXED_EVERYWHERE = frozenset({"dictionary", "image"})
+_NOT_A_NUMBER = re.compile(rb"\b(?:NaN|Infinity)\b")
+_JSON_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|\s+', re.DOTALL)
+
+
+def codec_of(msg_type: str) -> str:
+    """The native codec of an original's `msg_type`; what the originals do not know travels as JSON."""
+    return _CODECS.get(msg_type, "json")
+
+
+def framing_of(port: int, msg_type: str) -> Framing:
+    """The framing used by a program that asks at `port` (7000 or 50000) for a topic of `msg_type`."""
+    if msg_type in _BARE_EVERYWHERE:
+        return "bare"
+    if port == PORT_A or msg_type in _PREFIXED_EVERYWHERE:
+        return "prefixed"
+    return "bare"
+
+
+class FrameError(ValueError):
+    """A frame that nobody can read; `version` names the release of NEP that writes such frames, if known."""
+
+    def __init__(self, sentence: str, version: str | None = None) -> None:
+        super().__init__(sentence)
+        self.version = version
+
+
+@dataclass(frozen=True)
+class Shape:
+    """How frames of one topic look to one kind of original program."""
+
+    topic: str
+    framing: Framing
+    codec: str
+
+    @property
+    def prefix(self) -> bytes:
+        """What stands before the datum: the topic and a space, or nothing."""
+        return f"{self.topic} ".encode() if self.framing == "prefixed" else b""
+
+    def read(self, frame: bytes) -> bytes:
+        """The datum in `frame`, as bytes of the native codec. Raises `FrameError`."""
+        data = self._strip(frame)
+        if self.codec == "image":
+            return _from_base64(data)
+        if self.codec == "json" and _NOT_A_NUMBER.search(data):
+            return _without_nan(data)
+        return data
+
+    def write(self, data: bytes | memoryview) -> bytes:
+        """The frame that says `data`, which are bytes of the native codec."""
+        body = base64.b64encode(data) if self.codec == "image" else data
+        return b"".join((self.prefix, body))
+
+    def wants(self, subscription: bytes) -> bool:
+        """Whether a subscriber with this ZeroMQ filter gets any frame of this shape."""
+        if self.framing == "prefixed":
+            return self.prefix.startswith(subscription) or subscription.startswith(self.prefix)
+        return not self.is_from_0546(subscription)
+
+    def is_from_0546(self, subscription: bytes) -> bool:
+        """Whether this filter gives nep 0.5.4.6 away: it asks where frames are bare, and filters on the topic."""
+        return self.framing == "bare" and bool(subscription) and self.topic.encode().startswith(subscription)
+
+    def _strip(self, frame: bytes) -> bytes:
+        own = f"{self.topic} ".encode()
+        if self.framing == "prefixed":
+            if frame.startswith(own):
+                return frame[len(own) :]
+            if self.codec == "json" and frame[:1] in b'{["':
+                return frame
+            raise FrameError(f"a message on '{self.topic}' does not begin with the topic")
+        if self.codec == "json":
+            self._refuse_unserved(frame, own)
+        return frame
+
+    def _refuse_unserved(self, frame: bytes, own: bytes) -> None:
+        if frame.startswith(own):
+            raise FrameError(f"a message on '{self.topic}' begins with the topic", version="0.5.4.6")
+        if frame[:1] == b'"' and _is_json_in_json(frame):
+            raise FrameError(f"a message on '{self.topic}' is JSON inside JSON", version="0.5.4.7")
+
+
+def shield_javascript(data: bytes, topic: str) -> bytes:
+    """The same JSON without the topic's text in it.
+
+    nep-js cuts a frame at every occurrence of the topic and parses the second piece, so a payload that names its
+    own topic ends the program. In JSON a letter can be written as `\\uXXXX`, which every reader undoes.
+    """
+    word = topic.encode()
+    if not word or word not in data:
+        return data
+    escaped = "".join(f"\\u{unit:04x}" for unit in _utf16_units(topic[0])).encode()
+    spot = re.compile(
+        rb"\\u[0-9a-fA-F]{4}|\\.|(?P<first>%b(?=%b))"
+        % (re.escape(topic[0].encode()), re.escape(topic[1:].encode())),
+        re.DOTALL,
+    )
+
+    def rewrite(token: re.Match[bytes]) -> bytes:
+        text = token.group()
+        if text[:1] != b'"':
+            return text
+        inner = spot.sub(lambda hit: escaped if hit.group("first") else hit.group(), text[1:-1])
+        return b'"' + inner + b'"'
+
+    return _JSON_TOKEN.sub(rewrite, data)
+
+
+def shield_csharp(data: bytes) -> bytes:
+    """The same JSON without a space: C# cuts the frame at spaces and keeps the second piece only."""
+    if not any(space in data for space in (b" ", b"\n", b"\t", b"\r")):
+        return data
+    return _JSON_TOKEN.sub(
+        lambda token: token.group().replace(b" ", b"\\u0020") if token.group()[:1] == b'"' else b"", data
+    )
+
+
+def _utf16_units(letter: str) -> tuple[int, ...]:
+    """The numbers that JSON writes for a letter: one, or two beyond U+FFFF."""
+    packed = letter.encode("utf-16-be", "surrogatepass")
+    return tuple(int.from_bytes(packed[at : at + 2], "big") for at in range(0, len(packed), 2))
+
+
+def _from_base64(data: bytes) -> bytes:
+    try:
+        return base64.b64decode(data, validate=True)
+    except binascii.Error as error:
+        raise FrameError("a picture is not base64") from error
+
+
+def _is_json_in_json(frame: bytes) -> bool:
+    try:
+        text = json.loads(frame)
+        return isinstance(text, str) and isinstance(json.loads(text), (dict, list))
+    except ValueError:
+        return False
+
+
+def _without_nan(data: bytes) -> bytes:
+    """JSON with `null` for NaN and infinity, which JSON does not have and strict readers refuse."""
+    try:
+        value = json.loads(data, parse_constant=lambda _: None)
+    except ValueError:
+        return data  # the words stood in something else; whoever decodes it will say so
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()

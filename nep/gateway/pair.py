@@ -1,0 +1,168 @@
+"""The two sockets through which one line (a topic in one form) flows: originals publish into one, read the other."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import zmq
+from zmq.utils.monitor import parse_monitor_message
+
+from nep.gateway.framing import Shape, shield_csharp, shield_javascript
+from nep.gateway.portmap import Line
+from nep.gateway.requests import LOOPBACK, Role
+
+_OPENED = zmq.EVENT_HANDSHAKE_SUCCEEDED
+_CLOSED = zmq.EVENT_DISCONNECTED
+_QUEUE = 1000
+_QUEUE_OF_PICTURES = 20
+_LINGER_MS = 200
+
+
+@dataclass(frozen=True)
+class End:
+    """One of the two ports of a line: who joins it, and whether the program binds it or we do."""
+
+    role: Role
+    port: int
+    bound_by_program: bool
+
+
+def ends_of(line: Line, base: int) -> tuple[End, End]:
+    """Where publishers and where subscribers of `line` join, its base port being `base`."""
+    return (
+        End("publisher", base, bound_by_program=line.mode == "one2many"),
+        End("subscriber", base + 1, bound_by_program=line.mode == "many2one"),
+    )
+
+
+def port_to_tell(line: Line, base: int, socket_name: str) -> int:
+    """The port to answer: `many2many` originals add one themselves, others are told their own."""
+    if line.is_service or line.mode == "many2many" or socket_name == "publisher":
+        return base
+    return base + 1
+
+
+def is_free(port: int) -> bool:
+    """Whether nobody has bound `port` of the loopback address."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        try:
+            probe.bind((LOOPBACK, port))
+        except OSError:
+            return False
+        return True
+
+
+class Pair:
+    """An XSUB that takes what originals publish and an XPUB from which they read.
+
+    Belongs to the gateway's thread. Raises `zmq.ZMQError` when a port is taken.
+    """
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], line: Line, base: int) -> None:
+        self.line = line
+        self.base = base
+        self.shape = Shape(line.topic, line.framing, line.codec)
+        self.ends = ends_of(line, base)
+        self.filters: set[bytes] = set()
+        self.connections: dict[Role, int] = {"publisher": 0, "subscriber": 0}
+        self.monitors: dict[Role, zmq.Socket[bytes]] = {}
+        self.languages: frozenset[str] = frozenset()
+        with contextlib.ExitStack() as undo:
+            self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo)
+            self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo)
+            self.incoming.send(b"\x01")  # everything: an original's role shows in its traffic
+            self._closing = undo.pop_all()
+
+    def _open(
+        self, context: zmq.Context[zmq.Socket[bytes]], kind: int, end: End, undo: contextlib.ExitStack
+    ) -> zmq.Socket[bytes]:
+        opened = context.socket(kind)
+        undo.callback(opened.close, _LINGER_MS)
+        queue = _QUEUE_OF_PICTURES if self.line.codec == "image" else _QUEUE
+        opened.setsockopt(zmq.SNDHWM, queue)
+        opened.setsockopt(zmq.RCVHWM, queue)
+        if end.bound_by_program and not is_free(end.port):
+            raise zmq.ZMQError(zmq.EADDRINUSE)
+        monitor = opened.get_monitor_socket(_OPENED | _CLOSED)
+        undo.callback(opened.disable_monitor)
+        self.monitors[end.role] = monitor
+        address = f"tcp://{LOOPBACK}:{end.port}"
+        if end.bound_by_program:
+            opened.connect(address)
+        else:
+            opened.bind(address)
+        return opened
+
+    @property
+    def wanted(self) -> bool:
+        """Whether an original wants to read this line now."""
+        return any(self.shape.wants(filter_) for filter_ in self.filters)
+
+    @property
+    def has_0546(self) -> bool:
+        """Whether a subscriber is given away as nep 0.5.4.6 by its filter."""
+        return any(self.shape.is_from_0546(filter_) for filter_ in self.filters)
+
+    def frames(self, limit: int) -> Iterator[bytes]:
+        """At most `limit` frames that originals have published."""
+        for _ in range(limit):
+            try:
+                parts = self.incoming.recv_multipart(zmq.NOBLOCK)
+            except zmq.Again:
+                return
+            yield parts[0]
+
+    def read_filters(self) -> bool:
+        """Follow who subscribes and unsubscribes; whether anything changed."""
+        before = set(self.filters)
+        while True:
+            try:
+                note = self.outgoing.recv(zmq.NOBLOCK)
+            except zmq.Again:
+                return before != self.filters
+            if note[:1] == b"\x01":
+                self.filters.add(note[1:])
+            elif note[:1] == b"\x00":
+                self.filters.discard(note[1:])
+
+    def read_connections(self) -> bool:
+        """Follow who connects and leaves; whether anything happened."""
+        happened = False
+        for role, monitor in self.monitors.items():
+            while monitor.poll(0):
+                event = parse_monitor_message(monitor.recv_multipart())["event"]
+                self.connections[role] = max(0, self.connections[role] + (1 if event == _OPENED else -1))
+                happened = True
+        return happened
+
+    def pass_on(self, frame: bytes, data: bytes) -> None:
+        """Give a frame of this line's own form to its subscribers, untouched where they can bear it."""
+        if self.wanted:
+            self._send(self.shape.write(self._shielded(data)) if self._needs_shield else frame)
+
+    def deliver(self, data: bytes | memoryview) -> None:
+        """Give a datum (bytes of the native codec) to this line's subscribers, in this line's form."""
+        if self.wanted:
+            self._send(self.shape.write(self._shielded(bytes(data)) if self._needs_shield else data))
+
+    def close(self) -> None:
+        """Close both sockets; what is queued is given a moment to leave."""
+        self._closing.close()
+
+    @property
+    def _needs_shield(self) -> bool:
+        return self.line.codec == "json" and not self.languages.isdisjoint(("javascript", "csharp"))
+
+    def _shielded(self, data: bytes) -> bytes:
+        if "javascript" in self.languages:
+            data = shield_javascript(data, self.line.topic)
+        if "csharp" in self.languages:
+            data = shield_csharp(data)
+        return data
+
+    def _send(self, frame: bytes) -> None:
+        with contextlib.suppress(zmq.Again):
+            self.outgoing.send(frame, zmq.NOBLOCK)

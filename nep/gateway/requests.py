@@ -1,0 +1,175 @@
+"""What the original NEP asks its master, what it answers, and what it broadcasts. Pure functions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from nep.gateway.framing import PORT_B, Framing, codec_of, framing_of
+
+Mode = Literal["many2many", "one2many", "many2one"]
+Role = Literal["publisher", "subscriber"]
+
+LOOPBACK = "127.0.0.1"
+MAX_REQUEST_BYTES = 64 * 1024
+MAX_NAME_BYTES = 200
+_DATA = frozenset({"publisher", "subscriber"})
+_SERVICES = frozenset({"client", "server", "surveyor", "respondent"})
+_MODES: Mapping[str, Mode] = {"many2many": "many2many", "one2many": "one2many", "many2one": "many2one"}
+
+
+class RequestError(ValueError):
+    """A request that cannot be granted; `topic` is what it asked for, as far as that can be known."""
+
+    def __init__(self, sentence: str, topic: object = None) -> None:
+        super().__init__(sentence)
+        self.topic = topic
+
+
+@dataclass(frozen=True)
+class Request:
+    """A program of the original NEP asks for a topic."""
+
+    node: str
+    topic: str
+    socket: str
+    mode: Mode
+    msg_type: str
+    pid: int | None
+    asked_port: int
+    language: str | None
+
+    @property
+    def generation(self) -> str:
+        """`A` or `B`, the two incompatible wires of the original NEP."""
+        return "B" if self.asked_port == PORT_B else "A"
+
+    @property
+    def framing(self) -> Framing:
+        """How this program's frames are written."""
+        return framing_of(self.asked_port, self.msg_type)
+
+    @property
+    def codec(self) -> str:
+        """The native codec of what this program sends or wants."""
+        return codec_of(self.msg_type)
+
+    @property
+    def is_service(self) -> bool:
+        """Whether it wants a port for requests and answers, which are not translated."""
+        return self.socket in _SERVICES
+
+
+def read_request(data: bytes, asked_port: int) -> Request:
+    """The request in `data`, which came in at `asked_port`. Raises `RequestError` with a sentence."""
+    if len(data) > MAX_REQUEST_BYTES:
+        raise RequestError(f"the request has {len(data)} bytes; at most {MAX_REQUEST_BYTES} are read")
+    try:
+        fields = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise RequestError("the request is not JSON") from error
+    if not isinstance(fields, dict):
+        raise RequestError("the request is not a JSON object")
+    topic = fields.get("topic")
+    return Request(
+        node=_name(fields, "node", topic),
+        topic=_name(fields, "topic", topic),
+        socket=_choice(fields, "socket", _DATA | _SERVICES, topic),
+        mode=_MODES[_choice(fields, "mode", frozenset(_MODES), topic, default="many2many")],
+        msg_type=_choice(fields, "msg_type", None, topic, default="json"),
+        pid=_pid(fields.get("pid")),
+        asked_port=asked_port,
+        language=_language(fields),
+    )
+
+
+def grant(request: Request, port: int) -> bytes:
+    """The answer that gives `request` its port; of the shape that the originals expect."""
+    answer: dict[str, object] = {"topic": request.topic, "port": port}
+    if not request.is_service:
+        answer["mode"] = request.mode
+    return _dump({**answer, "ip": LOOPBACK, "socket": request.socket, "state": "success"})
+
+
+def refuse(error: RequestError) -> bytes:
+    """The answer to a request that cannot be granted. The originals read `state`; people read `error`."""
+    return _dump({"topic": error.topic, "state": "failure", "error": str(error)})
+
+
+@dataclass(frozen=True)
+class Member:
+    """One program on one topic, as the broadcast tells it."""
+
+    topic: str
+    node: str
+    port: int
+    socket: str
+    mode: Mode | None
+    msg_type: str
+    pid: int | None
+
+
+def broadcast(members: Iterable[Member]) -> bytes:
+    """The frame that the originals' tools expect on port 7777: every topic and its nodes, with the prefix."""
+    topics: dict[str, dict[str, object]] = {}
+    nodes: dict[str, dict[str, object]] = {}
+    for member in members:
+        if member.topic not in topics:
+            nodes[member.topic] = {}
+            about: dict[str, object] = {"port": member.port, "socket": member.socket, "ip": LOOPBACK}
+            if member.mode is not None:
+                about["mode"] = member.mode
+            topics[member.topic] = {**about, "msg_type": member.msg_type, "nodes": nodes[member.topic]}
+        nodes[member.topic][member.node] = {"socket": member.socket, "pid": member.pid, "ip": LOOPBACK}
+    return b"master " + _dump(topics)
+
+
+def _dump(value: object) -> bytes:
+    return json.dumps(value, separators=(",", ":")).encode("ascii")
+
+
+def _name(fields: Mapping[str, object], key: str, topic: object) -> str:
+    value = fields.get(key)
+    if not isinstance(value, str) or not value:
+        raise RequestError(f"the request has no '{key}'", topic)
+    try:
+        size = len(value.encode())
+    except UnicodeEncodeError as error:
+        raise RequestError(f"the '{key}' of the request is not text", topic) from error
+    if size > MAX_NAME_BYTES:
+        raise RequestError(f"the '{key}' of the request has {size} bytes; at most {MAX_NAME_BYTES} go", topic)
+    return value
+
+
+def _choice(
+    fields: Mapping[str, object],
+    key: str,
+    known: frozenset[str] | None,
+    topic: object,
+    default: str | None = None,
+) -> str:
+    value = fields.get(key, default)
+    if not isinstance(value, str):
+        raise RequestError(f"the request has no '{key}'", topic)
+    if known is not None and value not in known:
+        raise RequestError(f"no {key} '{value[:40]}'; one of {', '.join(sorted(known))}", topic)
+    return value
+
+
+def _pid(value: object) -> int | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, str) and value.isascii() and value.isdigit() and len(value) < 12:
+        value = int(value)
+    return value if isinstance(value, int) and 0 < value < 2**31 else None
+
+
+def _language(fields: Mapping[str, object]) -> str | None:
+    """What can be read from the request itself: only C# sends its pid as text, only C++ names itself."""
+    language = fields.get("language")
+    if isinstance(language, str):
+        return language[:20].lower()
+    pid = fields.get("pid")
+    return "csharp" if isinstance(pid, str) and pid.isascii() and pid.isdigit() else None

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import pytest
+
+from nep.gateway.portmap import FIRST_PORT, LAST_PORT, Line, PortMap, Registration, default_file
+
+JSON_A = Line("t", "prefixed", "json", "many2many")
+JSON_B = Line("t", "bare", "json", "many2many")
+
+
+def registration(line=JSON_A, node="n", pid=7):
+    return Registration(line, node, "publisher", "json", "A", None, pid, 12.5)
+
+
+def test_the_map_is_the_same_after_a_restart(tmp_path):
+    before = PortMap(tmp_path / "deep" / "map.json")
+    before.give(JSON_A, 9000)
+    before.give(JSON_B, 9002)
+    before.add(registration())
+    before.save()
+    after = PortMap(tmp_path / "deep" / "map.json")
+    assert dict(after.lines) == {JSON_A: 9000, JSON_B: 9002}
+    assert after.registrations == (registration(),)
+    assert [entry.name for entry in (tmp_path / "deep").iterdir()] == ["map.json"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", '{"version":99}', '{"version":1,"lines":[{}],"programs":[]}', '{"version":1,"lines":7}'],
+)
+def test_a_damaged_file_is_an_empty_map(tmp_path, text):
+    file = tmp_path / "map.json"
+    file.write_text(text)
+    assert not PortMap(file).lines
+
+
+def test_asking_twice_is_one_registration_and_another_program_another():
+    known = PortMap(None)
+    known.add(registration())
+    known.add(registration())
+    known.add(registration(pid=8))
+    assert len(known.registrations) == 2
+    known.remove({registration(pid=8)})
+    assert known.registrations == (registration(),)
+
+
+def test_ports_are_given_from_9000_up_in_even_steps():
+    known = PortMap(None)
+    assert next(known.candidates(lambda line: True)) == FIRST_PORT == 9000
+    known.give(JSON_A, 9000)
+    assert next(known.candidates(lambda line: True)) == 9002
+
+
+def test_a_line_that_nobody_uses_gives_its_port_away_only_when_all_are_given():
+    known = PortMap(None)
+    for number, port in enumerate(range(FIRST_PORT, LAST_PORT + 1, 2)):
+        known.give(Line(f"t{number}", "bare", "json", "many2many"), port)
+    assert list(known.candidates(lambda line: line.topic != "t3")) == [9006]
+    known.give(JSON_A, 9006)
+    assert known.port_of(JSON_A) == 9006
+    assert known.port_of(Line("t3", "bare", "json", "many2many")) is None
+    assert not list(known.candidates(lambda line: True))
+
+
+def test_nodes_of_one_name_are_told_apart():
+    assert registration(pid=1).node_id != registration(pid=2).node_id
+    assert registration(pid=None).node_id == registration(pid=None).node_id
+
+
+def test_each_master_has_its_own_file(tmp_path, monkeypatch):
+    monkeypatch.setenv("NEP_STATE_DIR", str(tmp_path))
+    assert default_file(7780) != default_file(7781)
+    assert default_file(7780).parent == tmp_path

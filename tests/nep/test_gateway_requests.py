@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nep.gateway.requests import Member, RequestError, broadcast, grant, read_request, refuse
+
+ASKED = {
+    "node": "n1",
+    "topic": "t1",
+    "mode": "many2many",
+    "socket": "publisher",
+    "pid": 3346,
+    "msg_type": "json",
+}
+
+
+def ask(port=7000, **changes):
+    fields = {key: value for key, value in {**ASKED, **changes}.items() if value is not ...}
+    return read_request(json.dumps(fields).encode(), port)
+
+
+def test_a_request_as_the_python_library_sends_it():
+    request = ask()
+    assert (request.node, request.topic, request.socket, request.pid) == ("n1", "t1", "publisher", 3346)
+    assert (request.generation, request.framing, request.codec) == ("A", "prefixed", "json")
+    assert (ask(50000).generation, ask(50000).framing) == ("B", "bare")
+
+
+@pytest.mark.parametrize(
+    ("pid", "read"), [(7, 7), ("7", 7), ("none", None), (..., None), (True, None), (-1, None), (1e9, None)]
+)
+def test_the_process_id_is_a_number_a_text_or_not_there(pid, read):
+    assert ask(pid=pid).pid == read
+
+
+def test_only_csharp_sends_its_process_id_as_text():
+    assert ask(pid="77").language == "csharp"
+    assert ask(pid=77).language is None
+    assert ask(language="C++").language == "c++"
+
+
+def test_missing_type_and_mode_have_the_originals_defaults():
+    request = ask(msg_type=..., mode=...)
+    assert (request.msg_type, request.mode) == ("json", "many2many")
+
+
+def test_the_answer_has_the_shape_and_order_that_the_originals_expect():
+    assert grant(ask(), 9000) == (
+        b'{"topic":"t1","port":9000,"mode":"many2many","ip":"127.0.0.1","socket":"publisher","state":"success"}'
+    )
+    assert b"mode" not in grant(ask(socket="server"), 9000)
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"", "not JSON"),
+        (b"\xff\xfe", "not JSON"),
+        (b"[" * 60000, "not JSON"),
+        (b"[]", "not a JSON object"),
+        (b"{}", "no 'node'"),
+        (json.dumps({**ASKED, "topic": 5}).encode(), "no 'topic'"),
+        (json.dumps({**ASKED, "topic": "\ud800"}).encode(), "not text"),
+        (json.dumps({**ASKED, "topic": "t" * 201}).encode(), "201 bytes"),
+        (json.dumps({**ASKED, "socket": "nobody"}).encode(), "no socket 'nobody'"),
+        (json.dumps({**ASKED, "mode": "all2all"}).encode(), "no mode 'all2all'"),
+        (json.dumps({**ASKED, "msg_type": {}}).encode(), "no 'msg_type'"),
+        (b" " * 70000, "at most"),
+    ],
+)
+def test_a_bad_request_is_answered_with_a_sentence(data, sentence):
+    with pytest.raises(RequestError, match=sentence) as caught:
+        read_request(data, 7000)
+    answer = json.loads(refuse(caught.value))
+    assert answer["state"] == "failure"
+    assert sentence in answer["error"]
+
+
+def test_a_refusal_names_the_topic_because_the_originals_compare_it():
+    with pytest.raises(RequestError) as caught:
+        ask(node=...)
+    assert json.loads(refuse(caught.value))["topic"] == "t1"
+
+
+@given(st.binary(max_size=300))
+def test_random_bytes_are_refused_and_never_kill(data):
+    with pytest.raises(RequestError) as caught:
+        read_request(data, 50000)
+    assert json.loads(refuse(caught.value))["state"] == "failure"
+
+
+def test_the_broadcast_has_the_prefix_and_the_shape_of_the_originals():
+    frame = broadcast(
+        [
+            Member("t1", "n1", 9000, "publisher", "many2many", "json", 3346),
+            Member("t1", "n2", 9000, "subscriber", "many2many", "json", None),
+            Member("s", "n3", 9002, "server", None, "json", 1),
+        ]
+    )
+    assert frame.startswith(b"master {")
+    topics = json.loads(frame[len(b"master ") :])
+    assert topics["t1"] == {
+        "port": 9000,
+        "socket": "publisher",
+        "ip": "127.0.0.1",
+        "mode": "many2many",
+        "msg_type": "json",
+        "nodes": {
+            "n1": {"socket": "publisher", "pid": 3346, "ip": "127.0.0.1"},
+            "n2": {"socket": "subscriber", "pid": None, "ip": "127.0.0.1"},
+        },
+    }
+    assert "mode" not in topics["s"]
+    assert broadcast([]) == b"master {}"
