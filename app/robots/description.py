@@ -1,0 +1,98 @@
+"""What a robot can do and tell: typed values parsed from its W3C Thing Model or Thing Description.
+
+The document is parsed once, at the edge, by :func:`parse`; Studio itself works with :class:`Robot`.
+The ``rb:`` terms are explained in ``resources/robots/README.md``.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Mapping
+
+from app.errors import DescriptionError
+from app.robots.inputs import Choice, Parameter, pretty_unit
+from app.robots.members import as_part, part, text
+from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor, Topics
+from app.robots.profile import validate
+from app.robots.reading import read
+
+__all__ = [
+    "Action", "Choice", "Event", "Field", "Parameter", "Robot", "SafeStop", "Sensor", "Topics",
+    "parse", "pretty_unit", "td_for", "topic_of", "validate",
+]  # fmt: skip
+
+_NOT_IN_TOPICS = re.compile(r"[^\w.-]")
+
+
+def topic_of(name: str, leaf: str) -> str:
+    """The topic of a robot's part: ``topic_of("My robot", "camera")`` is ``/My_robot/camera``."""
+    return f"/{_NOT_IN_TOPICS.sub('_', name)}/{leaf}"
+
+
+def parse(document: Mapping[str, object]) -> Robot:
+    """The robot that a Thing Model or Thing Description describes; DescriptionError says what is wrong."""
+    problems = validate(document)
+    if problems:
+        title = as_part(document).get("title")
+        raise DescriptionError(title if isinstance(title, str) else "a robot", problems)
+    return read(document, default_topics(str(document["title"])))
+
+
+def default_topics(name: str, *, virtual: bool = False) -> Topics:
+    """The topics of a robot of that name, as the kit uses them."""
+    return Topics(
+        description=topic_of(name, "description"),
+        command=topic_of(name, "command"),
+        answer=topic_of(name, "answer"),
+        state=topic_of(name, "state") if virtual else None,
+        world=topic_of(name, "world") if virtual else None,
+    )
+
+
+def td_for(model: Mapping[str, object], name: str) -> dict[str, object]:
+    """The Thing Description that a robot of this model announces under its name: its id and all its forms.
+
+    The model is one that :func:`validate` finds good; it is not changed.
+    """
+    described = copy.deepcopy(dict(model))
+    kind = part(described, "rb:robot")
+    topics = default_topics(name, virtual=kind.get("virtual") is True)
+    kept = {
+        key: value
+        for key, value in described.items()
+        if key not in {"titles", "actions", "properties", "events"}
+    }
+    kept |= {
+        "@type": ["rb:Robot"],
+        "title": name,
+        "id": f"urn:nep:robot:{_NOT_IN_TOPICS.sub('_', name)}",
+        "securityDefinitions": {"nosec_sc": {"scheme": "nosec"}},
+        "security": "nosec_sc",
+        "rb:robot": {**kind, "title": text(kind.get("title")) or str(model["title"])},
+        "rb:topics": {leaf: topic for leaf, topic in vars(topics).items() if topic is not None},
+    }
+    asked = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.answer}"}
+    kept["properties"] = {
+        leaf: {**as_part(sensor), "forms": [_sensor_form(topic_of(name, leaf), as_part(sensor))]}
+        for leaf, sensor in part(described, "properties").items()
+    }
+    kept["actions"] = {
+        leaf: {**as_part(action), "forms": [dict(asked)]}
+        for leaf, action in part(described, "actions").items()
+    }
+    kept["events"] = {
+        leaf: {**as_part(event), "forms": [_form(topic_of(name, leaf), "subscribeevent", "unsubscribeevent")]}
+        for leaf, event in part(described, "events").items()
+    }
+    return kept
+
+
+def _form(topic: str, *ops: str) -> dict[str, object]:
+    return {"href": f"nep:{topic}", "contentType": "application/json", "op": list(ops)}
+
+
+def _sensor_form(topic: str, sensor: Mapping[str, object]) -> dict[str, object]:
+    form = _form(topic, "observeproperty", "unobserveproperty")
+    media = text(sensor.get("contentMediaType"))
+    return {**form, "contentType": media} if media else form

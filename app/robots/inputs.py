@@ -1,0 +1,203 @@
+"""Is this input good for that action? Sentences that a person can act on.
+
+``turn: angle must be between -360 and 360 °``
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from app.robots.members import as_part, number, text
+
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of the values that a parameter allows, and the word that people see for it."""
+
+    value: str | int | float
+    title: str
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One input of an action, or one datum of an event.
+
+    ``kind`` is text, number, integer, choice, colour, boolean, angle (a number in degrees), image or list.
+    ``step`` is a hint for editors, never a reason to refuse. ``advanced`` ones are folded in forms.
+    """
+
+    name: str
+    title: str
+    kind: str
+    minimum: float | None = None
+    maximum: float | None = None
+    step: float | None = None
+    unit: str | None = None
+    default: object = None
+    choices: tuple[Choice, ...] = ()
+    required: bool = False
+    advanced: bool = False
+    options_from: str | None = None
+    min_length: int = 0
+    max_length: int | None = None
+    widget: str | None = None
+
+
+def pretty_unit(unit: str | None) -> str | None:
+    """The unit as people write it: "deg" is "°"; None stays None."""
+    return None if unit is None else _UNITS.get(unit, unit)
+
+
+def pretty_number(value: float) -> str:
+    """The number without a needless fraction: 360, -0.05."""
+    return f"{value:.10g}"
+
+
+def near_miss(wrong: str, known: Iterable[str]) -> str:
+    """``; did you mean "turn"?`` when a known word is close, else nothing."""
+    close = difflib.get_close_matches(wrong, list(known), n=1)
+    return f"; did you mean “{close[0]}”?" if close else ""
+
+
+def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
+    """The parameter that a data schema describes."""
+    longest = number(data.get("maxLength"))
+    return Parameter(
+        name=name,
+        title=text(data.get("title")) or name.replace("_", " "),
+        kind=kind_of(data),
+        minimum=number(data.get("minimum")),
+        maximum=number(data.get("maximum")),
+        step=number(data.get("rb:step")) or number(data.get("multipleOf")),
+        unit=pretty_unit(text(data.get("unit"))),
+        default=data.get("default"),
+        choices=choices_of(data),
+        required=required,
+        advanced=data.get("rb:advanced") is True,
+        options_from=text(data.get("rb:optionsFrom")),
+        min_length=int(number(data.get("minLength")) or 0),
+        max_length=None if longest is None else int(longest),
+        widget=text(data.get("rb:widget")),
+    )
+
+
+def kind_of(data: Mapping[str, object]) -> str:
+    """The kind of value that a data schema describes, as :class:`Parameter` names it, or "object"."""
+    widget, kind = data.get("rb:widget"), data.get("type")
+    if choices_of(data):
+        return "choice"
+    if widget == "colour" or "pattern" in data:
+        return "colour"
+    if widget == "image":
+        return "image"
+    if kind in {"number", "integer"}:
+        return "angle" if widget == "angle" else str(kind)
+    return {"boolean": "boolean", "array": "list", "object": "object"}.get(str(kind), "text")
+
+
+def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
+    """The values that a data schema lists, with their words; empty when it lists none."""
+    listed = data.get("enum")
+    pairs: list[tuple[object, object]] = []
+    if isinstance(listed, (list, tuple)):
+        pairs = [(value, None) for value in listed]
+    named = data.get("oneOf")
+    if isinstance(named, (list, tuple)):
+        pairs = [(as_part(item).get("const"), as_part(item).get("title")) for item in named]
+    return tuple(
+        Choice(value, text(title) or str(value).replace("_", " "))
+        for value, title in pairs
+        if isinstance(value, (str, int, float))
+    )
+
+
+def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
+    """One sentence for each thing wrong with the input; empty when the robot may be asked."""
+    if not isinstance(given, Mapping):
+        return (f"{action}: the input must be an object with named values",)
+    known = {parameter.name: parameter for parameter in parameters}
+    sentences = []
+    for name in given:
+        if name not in known:
+            word = str(name)
+            sentences.append(f"{action}: there is no “{word}”{near_miss(word, known)}")
+    for name, parameter in known.items():
+        if name in given:
+            wrong = wrong_value(parameter, given[name])
+            if wrong is not None:
+                sentences.append(f"{action}: {parameter.title} {wrong}")
+        elif parameter.required:
+            sentences.append(f"{action}: {parameter.title} is missing")
+    return tuple(sentences)
+
+
+def wrong_value(parameter: Parameter, value: object) -> str | None:
+    """What a value must be instead ("must be a number"); None when it is good."""
+    if parameter.choices:
+        if any(_same(choice.value, value) for choice in parameter.choices):
+            return None
+        return f"must be {_listed([choice.title for choice in parameter.choices])}"
+    if parameter.kind in {"number", "integer", "angle"}:
+        return _wrong_number(parameter, value)
+    if parameter.kind == "boolean":
+        return None if isinstance(value, bool) else "must be yes or no"
+    if parameter.kind == "colour":
+        good = isinstance(value, str) and _COLOUR.fullmatch(value) is not None
+        return None if good else "must be a colour like #20c0e0"
+    if parameter.kind == "list":
+        good = isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value)
+        return None if good else "must be a list"
+    return _wrong_text(parameter, value)
+
+
+def _same(allowed: object, given: object) -> bool:
+    # 1 == True in Python, but a robot that knows 1 does not know "yes".
+    return allowed == given and isinstance(allowed, bool) == isinstance(given, bool)
+
+
+def _wrong_number(parameter: Parameter, value: object) -> str | None:
+    whole = parameter.kind == "integer"
+    noun = "a whole number" if whole else "a number"
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not _is_finite(value):
+        return f"must be {noun}"
+    if whole and float(value) != int(value):
+        return f"must be {noun}"
+    low, high = parameter.minimum, parameter.maximum
+    if (low is None or value >= low) and (high is None or value <= high):
+        return None
+    unit = "" if parameter.unit is None else f" {parameter.unit}"
+    if low is not None and high is not None:
+        return f"must be between {pretty_number(low)} and {pretty_number(high)}{unit}"
+    if low is not None:
+        return f"must be at least {pretty_number(low)}{unit}"
+    return f"must be at most {pretty_number(high or 0.0)}{unit}"
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
+
+
+def _wrong_text(parameter: Parameter, value: object) -> str | None:
+    if not isinstance(value, str):
+        return "must be text"
+    if len(value) < parameter.min_length:
+        return (
+            "must not be empty" if parameter.min_length == 1 else f"needs {parameter.min_length} characters"
+        )
+    if parameter.max_length is not None and len(value) > parameter.max_length:
+        return f"must be at most {parameter.max_length} characters long"
+    return None
+
+
+def _listed(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"

@@ -1,0 +1,30 @@
+"""Reading the members of a JSON document that may hold anything."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+
+def part(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
+    """The object of that name inside another; empty when it is missing or something else."""
+    return as_part(mapping.get(name))
+
+
+def as_part(value: object) -> Mapping[str, object]:
+    """The value when it is an object, else an empty one."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def names(value: object) -> tuple[str, ...]:
+    """The words of a list; none when it is something else."""
+    return tuple(str(item) for item in value) if isinstance(value, (list, tuple)) else ()
+
+
+def text(value: object) -> str | None:
+    """The text, or None when it is something else or empty."""
+    return value if isinstance(value, str) and value else None
+
+
+def number(value: object) -> float | None:
+    """The number as it is (a whole one stays whole), or None; yes and no are no numbers."""
+    return value if isinstance(value, (int, float)) and not isinstance(value, bool) else None

@@ -1,0 +1,193 @@
+"""Is this a robot's description? The profile's JSON Schema, and what a schema can't say, in sentences.
+
+The schema is ``resources/robots/robot-profile.schema.json``; the terms are explained in the README beside it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from jsonschema import Draft7Validator
+
+from app import resources
+from app.robots.inputs import parameter_of, wrong_value
+from app.robots.members import as_part, names, part
+
+if TYPE_CHECKING:
+    from jsonschema.exceptions import ValidationError
+
+PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
+_MOST_PROBLEMS = 20
+_DEEPEST = 40
+_LARGEST = 1e15
+
+
+@lru_cache(maxsize=1)
+def _validator() -> Draft7Validator:
+    schema = json.loads(resources.path("robots", "robot-profile.schema.json").read_text(encoding="utf-8"))
+    return Draft7Validator(schema)
+
+
+def validate(model: object) -> tuple[str, ...]:
+    """What is wrong with a Thing Model or Thing Description, one sentence each; empty when it can be used."""
+    if not isinstance(model, Mapping):
+        return ("a description must be a JSON object",)
+    model = dict(model)
+    strange = _not_json(model)
+    if strange is not None:
+        return (strange,)
+    problems = [_sentence(error) for error in _validator().iter_errors(model)]
+    if not problems:
+        problems = list(_contradictions(model))
+    return tuple(dict.fromkeys(problems))[:_MOST_PROBLEMS]
+
+
+def _not_json(value: object, path: str = "", depth: int = 0) -> str | None:
+    """The first thing in it that JSON does not have, that never ends, or that points elsewhere."""
+    if depth > _DEEPEST:
+        return f"{path or 'the description'} is nested too deeply"
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if not isinstance(key, str):
+                return f"{path or 'the description'} has a name that is not text: {key!r}"
+            if key == "$ref":
+                return f"{path or 'the description'} uses $ref, which is not allowed here; write the part out"
+            found = _not_json(item, f"{path}.{key}" if path else key, depth + 1)
+            if found is not None:
+                return found
+        return None
+    if isinstance(value, list):
+        found_items = (_not_json(item, f"{path}[{index}]", depth + 1) for index, item in enumerate(value))
+        return next((found for found in found_items if found is not None), None)
+    if isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
+        return f"{path} is no usable number"
+    if value is None or isinstance(value, (str, bool, int, float)):
+        return None
+    return f"{path} is not JSON: {type(value).__name__}"
+
+
+# ---- sentences for what the schema finds ----------------------------------------------------------
+
+_TYPE_WORDS = {
+    "string": "text",
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "object": "an object",
+    "array": "a list",
+    "null": "null",
+}
+
+
+def _sentence(error: ValidationError) -> str:
+    place = ".".join(str(part) for part in error.absolute_path) or "the description"
+    rule = str(error.validator)
+    limit: object = error.validator_value
+    if rule == "required" and isinstance(error.instance, Mapping) and isinstance(limit, Sequence):
+        missing = next((str(name) for name in limit if name not in error.instance), "something")
+        return f"{place} has no '{missing}'"
+    if rule == "type":
+        kinds = limit if isinstance(limit, list) else [limit]
+        return f"{place} must be {' or '.join(_TYPE_WORDS.get(str(kind), str(kind)) for kind in kinds)}"
+    if rule == "enum":
+        return f"{place} must be one of {', '.join(names(limit))}"
+    if rule == "const":
+        return f"{place} must be {limit}"
+    words = {
+        "minimum": f"must be at least {limit}",
+        "exclusiveMinimum": f"must be above {limit}",
+        "maximum": f"must be at most {limit}",
+        "minLength": "must not be empty",
+        "maxLength": f"is longer than {limit} characters",
+        "minItems": "must not be empty",
+        "minProperties": "must not be empty",
+        "maxItems": f"has more than {limit} entries",
+        "maxProperties": f"has more than {limit} entries",
+        "anyOf": "has the wrong form",
+    }
+    if rule == "pattern":
+        shown = _shortened(error.instance)
+        return f"{place}: {shown} can't be used here; use letters, digits, - and _ without spaces"
+    return f"{place} {words.get(rule, 'can not be understood')}"
+
+
+def _shortened(value: object) -> str:
+    text = str(value)
+    return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
+
+
+# ---- what a schema can't say ----------------------------------------------------------------------
+
+
+def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
+    actions = part(model, "actions")
+    properties = part(model, "properties")
+    stop = str(part(model, "rb:safeStop").get("action"))
+    if stop not in actions:
+        yield f"rb:safeStop.action names '{stop}', but there is no such action"
+    elif part(part(actions, stop), "input").get("required"):
+        yield f"'{stop}' is the safe stop, so its input must not require anything"
+    resources_named = set(names(model.get("rb:resources")))
+    for name, action in actions.items():
+        yield from _of_action(name, as_part(action), resources_named, properties)
+    for name, sensor in properties.items():
+        yield from _of_data(f"properties.{name}", as_part(sensor))
+    for name, event in part(model, "events").items():
+        happening = as_part(event)
+        data = part(part(happening, "data"), "properties")
+        yield from _of_fields(f"events.{name}.data", data)
+        for field in names(happening.get("rb:filter")):
+            if field not in data:
+                yield f"events.{name}.rb:filter names '{field}', which is not in its data"
+        yield from _of_texts(f"events.{name}", happening, data)
+
+
+def _of_action(
+    name: str, action: Mapping[str, object], resources_named: set[str], properties: Mapping[str, object]
+) -> Iterator[str]:
+    fields = part(part(action, "input"), "properties")
+    yield from _of_fields(f"actions.{name}.input", fields)
+    for field in names(part(action, "input").get("required")):
+        if field not in fields:
+            yield f"actions.{name}.input requires '{field}', which it does not describe"
+    for used in names(action.get("rb:uses")):
+        if used not in resources_named:
+            yield f"actions.{name}.rb:uses names '{used}', which is not in rb:resources"
+    for field, data in fields.items():
+        source = as_part(data).get("rb:optionsFrom")
+        if source is not None and source not in properties:
+            yield f"actions.{name}.input.{field} takes its options from '{source}', which is no property"
+    yield from _of_texts(f"actions.{name}", action, fields)
+
+
+def _of_fields(place: str, fields: Mapping[str, object]) -> Iterator[str]:
+    for name, data in fields.items():
+        if name == "robot":
+            yield f"{place}: 'robot' is taken; name the value differently"
+        yield from _of_data(f"{place}.{name}", as_part(data))
+
+
+def _of_data(place: str, data: Mapping[str, object]) -> Iterator[str]:
+    low, high = data.get("minimum"), data.get("maximum")
+    if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low > high:
+        yield f"{place}: minimum {low} is above maximum {high}"
+    elif data.get("default") is not None:
+        wrong = wrong_value(parameter_of(place, data), data["default"])
+        if wrong is not None:
+            yield f"{place}: the default {wrong}"
+
+
+def _of_texts(place: str, owner: Mapping[str, object], fields: Mapping[str, object]) -> Iterator[str]:
+    block = part(owner, "rb:block")
+    for kind in ("text", "says"):
+        for language, text in part(block, kind).items():
+            used = PLACEHOLDER.findall(str(text))
+            for name in used:
+                if name != "robot" and name not in fields:
+                    yield f"{place}.rb:block.{kind}.{language} uses %{name}, which is not described"
+            if kind == "text" and len(used) != len(set(used)):
+                yield f"{place}.rb:block.text.{language} uses a value twice"

@@ -1,0 +1,179 @@
+"""From a checked description document to typed parts; :func:`app.robots.description.parse` is the way in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.robots.inputs import Parameter, choices_of, kind_of, parameter_of, pretty_unit
+from app.robots.members import as_part, names, number, part, text
+from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor, Topics
+
+_SCHEME = "nep:"
+_LANGUAGE = "en"
+_ICONS = {"moves": "move", "locomotes": "footprints"}
+
+
+def read(document: Mapping[str, object], topics: Topics) -> Robot:
+    """The robot of a document that has no problems; `topics` serve where the document names none."""
+    own = part(document, "rb:topics")
+    topics = Topics(
+        description=text(own.get("description")) or topics.description,
+        command=text(own.get("command")) or topics.command,
+        answer=text(own.get("answer")) or topics.answer,
+        state=text(own.get("state")) or topics.state,
+        world=text(own.get("world")) or topics.world,
+    )
+    name = str(document["title"])
+    kind = part(document, "rb:robot")
+    home = topics.command.rpartition("/")[0]
+    return Robot(
+        name=name,
+        model=str(kind["model"]),
+        title=text(kind.get("title")) or name,
+        virtual=kind.get("virtual") is True,
+        dialect=text(kind.get("dialect")) or "native",
+        actions=tuple(_action(leaf, as_part(a), topics) for leaf, a in part(document, "actions").items()),
+        sensors=tuple(_sensor(leaf, as_part(s), home) for leaf, s in part(document, "properties").items()),
+        events=tuple(_event(leaf, as_part(e), home) for leaf, e in part(document, "events").items()),
+        safe_stop=_safe_stop(part(document, "rb:safeStop")),
+        resources=names(document.get("rb:resources")),
+        topics=topics,
+        source=document,
+    )
+
+
+def _safe_stop(stop: Mapping[str, object]) -> SafeStop:
+    return SafeStop(
+        action=str(stop["action"]),
+        watchdog_s=number(stop.get("watchdog")),
+        within_s=number(stop.get("within")) or 0.5,
+        on_program_end=stop.get("onProgramEnd") is not False,
+        on_disconnect=stop.get("onDisconnect") is not False,
+        confirmed=stop.get("confirmed") is not False,
+    )
+
+
+def _action(name: str, action: Mapping[str, object], topics: Topics) -> Action:
+    given = part(action, "input")
+    required = names(given.get("required"))
+    parameters = _parameters(part(given, "properties"), required)
+    block = part(action, "rb:block")
+    risk = text(action.get("rb:risk"))
+    title = _title(name, action)
+    return Action(
+        name=name,
+        title=title,
+        icon=text(block.get("icon")) or _ICONS.get(risk or "", "play"),
+        category=_category(block, "Actions"),
+        parameters=parameters,
+        text=_with_robot(_words(block, "text") or _spelled(title, parameters)),
+        says=_with_robot(_words(block, "says")) or None,
+        topic=_topic(action, topics.command),
+        answer_topic=_topic(action, topics.answer, "rb:answer"),
+        risk=risk,
+        cancellable=action.get("rb:cancel") is True,
+        timeout_s=number(action.get("rb:timeout")),
+        uses=names(action.get("rb:uses")),
+        on_busy=text(action.get("rb:onBusy")) or "queue",
+        synchronous=action.get("synchronous") is True,
+        feedback=_fields(part(action, "rb:feedback")),
+        output=_fields(part(action, "output")),
+    )
+
+
+def _sensor(name: str, sensor: Mapping[str, object], home: str) -> Sensor:
+    block = part(sensor, "rb:block")
+    return Sensor(
+        name=name,
+        title=_title(name, sensor),
+        kind=_sensor_kind(sensor),
+        topic=_topic(sensor, f"{home}/{name}"),
+        unit=pretty_unit(text(sensor.get("unit"))),
+        minimum=number(sensor.get("minimum")),
+        maximum=number(sensor.get("maximum")),
+        rate_hz=number(sensor.get("rb:rate")),
+        fields=_fields(sensor),
+        icon=text(block.get("icon")) or "activity",
+        category=_category(block, "Sensors"),
+        text=_with_robot(_words(block, "text")),
+        camera=text(sensor.get("rb:camera")),
+        choices=choices_of(sensor),
+    )
+
+
+def _sensor_kind(sensor: Mapping[str, object]) -> str:
+    if str(sensor.get("contentMediaType", "")).startswith("image/"):
+        return "image"
+    if sensor.get("rb:widget") == "detections":
+        return "detections"
+    kind = kind_of(sensor)
+    return "number" if kind == "angle" else kind
+
+
+def _event(name: str, event: Mapping[str, object], home: str) -> Event:
+    block = part(event, "rb:block")
+    fields = _parameters(part(part(event, "data"), "properties"), ())
+    filters = names(event.get("rb:filter"))
+    title = _title(name, event)
+    words = _words(block, "text") or f"when %robot {title}"
+    return Event(
+        name=name,
+        title=title,
+        icon=text(block.get("icon")) or "zap",
+        category=_category(block, "Events"),
+        fields=fields,
+        filters=filters,
+        text=_with_robot(words),
+        topic=_topic(event, f"{home}/{name}"),
+    )
+
+
+def _parameters(data: Mapping[str, object], required: tuple[str, ...]) -> tuple[Parameter, ...]:
+    return tuple(parameter_of(name, as_part(d), required=name in required) for name, d in data.items())
+
+
+def _fields(owner: Mapping[str, object]) -> tuple[Field, ...]:
+    return tuple(
+        Field(name, _title(name, as_part(d)), kind_of(as_part(d)), pretty_unit(text(as_part(d).get("unit"))))
+        for name, d in part(owner, "properties").items()
+    )
+
+
+def _title(name: str, owner: Mapping[str, object]) -> str:
+    return text(owner.get("title")) or name.replace("_", " ")
+
+
+def _category(block: Mapping[str, object], otherwise: str) -> str:
+    """The heading in the toolbox: a sentence's capital, whatever the document has."""
+    found = (text(block.get("category")) or otherwise).strip()
+    return found[:1].upper() + found[1:]
+
+
+def _words(block: Mapping[str, object], kind: str) -> str:
+    words = part(block, kind)
+    return (text(words.get(_LANGUAGE)) or next((str(word) for word in words.values()), "")).strip()
+
+
+def _spelled(title: str, parameters: tuple[Parameter, ...]) -> str:
+    """A block text for an action that brings none: its title, then each value with its name and unit."""
+    shown = [parameter for parameter in parameters if not parameter.advanced]
+    values = [f"%{p.name}{' ' + p.unit if p.unit else ''}" for p in shown]
+    return " ".join([title, *values])
+
+
+def _with_robot(words: str) -> str:
+    """The text with ``%robot`` in it: at the front, or behind the "when" of an event."""
+    if not words or "%robot" in words:
+        return words
+    if words.startswith("when "):
+        return f"when %robot {words.removeprefix('when ')}"
+    return f"%robot {words}"
+
+
+def _topic(owner: Mapping[str, object], otherwise: str, member: str = "href") -> str:
+    forms = owner.get("forms")
+    for form in forms if isinstance(forms, (list, tuple)) else ():
+        href = text(as_part(form).get(member))
+        if href is not None and href.startswith(_SCHEME):
+            return href.removeprefix(_SCHEME)
+    return otherwise
