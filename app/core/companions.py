@@ -1,0 +1,149 @@
+"""The processes that Studio starts beside itself: the master, when there is none, and virtual robots."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import IO
+
+from nep.masters import is_running, start_process
+
+from nep.errors import NepError
+
+END_WAIT_S = 2.0
+TAIL_BYTES = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class CompanionFailed:
+    """A process did not start or ended by itself; ``detail`` is the end of what it said."""
+
+    what: str
+    sentence: str
+    detail: str
+
+
+def module_command(module: str) -> list[str]:
+    """The command that runs one of our modules as a process of its own, also from a frozen build."""
+    if getattr(sys, "frozen", False):
+        return [sys.executable, "--module", module]
+    return [sys.executable, "-m", module]
+
+
+class Companions:
+    """Starts processes, notices when one ends, ends them with the window."""
+
+    def __init__(self, address: str, post_event: Callable[[object], None]) -> None:
+        """``address`` is the master's; failures are posted as `CompanionFailed`."""
+        self._address = address
+        self._post_event = post_event
+        self._lock = threading.Lock()
+        self._robots: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+        self._master: subprocess.Popen[bytes] | None = None
+        self._starting: threading.Thread | None = None
+
+    @property
+    def virtual_robots(self) -> tuple[str, ...]:
+        """The names of the virtual robots that run because Studio started them."""
+        with self._lock:
+            return tuple(name for name, (process, _) in self._robots.items() if process.poll() is None)
+
+    @property
+    def started_master(self) -> bool:
+        """Whether the master that runs was started here."""
+        return self._master is not None and self._master.poll() is None
+
+    def ensure_master(self) -> None:
+        """Join the master that runs, or start one; returns at once, a failure is posted."""
+        if self._starting is not None and self._starting.is_alive():
+            return
+        self._starting = threading.Thread(target=self._start_master, name="studio-companions", daemon=True)
+        self._starting.start()
+
+    def start_virtual_robot(self, name: str = "Pepper") -> None:
+        """Start a virtual robot of that name; nothing happens when it runs already."""
+        with self._lock:
+            held = self._robots.get(name)
+            if held is not None and held[0].poll() is None:
+                return
+            log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  open while the process writes
+            command = [
+                *module_command("app.robots.simulated"),
+                "--name",
+                name,
+                "--owner-pid",
+                str(os.getpid()),
+            ]
+            environment = {**os.environ, "NEP_MASTER": self._address}
+            try:
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=log,
+                    env=environment,
+                    creationflags=_no_console(),
+                )
+            except OSError as error:
+                log.close()
+                self._post_event(
+                    CompanionFailed(name, f"The virtual robot {name} can't be started.", str(error))
+                )
+                return
+            self._robots[name] = (process, log)
+
+    def stop_virtual_robot(self, name: str) -> None:
+        """End a virtual robot that was started here."""
+        with self._lock:
+            held = self._robots.pop(name, None)
+        if held is not None:
+            _end(held[0])
+            held[1].close()
+
+    def check(self) -> None:
+        """Notice processes that ended by themselves (called once in a while by the session's tick)."""
+        with self._lock:
+            ended = [name for name, (process, _) in self._robots.items() if process.poll() is not None]
+            for name in ended:
+                _, log = self._robots.pop(name)
+                self._post_event(CompanionFailed(name, f"The virtual robot {name} has ended.", _tail(log)))
+                log.close()
+
+    def close(self) -> None:
+        """End the virtual robots. The master lives on while programs that are not ours are registered."""
+        for name in list(self._robots):
+            self.stop_virtual_robot(name)
+        if self._starting is not None:
+            self._starting.join(timeout=END_WAIT_S)
+
+    def _start_master(self) -> None:
+        if is_running(self._address, timeout_s=0.5):
+            return
+        try:
+            self._master = start_process(self._address, owner_pid=os.getpid())
+        except (NepError, OSError) as error:
+            self._post_event(CompanionFailed("master", "The master can't be started.", str(error)))
+
+
+def _no_console() -> int:
+    return getattr(subprocess, "CREATE_NO_WINDOW", 0)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(timeout=END_WAIT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _tail(log: IO[bytes]) -> str:
+    log.seek(0, os.SEEK_END)
+    log.seek(max(0, log.tell() - TAIL_BYTES))
+    return log.read().decode("utf-8", "replace").strip()

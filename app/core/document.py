@@ -1,0 +1,224 @@
+"""The behaviour that is open: its blocks, its file, its journal, and what the compiler says of it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from app.blocks import Problem, Program, compile_behaviour, editor_definitions
+from app.core.files import write_atomically
+from app.core.journal import Journal, Unsaved
+from app.errors import DescriptionError, DocumentError
+from app.robots.description import Robot, parse
+
+FORMAT = "nep-behaviour"
+VERSION = 1
+SUFFIX = ".nepb"
+UNNAMED = "New behaviour"
+LARGEST_BYTES = 32 * 1024 * 1024
+
+Workspace = Mapping[str, object]
+Descriptions = Mapping[str, Mapping[str, object]]
+
+
+class Document:
+    """One behaviour.
+
+    ``revision`` grows when it is replaced from outside the editor, ``edits`` with every edit.
+    """
+
+    def __init__(
+        self, journal: Callable[[], Journal] = Journal, clock: Callable[[], float] = time.time
+    ) -> None:
+        """Start with an empty new behaviour; ``journal`` makes the journal of each."""
+        self._make_journal = journal
+        self._clock = clock
+        self._journal = journal()
+        self.path: Path | None = None
+        self.name = UNNAMED
+        self.workspace: Workspace = {}
+        self.robots: dict[str, Mapping[str, object]] = {}
+        self.dirty = False
+        self.saved_at: float | None = None
+        self.revision = 0
+        self.edits = 0
+        self.definitions_revision = 0
+        self._connected: tuple[Robot, ...] = ()
+        self._topics: tuple[str, ...] = ()
+        self._compiled: tuple[tuple[int, int, int], Program] | None = None
+        self._definitions: tuple[int, Mapping[str, object]] | None = None
+        self.journal_error: str | None = None
+
+    # -- editing and files -----------------------------------------------------------------------------------
+
+    def edited(self, workspace: Workspace) -> None:
+        """The editor changed the blocks. They are in the journal when this returns."""
+        if workspace == self.workspace:
+            return
+        self.workspace = workspace
+        self.dirty = True
+        self.edits += 1
+        self._keep_used_robots()
+        self._write_journal()
+
+    def new(self, name: str = UNNAMED) -> None:
+        """Begin an empty behaviour."""
+        self._replace(name, None, {}, {})
+
+    def open(self, path: Path) -> None:
+        """Open a file. Raises DocumentError; then what was open stays."""
+        name, workspace, robots = read(path)
+        self._replace(name, path, workspace, robots)
+        self.saved_at = path.stat().st_mtime
+
+    def example(self, path: Path) -> None:
+        """Open an example as a new, unsaved behaviour. Raises DocumentError."""
+        name, workspace, robots = read(path)
+        self._replace(name, None, workspace, robots)
+
+    def recover(self, unsaved: Unsaved) -> None:
+        """Put back what a crash left behind.
+
+        It is unsaved, and journalled anew before the old journal goes.
+        """
+        self._replace(unsaved.name, unsaved.path, unsaved.workspace, unsaved.robots)
+        self.dirty = True
+        self._write_journal()
+        unsaved.journal.unlink(missing_ok=True)
+
+    def save(self, path: Path | None = None) -> None:
+        """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError."""
+        target = path if path is not None else self.path
+        if target is None:
+            raise DocumentError(None, "this behaviour has no file yet; choose one")
+        name = target.stem if path is not None else self.name
+        content = {
+            "format": FORMAT,
+            "version": VERSION,
+            "name": name,
+            "workspace": self.workspace,
+            "robots": self.robots,
+        }
+        data = json.dumps(content, indent=1, ensure_ascii=False).encode("utf-8", "surrogatepass")
+        try:
+            write_atomically(target, data)
+        except OSError as error:
+            raise DocumentError(
+                target, f"can't be written ({error.strerror or error}); save it in another place"
+            ) from error
+        self.path, self.name = target, name
+        self.dirty = False
+        self.saved_at = self._clock()
+        self._journal.discard()
+
+    def close(self) -> None:
+        """The window closes: unsaved work stays in the journal and is offered at the next start."""
+        if not self.dirty:
+            self._journal.discard()
+
+    # -- robots and the compiler -----------------------------------------------------------------------------
+
+    def set_connected(self, robots: Sequence[Robot]) -> None:
+        """The robots that are connected now."""
+        if tuple(robots) != self._connected:
+            self._connected = tuple(robots)
+            self.definitions_revision += 1
+            self._keep_used_robots()
+
+    def set_topics(self, topics: Sequence[str]) -> None:
+        """The topics that the editor offers to choose from."""
+        if tuple(topics) != self._topics:
+            self._topics = tuple(topics)
+            self.definitions_revision += 1
+
+    @property
+    def absent(self) -> tuple[Robot, ...]:
+        """Robots that the behaviour knows and that are not connected."""
+        there = {robot.name for robot in self._connected}
+        return tuple(robot for robot in self._known() if robot.name not in there)
+
+    def program(self) -> Program:
+        """The blocks as a program, for the robots known now; compiled once for each edit."""
+        key = (self.revision, self.edits, self.definitions_revision)
+        if self._compiled is None or self._compiled[0] != key:
+            self._compiled = (key, compile_behaviour(self.workspace, self._connected))
+        return self._compiled[1]
+
+    def problems(self) -> tuple[Problem, ...]:
+        """What the compiler says of the blocks."""
+        return self.program().problems
+
+    def definitions(self) -> Mapping[str, object]:
+        """Blocks and toolbox for the editor, from the categories and the robots connected now."""
+        if self._definitions is None or self._definitions[0] != self.definitions_revision:
+            made = editor_definitions(self._connected, self.absent, self._topics)
+            self._definitions = (self.definitions_revision, made)
+        return self._definitions[1]
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _replace(self, name: str, path: Path | None, workspace: Workspace, robots: Descriptions) -> None:
+        self._journal.discard()
+        self._journal = self._make_journal()
+        self.name, self.path, self.workspace = name, path, workspace
+        self.robots = dict(robots)
+        self.dirty = False
+        self.saved_at = None
+        self.revision += 1
+        self.definitions_revision += 1
+
+    def _write_journal(self) -> None:
+        try:
+            self._journal.write(self.name, self.path, self.workspace, self.robots)
+        except OSError as error:
+            self.journal_error = f"unsaved work can't be kept ({error.strerror or error}); save the file now"
+        else:
+            self.journal_error = None
+
+    def _keep_used_robots(self) -> None:
+        """The file carries the descriptions of the robots in it, so that their blocks are known without them.
+
+        He file carries the descriptions of the robots in it, so that their blocks are known without them.
+        """
+        text = json.dumps(self.workspace, ensure_ascii=False)
+        for robot in self._connected:
+            if json.dumps(robot.name, ensure_ascii=False) in text:
+                self.robots[robot.name] = dict(robot.source)
+
+    def _known(self) -> list[Robot]:
+        found = (_parsed(description) for description in self.robots.values())
+        return [robot for robot in found if robot is not None]
+
+
+def _parsed(description: Mapping[str, object]) -> Robot | None:
+    try:
+        return parse(description)
+    except DescriptionError:
+        return None  # its blocks are kept as unknown ones, and the problems list names them
+
+
+def read(path: Path) -> tuple[str, Workspace, Descriptions]:
+    """Name, workspace and robots of a behaviour file. Raises DocumentError with what to do next."""
+    try:
+        size = path.stat().st_size
+        data = path.read_bytes() if size <= LARGEST_BYTES else b""
+    except OSError as error:
+        raise DocumentError(path, f"can't be read ({error.strerror or error})") from error
+    if size > LARGEST_BYTES:
+        raise DocumentError(path, f"is {size // 1_000_000} MB; a behaviour has at most 32 MB")
+    try:
+        content = json.loads(data.decode("utf-8", "surrogatepass"))
+    except (ValueError, RecursionError) as error:
+        raise DocumentError(path, "is damaged or no behaviour; open a copy from before") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise DocumentError(path, f"is no behaviour; behaviours are files ending in {SUFFIX}")
+    version = content.get("version")
+    if not isinstance(version, int) or version > VERSION:
+        raise DocumentError(path, f"was made by a newer NEP Studio (version {version}); update this one")
+    workspace, robots = content.get("workspace"), content.get("robots", {})
+    if not isinstance(workspace, dict) or not isinstance(robots, dict):
+        raise DocumentError(path, "has no blocks in it; open a copy from before")
+    described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
+    return str(content.get("name") or path.stem), workspace, described

@@ -1,0 +1,401 @@
+"""The robots that are there.
+
+Found by their description, watched by their sensors, tried out by their actions.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from nep.graph import GraphView
+from nep.nodes import Node
+from nep.pubsub import Publisher
+
+from app.core.mailbox import Batch
+from app.core.watches import Watch, Watches
+from app.errors import DescriptionError, RobotInputError, RobotUnknownError
+from app.robots import rize
+from app.robots.description import Robot, parse
+from nep.errors import NepError
+
+DESCRIPTION_TYPE = "robot/description"
+COMMAND_TYPE = "robot/command"
+ALIVE_S = 0.2
+SENDER = "studio"
+FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
+
+Payload = Mapping[str, object]
+
+
+@dataclass(slots=True, eq=False)
+class Invocation:
+    """One action that a person tried: its state is a robot's answer (``sent`` until the first one)."""
+
+    id: str
+    action: str
+    state: str = "sent"
+    feedback: Payload = field(default_factory=dict)
+    output: Payload = field(default_factory=dict)
+    error: str | None = None
+    started_s: float = 0.0
+    ended_s: float | None = None
+    clock: Callable[[], float] = time.monotonic
+
+    @property
+    def running(self) -> bool:
+        """Whether the robot has not finished it."""
+        return self.state not in FINAL_STATES
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since it was sent, at most until it ended."""
+        return (self.ended_s if self.ended_s is not None else self.clock()) - self.started_s
+
+
+@dataclass(slots=True, eq=False)
+class RobotLink:
+    """One robot as Studio sees it now.
+
+    ``values`` has the newest value of each sensor while somebody looks.
+    """
+
+    name: str
+    robot: Robot
+    connected: bool = True
+    silent: str | None = None
+    values: dict[str, object] = field(default_factory=dict)
+    drawing: Payload | None = None
+    invocations: dict[str, Invocation] = field(default_factory=dict)
+    last_stop: str | None = None
+    publisher: Publisher | None = None
+    world: Publisher | None = None
+    watch: Watch | None = None
+
+    @property
+    def virtual(self) -> bool:
+        """Whether it exists only on this computer."""
+        return self.robot.virtual
+
+    @property
+    def can_confirm_stop(self) -> bool:
+        """Whether it answers a stop; robots of RIZE do not."""
+        return self.robot.safe_stop.confirmed
+
+    @property
+    def state(self) -> str:
+        """``away``, ``silent``, ``busy`` or ``ready``."""
+        if not self.connected:
+            return "away"
+        if self.silent is not None:
+            return "silent"
+        return "busy" if any(invocation.running for invocation in self.invocations.values()) else "ready"
+
+    @property
+    def chip(self) -> str:
+        """The words of its chip: ``virtual, ready``."""
+        words = self.silent if self.silent is not None and self.connected else self.state
+        return f"virtual, {words}" if self.virtual else words
+
+
+class Fleet:
+    """All robots, in the order in which they came. One thread uses it (the window's)."""
+
+    def __init__(
+        self,
+        watches: Watches,
+        submit: Callable[[str, Callable[[Node], None]], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``watches`` subscribes topics, ``submit`` does something with the node in the source's thread."""
+        self._watches = watches
+        self._submit = submit
+        self._clock = clock
+        self._links: dict[str, RobotLink] = {}
+        self._descriptions: dict[str, Watch] = {}
+        self._named: dict[str, str] = {}
+        self._alive = _Heartbeat()
+        self.revision = 0
+
+    @property
+    def links(self) -> Sequence[RobotLink]:
+        """All robots seen since the start, also those that are away now."""
+        return tuple(self._links.values())
+
+    @property
+    def connected(self) -> tuple[RobotLink, ...]:
+        """Those that are there now."""
+        return tuple(link for link in self._links.values() if link.connected)
+
+    def link(self, name: str) -> RobotLink | None:
+        """The robot of that name, or None."""
+        return self._links.get(name)
+
+    # -- what a person does ----------------------------------------------------------------------------------
+
+    def look_at(self, name: str) -> Watch:
+        """A panel shows this robot: its sensors arrive until the watch is closed.
+
+        Raises RobotUnknownError.
+        """
+        return self._watches.open(_sensor_topics(self._get(name).robot))
+
+    def invoke(self, name: str, action: str, input: Payload) -> Invocation:
+        """Try an action.
+
+        Raises RobotUnknownError, or RobotInputError with a sentence for each wrong value.
+        """
+        link = self._get(name)
+        described = link.robot.action(action)
+        if described is None:
+            raise RobotInputError((f"{name} can't {action}",))
+        wrong = described.check(input)
+        if wrong:
+            raise RobotInputError(tuple(wrong))
+        invocation = Invocation(uuid.uuid4().hex, action, started_s=self._clock(), clock=self._clock)
+        if not self._send(link, _command(link.robot, invocation, input)):
+            invocation.state, invocation.error = "failed", f"{name} can't be reached; check that it is on"
+            invocation.ended_s = self._clock()
+        elif link.publisher is not None and link.robot.dialect == "native":
+            self._alive.beat(name, link.publisher)
+        link.invocations[action] = invocation
+        return invocation
+
+    def cancel(self, name: str, action: str) -> None:
+        """Cancel the action that was tried last; nothing happens when it has ended."""
+        link = self._get(name)
+        invocation = link.invocations.get(action)
+        if invocation is not None and invocation.running and link.robot.dialect == "native":
+            self._send(link, {"id": invocation.id, "op": "cancel", "from": SENDER, "action": action})
+
+    def world(self, name: str, change: Payload) -> None:
+        """Change the world of a virtual robot: touch its head, move the ball, say a word."""
+        link = self._get(name)
+        if link.world is not None:
+            link.world.publish(dict(change))
+
+    def stopped(self, names: Iterable[str], words: Mapping[str, str]) -> None:
+        """These robots were told to stop; ``words`` says what each answered."""
+        for name in names:
+            link = self._links.get(name)
+            if link is None:
+                continue
+            link.last_stop = words.get(name)
+            for invocation in link.invocations.values():
+                if invocation.running:
+                    invocation.state, invocation.ended_s = "canceled", self._clock()
+            self._alive.rest(name)
+
+    # -- what the session tells ------------------------------------------------------------------------------
+
+    def update(self, view: GraphView) -> None:
+        """Take over a new graph: robots come and go."""
+        there = {
+            name
+            for name, info in view.topics.items()
+            if info.msg_type == DESCRIPTION_TYPE and info.publishers
+        }
+        for topic in there - self._descriptions.keys():
+            self._descriptions[topic] = self._watches.open([topic])
+        for topic in self._descriptions.keys() - there:
+            self._descriptions.pop(topic).close()
+            link = self._links.get(self._named.get(topic, ""))
+            if link is not None:
+                self._away(link)
+
+    def forget(self) -> None:
+        """The master is gone; robots that are still connected directly are shown until they fall silent."""
+
+    def add(self, batches: Mapping[str, Batch]) -> None:
+        """Take over what arrived: descriptions, answers, sensor values."""
+        for topic, batch in batches.items():
+            if topic in self._descriptions and batch.messages:
+                self._describe(topic, batch)
+        for link in self._links.values():
+            self._read(link, batches)
+
+    def close(self) -> None:
+        """End the heartbeat and the command publishers."""
+        self._alive.close()
+        for link in self._links.values():
+            for publisher in (link.publisher, link.world):
+                if publisher is not None:
+                    publisher.close()
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _get(self, name: str) -> RobotLink:
+        link = self._links.get(name)
+        if link is None:
+            raise RobotUnknownError(name)
+        return link
+
+    def _describe(self, topic: str, batch: Batch) -> None:
+        try:
+            payload = batch.messages[-1].payload
+            if not isinstance(payload, Mapping):
+                return
+            robot = parse(payload)
+        except (NepError, DescriptionError):
+            return  # the session's alert `message:<topic>` says so
+        self.join(robot, topic)
+
+    def join(self, robot: Robot, topic: str) -> None:
+        """A robot has told who it is, on ``topic``."""
+        self._named[topic] = robot.name
+        link = self._links.get(robot.name)
+        if link is None:
+            link = self._links[robot.name] = RobotLink(robot.name, robot)
+        elif link.connected and link.robot == robot:
+            return
+        link.robot, link.connected = robot, True
+        if link.watch is None:
+            link.watch = self._watches.open([robot.topics.answer])
+        self._open_publisher(link)
+        self.revision += 1
+
+    def _open_publisher(self, link: RobotLink) -> None:
+        topics = link.robot.topics
+        if link.publisher is not None:
+            return
+
+        def open_them(node: Node) -> None:
+            native = link.robot.dialect == "native"
+            link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json")
+            if topics.world is not None:
+                link.world = node.new_pub(topics.world, "json")
+
+        self._submit(f"reach {link.name}", open_them)
+
+    def _away(self, link: RobotLink) -> None:
+        link.connected = False
+        self._alive.rest(link.name)
+        if link.watch is not None:
+            link.watch.close()
+            link.watch = None
+        for invocation in link.invocations.values():
+            if invocation.running:
+                invocation.state, invocation.ended_s = "failed", self._clock()
+                invocation.error = f"{link.name} has gone; check that it is on"
+        self.revision += 1
+
+    def _send(self, link: RobotLink, command: Payload) -> bool:
+        if link.publisher is None or not link.connected:
+            return False
+        try:
+            link.publisher.publish(command)
+        except NepError:
+            return False
+        return True
+
+    def _read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
+        answers = batches.get(link.robot.topics.answer)
+        for message in answers.messages if answers is not None else ():
+            answer = _mapping(message)
+            if answer is not None and link.robot.dialect == "rize":
+                answer = rize.from_answer(answer)
+            self._answer(link, answer)
+        for sensor in link.robot.sensors:
+            batch = batches.get(sensor.topic)
+            if batch is not None and batch.messages and not sensor.is_image:
+                value = _mapping(batch.messages[-1])
+                if value is not None:
+                    link.values[sensor.name] = value.get("value", value)
+        state = batches.get(link.robot.topics.state or "")
+        if state is not None and state.messages:
+            link.drawing = _mapping(state.messages[-1]) or link.drawing
+
+    def _answer(self, link: RobotLink, answer: Payload | None) -> None:
+        if answer is None:
+            return
+        for invocation in link.invocations.values():
+            if invocation.id != answer.get("id") or not invocation.running or answer.get("op") == "cancel":
+                continue
+            invocation.state = str(answer.get("state", invocation.state))
+            invocation.feedback = _object(answer.get("feedback")) or invocation.feedback
+            invocation.output = _object(answer.get("output")) or invocation.output
+            error = answer.get("error")
+            invocation.error = str(error) if error else None
+            if not invocation.running:
+                invocation.ended_s = self._clock()
+        if not any(invocation.running for invocation in link.invocations.values()):
+            self._alive.rest(link.name)
+
+
+class _Heartbeat:
+    """Tells robots that a person's try-out goes on, five times a second, in a thread of its own."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._robots: dict[str, Publisher] = {}
+        self._changed = threading.Event()
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def beat(self, name: str, publisher: Publisher) -> None:
+        with self._lock:
+            self._robots[name] = publisher
+            if self._thread is None and not self._closing:
+                self._thread = threading.Thread(target=self._run, name="studio-alive", daemon=True)
+                self._thread.start()
+        self._changed.set()
+
+    def rest(self, name: str) -> None:
+        with self._lock:
+            self._robots.pop(name, None)
+
+    def close(self) -> None:
+        self._closing = True
+        self._changed.set()
+        if self._thread is not None:
+            self._thread.join(timeout=2)
+
+    def _run(self) -> None:
+        while not self._closing:
+            with self._lock:
+                robots = list(self._robots.values())
+            for publisher in robots:
+                _tell_alive(publisher)
+            self._changed.clear()
+            self._changed.wait(ALIVE_S if robots else None)
+
+
+def _tell_alive(publisher: Publisher) -> None:
+    try:
+        publisher.publish({"id": uuid.uuid4().hex, "op": "alive", "from": SENDER})
+    except NepError:
+        return  # it has gone; its robot's watchdog does the rest
+
+
+def _command(robot: Robot, invocation: Invocation, input: Payload) -> Payload:
+    if robot.dialect == "rize":
+        return rize.to_command(robot, invocation.action, input, invocation.id)
+    return {
+        "id": invocation.id,
+        "op": "invoke",
+        "from": SENDER,
+        "action": invocation.action,
+        "input": dict(input),
+    }
+
+
+def _sensor_topics(robot: Robot) -> list[str]:
+    topics = [sensor.topic for sensor in robot.sensors if sensor.topic and not sensor.is_image]
+    topics += [event.topic for event in robot.events if event.topic]
+    if robot.topics.state is not None:
+        topics.append(robot.topics.state)
+    return list(dict.fromkeys(topics))
+
+
+def _mapping(message: object) -> Payload | None:
+    try:
+        return _object(message.payload)  # type: ignore[attr-defined]  # a Message; decoding may fail
+    except NepError:
+        return None
+
+
+def _object(value: object) -> Payload | None:
+    return value if isinstance(value, Mapping) else None

@@ -1,0 +1,104 @@
+"""Unsaved work survives a crash: every edit is written to a journal before anything else happens.
+
+One journal per open behaviour, in ``journal/`` of Studio's folder. It names the process that writes it, so
+that a second Studio does not offer what the first one still holds.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from app.core.files import write_atomically
+from app.core.settings import home
+
+
+@dataclass(frozen=True, slots=True)
+class Unsaved:
+    """Work that a Studio left behind: what it was, which file it belongs to, and when it was last edited."""
+
+    journal: Path
+    name: str
+    path: Path | None
+    edited_s: float
+    workspace: Mapping[str, object]
+    robots: Mapping[str, Mapping[str, object]]
+
+
+class Journal:
+    """The journal of one open behaviour."""
+
+    def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
+        """Journals live in ``folder`` (default: ``journal`` in Studio's folder)."""
+        self._folder = folder if folder is not None else home() / "journal"
+        self._clock = clock
+        self._file = self._folder / f"{uuid.uuid4().hex}.json"
+
+    def write(
+        self,
+        name: str,
+        path: Path | None,
+        workspace: Mapping[str, object],
+        robots: Mapping[str, Mapping[str, object]],
+    ) -> None:
+        """Keep the newest state. It survives the death of this process. Raises OSError."""
+        entry = {
+            "pid": os.getpid(),
+            "born_s": _born(os.getpid()),
+            "name": name,
+            "path": str(path) if path is not None else None,
+            "edited_s": self._clock(),
+            "workspace": workspace,
+            "robots": robots,
+        }
+        data = json.dumps(entry, ensure_ascii=False).encode("utf-8", "surrogatepass")
+        write_atomically(self._file, data, durable=False)
+
+    def discard(self) -> None:
+        """The work is saved or given up: nothing is offered at the next start."""
+        self._file.unlink(missing_ok=True)
+
+
+def left_behind(folder: Path | None = None) -> list[Unsaved]:
+    """Work whose Studio is gone, the newest first. Journals that can't be read are left where they are."""
+    folder = folder if folder is not None else home() / "journal"
+    found = [_read(file) for file in folder.glob("*.json")] if folder.is_dir() else []
+    return sorted((entry for entry in found if entry is not None), key=lambda entry: -entry.edited_s)
+
+
+def _read(file: Path) -> Unsaved | None:
+    try:
+        entry = json.loads(file.read_bytes().decode("utf-8", "surrogatepass"))
+        if _alive(int(entry["pid"]), float(entry["born_s"])):
+            return None
+        path = entry["path"]
+        return Unsaved(
+            journal=file,
+            name=str(entry["name"]),
+            path=Path(path) if path is not None else None,
+            edited_s=float(entry["edited_s"]),
+            workspace=dict(entry["workspace"]),
+            robots={str(name): dict(td) for name, td in dict(entry["robots"]).items()},
+        )
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _born(pid: int) -> float:
+    return psutil.Process(pid).create_time()
+
+
+def _alive(pid: int, born_s: float) -> bool:
+    # a pid alone may belong to another program by now
+    try:
+        process = psutil.Process(pid)
+        return abs(process.create_time() - born_s) < 1.0 and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.Error:
+        return False

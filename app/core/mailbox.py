@@ -1,0 +1,108 @@
+"""The bounded hand-over from the threads into the window.
+
+Threads post, the window drains once a tick. Messages go into one ring per topic that keeps the newest and
+counts what it drops; events (a new graph, an answer of a robot, an end of a program) are few and must not be
+lost, so their queue is long, and what would overflow it is counted as well.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from nep.message import Message
+
+MESSAGES_PER_TOPIC = 256
+BYTES_PER_TOPIC = 64 * 1024 * 1024
+EVENTS = 20_000
+
+
+@dataclass(slots=True)
+class Batch:
+    """What arrived on one topic since the last drain.
+
+    The newest messages, and how many older ones were dropped.
+    """
+
+    messages: list[Message] = field(default_factory=list)
+    dropped: int = 0
+
+    @property
+    def arrived(self) -> int:
+        """All that arrived, the dropped ones too."""
+        return len(self.messages) + self.dropped
+
+
+@dataclass(slots=True)
+class Drained:
+    """One drain: batches by topic, events in their order, and how many events were lost."""
+
+    batches: dict[str, Batch]
+    events: list[object]
+    lost_events: int
+
+
+class _Ring:
+    __slots__ = ("dropped", "messages", "size_bytes")
+
+    def __init__(self) -> None:
+        self.messages: deque[Message] = deque()
+        self.size_bytes = 0
+        self.dropped = 0
+
+
+class Mailbox:
+    """Any thread posts; one thread drains."""
+
+    def __init__(
+        self,
+        messages_per_topic: int = MESSAGES_PER_TOPIC,
+        bytes_per_topic: int = BYTES_PER_TOPIC,
+        events: int = EVENTS,
+    ) -> None:
+        """Bound each topic's ring in messages and bytes, and the event queue in events."""
+        self._messages_per_topic = messages_per_topic
+        self._bytes_per_topic = bytes_per_topic
+        self._event_limit = events
+        self._lock = threading.Lock()
+        self._rings: dict[str, _Ring] = {}
+        self._events: deque[object] = deque()
+        self._lost_events = 0
+
+    def post(self, messages: Sequence[Message]) -> None:
+        """Hand over a batch; one lock for all of it."""
+        with self._lock:
+            for message in messages:
+                ring = self._rings.get(message.topic)
+                if ring is None:
+                    ring = self._rings[message.topic] = _Ring()
+                ring.messages.append(message)
+                ring.size_bytes += message.size_bytes
+                # the newest message always stays, however large it is
+                while len(ring.messages) > 1 and (
+                    len(ring.messages) > self._messages_per_topic or ring.size_bytes > self._bytes_per_topic
+                ):
+                    ring.size_bytes -= ring.messages.popleft().size_bytes
+                    ring.dropped += 1
+
+    def post_event(self, event: object) -> None:
+        """Hand over one event.
+
+        When the window has not drained for 20 000 events, new ones are counted as lost.
+        """
+        with self._lock:
+            if len(self._events) >= self._event_limit:
+                self._lost_events += 1
+            else:
+                self._events.append(event)
+
+    def drain(self) -> Drained:
+        """Take everything posted since the last drain."""
+        with self._lock:
+            rings, self._rings = self._rings, {}
+            events, self._events = self._events, deque()
+            lost, self._lost_events = self._lost_events, 0
+        batches = {topic: Batch(list(ring.messages), ring.dropped) for topic, ring in rings.items()}
+        return Drained(batches, list(events), lost)

@@ -1,0 +1,269 @@
+"""What is open now: the network, its topics and robots, the behaviour, its run.
+
+The window reads it 30 times a second. Nothing here waits: threads post into the mailbox, `Session.tick` takes over what they posted.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from nep.graph import GraphView
+from nep.masters import master_address
+from nep.nodes import Node
+
+from app.core.alerts import Alerts
+from app.core.companions import CompanionFailed, Companions
+from app.core.console import Console
+from app.core.document import Document
+from app.core.fleet import Fleet
+from app.core.health import Health
+from app.core.images import Images
+from app.core.journal import Journal
+from app.core.mailbox import Drained, Mailbox
+from app.core.runner import RunnerEvent
+from app.core.runs import RobotAnswered, Runs, StopDone
+from app.core.settings import Settings
+from app.core.source import (
+    GraphSeen,
+    JobFailed,
+    LiveSource,
+    MasterFound,
+    MasterLost,
+    Source,
+    WatchFailed,
+)
+from app.core.stopping import RobotStopper
+from app.core.topics import Topics, total_rate_hz
+from app.core.watches import Watch, Watches
+
+LOSS_WINDOW_S = 30.0
+CHECK_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class MasterState:
+    """Whether a master is there: ``searching``, ``connected`` or ``none``, its address, and a sentence."""
+
+    kind: str
+    address: str
+    sentence: str = ""
+
+
+class Session:
+    """Everything that the panels show. One thread uses it (the window's); `close` ends its threads."""
+
+    def __init__(
+        self,
+        settings: Settings | None = None,
+        *,
+        address: str | None = None,
+        source: Source | None = None,
+        journal_folder: Path | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        clock_ns: Callable[[], int] = time.time_ns,
+        start_companions: bool = True,
+    ) -> None:
+        """Join the master at ``address`` (default: `nep.masters.master_address`).
+
+        ``source`` may replace the network.
+        """
+        self.address = address if address is not None else master_address()
+        self._clock, self._clock_ns = clock, clock_ns
+        self._start_companions = start_companions
+        self.settings = settings if settings is not None else Settings()
+        self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
+        self._mailbox = Mailbox()
+        self._watches = Watches(self._begin_watch, self._end_watch)
+        self.images = Images(lambda topic: self._watches.open([topic]).close, clock)
+        self.source: Source = (
+            source
+            if source is not None
+            else LiveSource(self.address, [self._mailbox.post, self.images.offer], self._mailbox.post_event)
+        )
+        self.fleet = Fleet(self._watches, self.source.submit, clock)
+        self.document = Document(lambda: Journal(journal_folder))
+        self.stopper: RobotStopper | None = None
+        self.companions = Companions(self.address, self._mailbox.post_event)
+        self.runs = Runs(
+            self.document,
+            self.fleet,
+            self,
+            alerts=self.alerts,
+            console=self.console,
+            post_event=self._mailbox.post_event,
+            clock=clock,
+        )
+        self._health = Health(self.topics, self.fleet, self.alerts, clock)
+        self.graph: GraphView | None = None
+        self.master = MasterState("searching", self.address)
+        self.messages_per_s: float | None = None
+        self.lost_30s = 0
+        self.tick_ms = 0.0
+        self._losses: deque[tuple[float, int]] = deque()
+        self._lost_before: int | None = None
+        self._robots_seen = -1
+        self._topics_seen = -1
+        self._next_check = 0.0
+
+    # -- what the window and its panels call -----------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the threads; a master is started when none answers."""
+        self.source.start()
+        self.source.submit("watch over the robots", self._make_stopper)
+        if self._start_companions:
+            self.companions.ensure_master()
+
+    def watch(self, topic: str) -> Watch:
+        """Look at a topic until the watch is closed: its messages arrive in `Topics`."""
+        return self._watches.open([topic])
+
+    def tick(self) -> None:
+        """Take over everything that the threads posted since the last tick."""
+        began = self._clock()
+        now, now_ns = began, self._clock_ns()
+        drained = self._mailbox.drain()
+        for event in drained.events:
+            self._on_event(event, now)
+        self._on_messages(drained, now)
+        self.topics.age(now, now_ns)
+        self._follow_robots()
+        if now >= self._next_check:
+            self._next_check = now + CHECK_S
+            self.companions.check()
+            self._health.check()
+            if self.master.kind == "none" and self._start_companions:
+                self.companions.ensure_master()
+        self.tick_ms = (self._clock() - began) * 1000
+
+    def close(self) -> None:
+        """End the program, the threads and the processes that were started here."""
+        self.runs.close()
+        self.document.close()
+        self.fleet.close()
+        if self.stopper is not None:
+            self.stopper.close()
+        self.images.close()
+        self.source.close()
+        self.companions.close()
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _begin_watch(self, topic: str) -> None:
+        self.source.watch(topic)
+        known = self.topics.get(topic)
+        if known is not None:
+            known.watched = True
+
+    def _end_watch(self, topic: str) -> None:
+        self.source.unwatch(topic)
+        self.topics.unwatch(topic)
+        self.alerts.cure(f"message:{topic}")
+
+    def _make_stopper(self, node: Node) -> None:
+        self.stopper = RobotStopper(node)
+
+    def _on_messages(self, drained: Drained, now: float) -> None:
+        for topic, batch in drained.batches.items():
+            if not self._watches.watched(topic):
+                continue  # the last of a subscription that has just ended
+            self.topics.add(topic, batch, now)
+            self.topics[topic].watched = True
+        self.fleet.add(drained.batches)
+        self._health.look(drained.batches)
+        if drained.lost_events:
+            self.alerts.put(
+                "mailbox",
+                "warn",
+                f"{drained.lost_events} events were lost because the window was busy.",
+                "What panels show may be out of date for a second.",
+                count=drained.lost_events,
+            )
+
+    def _on_event(self, event: object, now: float) -> None:
+        match event:
+            case GraphSeen():
+                self._on_graph(event.view, now)
+            case MasterFound():
+                self.master = MasterState("connected", event.address)
+                self.alerts.cure("master")
+                self.console.add("info", "master", f"connected to {event.address}")
+            case MasterLost():
+                self._on_master_lost(event)
+            case RunnerEvent():
+                self.runs.on_runner(event)
+            case StopDone() | RobotAnswered():
+                self.runs.on_stop(event)
+            case CompanionFailed():
+                self.console.add("error", event.what, f"{event.sentence} {event.detail}".strip())
+                self.alerts.put(
+                    f"companion:{event.what}",
+                    "error",
+                    event.sentence,
+                    event.detail.splitlines()[-1] if event.detail else "",
+                )
+            case WatchFailed():
+                self.alerts.put(
+                    f"watch:{event.topic}", "warn", f"{event.topic} can't be read.", event.sentence
+                )
+            case JobFailed() if event.what:
+                self.console.add("error", "studio", f"can't {event.what}: {event.sentence}")
+            case _:
+                pass
+
+    def _on_graph(self, view: GraphView, now: float) -> None:
+        before = {topic.name for topic in self.topics.live()}
+        first = self.graph is None
+        self.graph = view
+        self.topics.update(view, now)
+        for topic in self.topics.live():
+            if topic.name not in before and not first:
+                count = topic.publishers
+                self.console.add(
+                    "info", "master", f"{topic.name} is new, {count} publisher{'' if count == 1 else 's'}"
+                )
+        self.fleet.update(view)
+        self._count_losses(view, now)
+        self.messages_per_s = total_rate_hz(list(view.topics.values()))
+        self._health.graph_alerts(view)
+
+    def _on_master_lost(self, event: MasterLost) -> None:
+        was_there = self.master.kind == "connected"
+        self.master = MasterState("none", event.address, event.sentence)
+        if was_there:
+            self.console.add("error", "master", event.sentence)
+            self.alerts.put(
+                "master",
+                "warn",
+                "The master has gone; a new one is being started.",
+                "Programs that are connected go on; new ones can't join until it is back.",
+            )
+            self.topics.values_revision += 1
+
+    def _count_losses(self, view: GraphView, now: float) -> None:
+        total = sum(info.lost or 0 for info in view.topics.values())
+        if self._lost_before is not None and total > self._lost_before:
+            self._losses.append((now, total - self._lost_before))
+        self._lost_before = total
+        while self._losses and now - self._losses[0][0] > LOSS_WINDOW_S:
+            self._losses.popleft()
+        self.lost_30s = sum(count for _, count in self._losses)
+
+    def _follow_robots(self) -> None:
+        if self.fleet.revision != self._robots_seen:
+            self._robots_seen = self.fleet.revision
+            robots = [link.robot for link in self.fleet.connected]
+            self.document.set_connected(robots)
+            if self.stopper is not None:
+                self.source.submit("watch over the robots", lambda _node: self._give_robots())
+        if self.topics.revision != self._topics_seen:
+            self._topics_seen = self.topics.revision
+            self.document.set_topics(sorted(topic.name for topic in self.topics.live()))
+
+    def _give_robots(self) -> None:
+        if self.stopper is not None:
+            self.stopper.set_robots([link.robot for link in self.fleet.connected])

@@ -1,0 +1,112 @@
+"""What a person chose, kept between starts: one JSON file in the user's configuration folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import platformdirs
+
+from app.core.files import write_atomically
+from app.errors import SettingsError
+
+RECENT_LIMIT = 12
+T = TypeVar("T")
+
+
+def home() -> Path:
+    """Studio's own folder: ``$NEP_STUDIO_HOME``, else the system's place for configuration."""
+    chosen = os.environ.get("NEP_STUDIO_HOME")
+    return Path(chosen) if chosen else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
+
+
+@dataclass(frozen=True, slots=True)
+class RecentFile:
+    """A file that was opened or saved, and when (epoch seconds)."""
+
+    path: Path
+    name: str
+    opened_s: float
+
+
+class Settings:
+    """Chosen values by name. A damaged file is kept beside (``settings.damaged.json``), never lost."""
+
+    def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
+        """Read ``settings.json`` in ``folder`` (default: `home`); none yet is fine."""
+        self.path = (folder if folder is not None else home()) / "settings.json"
+        self.damaged: Path | None = None
+        self._clock = clock
+        self._values: dict[str, object] = self._read()
+
+    def get(self, key: str, default: T) -> T:
+        """The value of ``key``; ``default`` when there is none or it is of another type."""
+        value = self._values.get(key, default)
+        if default is None or isinstance(value, type(default)):
+            return value  # type: ignore[return-value]  # checked on the line above
+        return default
+
+    def set(self, key: str, value: object) -> None:
+        """Keep ``value`` (anything JSON can say) and write the file. Raises SettingsError."""
+        if key in self._values and self._values[key] == value:
+            return
+        self._values[key] = value
+        self._write()
+
+    @property
+    def recent(self) -> list[RecentFile]:
+        """Files opened lately, newest first; those that are gone are left out."""
+        found = []
+        entries: list[object] = self.get("recent", [])
+        for entry in entries:
+            if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
+                path = Path(entry["path"])
+                if path.is_file():
+                    found.append(
+                        RecentFile(path, str(entry.get("name", path.stem)), float(entry.get("opened_s", 0)))
+                    )
+        return found
+
+    def add_recent(self, path: Path, name: str | None = None) -> None:
+        """Put ``path`` first among the recent files. Raises SettingsError."""
+        path = path.resolve()
+        kept: list[dict[str, object]] = [
+            {"path": str(item.path), "name": item.name, "opened_s": item.opened_s}
+            for item in self.recent
+            if item.path != path
+        ]
+        first: dict[str, object] = {"path": str(path), "name": name or path.stem, "opened_s": self._clock()}
+        self.set("recent", [first, *kept][:RECENT_LIMIT])
+
+    def _read(self) -> dict[str, object]:
+        try:
+            text = self.path.read_text(encoding="utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            return {}
+        except (OSError, UnicodeDecodeError):
+            return self._set_aside()
+        try:
+            values = json.loads(text)
+        except (ValueError, RecursionError):
+            return self._set_aside()
+        return values if isinstance(values, dict) else self._set_aside()
+
+    def _set_aside(self) -> dict[str, object]:
+        self.damaged = self.path.with_name("settings.damaged.json")
+        try:
+            self.path.replace(self.damaged)
+        except OSError:
+            self.damaged = None
+        return {}
+
+    def _write(self) -> None:
+        text = json.dumps(self._values, indent=1, ensure_ascii=False, sort_keys=True)
+        try:
+            write_atomically(self.path, text.encode("utf-8"), durable=False)
+        except OSError as error:
+            raise SettingsError(self.path, error.strerror or str(error)) from error

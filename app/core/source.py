@@ -1,0 +1,235 @@
+"""Where messages come from. The live network today; a recording gives the same calls."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from nep.graph import GraphView
+from nep.masters import is_running
+from nep.nodes import Node
+from nep.pubsub import Subscriber
+
+import nep
+from nep.errors import NepError
+from nep.message import Message
+
+POLL_S = 0.4
+NODE_NAME = "studio"
+
+Sink = Callable[[Sequence[Message]], None]
+Job = Callable[[Node], None]
+
+
+@dataclass(frozen=True, slots=True)
+class GraphSeen:
+    """The master told what is there; ``asked_s`` is how long it took."""
+
+    view: GraphView
+    asked_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class MasterFound:
+    """A master answers at ``address``."""
+
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class MasterLost:
+    """No master answers at ``address``; ``sentence`` says so to a person."""
+
+    address: str
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class WatchFailed:
+    """A topic could not be subscribed."""
+
+    topic: str
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class JobFailed:
+    """Something that was to be done on the network failed."""
+
+    what: str
+    sentence: str
+
+
+class Source(Protocol):
+    """Messages by topic, live or recorded. Nothing arrives for a topic that is not watched."""
+
+    address: str
+
+    def start(self) -> None:
+        """Begin; events and messages reach the sinks from now on."""
+
+    def watch(self, topic: str) -> None:
+        """Messages of ``topic`` are wanted, as soon as it is there."""
+
+    def unwatch(self, topic: str) -> None:
+        """Messages of ``topic`` are not wanted any more."""
+
+    def submit(self, what: str, job: Job) -> None:
+        """Do something with the node, in the source's thread; a failure is told as `JobFailed`."""
+
+    def close(self) -> None:
+        """End; returns when its thread has ended."""
+
+
+class LiveSource:
+    """The network of one master.
+
+    One thread asks the master, subscribes and does jobs; none of it in the window.
+    """
+
+    def __init__(self, address: str, sinks: Sequence[Sink], post_event: Callable[[object], None]) -> None:
+        """Give batches of messages to every sink (in nep's thread) and events to ``post_event``."""
+        self.address = address
+        self._sinks = tuple(sinks)
+        self._post_event = post_event
+        self._jobs: queue.SimpleQueue[tuple[str, Job] | None] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._wanted: set[str] = set()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="studio-source", daemon=True)
+        self._node: Node | None = None
+        self._subscribers: dict[str, tuple[str, Subscriber]] = {}
+        self._found: bool | None = None
+        self._view: GraphView | None = None
+
+    def start(self) -> None:
+        """Look for the master from now on."""
+        self._thread.start()
+
+    def watch(self, topic: str) -> None:
+        """See `Source.watch`."""
+        with self._lock:
+            self._wanted.add(topic)
+        self.submit("", _nothing)
+
+    def unwatch(self, topic: str) -> None:
+        """See `Source.unwatch`."""
+        with self._lock:
+            self._wanted.discard(topic)
+        self.submit("", _nothing)
+
+    def submit(self, what: str, job: Job) -> None:
+        """See `Source.submit`; jobs keep their order and wait until a master is there."""
+        self._jobs.put((what, job))
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        self._closing.set()
+        self._jobs.put(None)
+        if self._thread.is_alive():
+            self._thread.join(timeout=5)
+
+    # -- its thread ------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            while not self._closing.is_set():
+                if self._node is None and not self._join():
+                    self._closing.wait(POLL_S)
+                    continue
+                self._ask()
+                self._do_jobs(time.monotonic() + POLL_S)
+        finally:
+            for _, subscriber in self._subscribers.values():
+                subscriber.close()
+            if self._node is not None:
+                self._node.close()
+
+    def _join(self) -> bool:
+        if not is_running(self.address, timeout_s=0.5):
+            self._lost(f"no master answers at {self.address}")
+            return False
+        try:
+            self._node = nep.node(NODE_NAME, master=self.address)
+        except NepError as error:
+            self._lost(str(error))
+            return False
+        return True
+
+    def _lost(self, sentence: str) -> None:
+        if self._found is not False:
+            self._found = False
+            self._post_event(MasterLost(self.address, sentence))
+
+    def _ask(self) -> None:
+        if self._node is None:
+            return
+        asked = time.monotonic()
+        try:
+            view = self._node.graph(timeout_s=1.0)
+        except NepError as error:
+            self._lost(str(error))
+            return
+        if self._found is not True:
+            self._found = True
+            self._post_event(MasterFound(self.address))
+        self._post_event(GraphSeen(view, time.monotonic() - asked))
+        self._view = view
+        self._reconcile()
+
+    def _do_jobs(self, until: float) -> None:
+        while not self._closing.is_set() and self._node is not None:
+            try:
+                item = self._jobs.get(timeout=max(0.0, until - time.monotonic()))
+            except queue.Empty:
+                return
+            if item is None:
+                return
+            what, job = item
+            try:
+                job(self._node)
+            except NepError as error:
+                self._post_event(JobFailed(what, str(error)))
+            self._reconcile()
+
+    def _reconcile(self) -> None:
+        """Subscribe what is wanted and there, unsubscribe what is not wanted any more."""
+        view = self._view
+        if view is None:
+            return
+        with self._lock:
+            wanted = set(self._wanted)
+        for topic in [topic for topic in self._subscribers if topic not in wanted]:
+            self._subscribers.pop(topic)[1].close()
+        for topic in wanted:
+            info = view.topics.get(topic)
+            if info is None:
+                continue
+            held = self._subscribers.get(topic)
+            if held is not None and held[0] != info.msg_type:
+                held[1].close()
+                held = None
+            if held is None:
+                self._subscribe(topic, info.msg_type)
+
+    def _subscribe(self, topic: str, msg_type: str) -> None:
+        if self._node is None:
+            return
+        try:
+            subscriber = self._node.new_sub(topic, msg_type, sink=self._deliver)
+        except NepError as error:
+            self._post_event(WatchFailed(topic, str(error)))
+            return
+        self._subscribers[topic] = (msg_type, subscriber)
+
+    def _deliver(self, messages: Sequence[Message]) -> None:
+        for sink in self._sinks:
+            sink(messages)
+
+
+def _nothing(_node: Node) -> None:
+    """Only wakes the thread, so that a new wish is met at once."""

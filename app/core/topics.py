@@ -1,0 +1,214 @@
+"""What is on the network, as the window shows it: every topic with its figures and its newest message."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from nep.graph import GraphView, TopicInfo
+
+from app.core.mailbox import Batch
+from nep.errors import NepError
+from nep.message import Message
+
+GONE_SHOWN_S = 10.0
+RATES_KEPT = 60
+
+
+@dataclass(slots=True, eq=False)
+class Topic:
+    """One topic. Figures that are not known are None; a panel shows them blank.
+
+    ``rate_hz`` messages a second and ``bandwidth_Bps`` bytes a second as the publishers tell, ``age_s``
+    seconds since the newest message, ``lost`` messages and ``loss_ratio`` of those that a subscriber should
+    have had. ``gone_s`` is None while it is there, else the seconds since it vanished. ``newest``,
+    ``previous`` and ``received`` are kept only while somebody looks.
+    """
+
+    name: str
+    msg_type: str = ""
+    codec: str = "bytes"
+    publishers: int = 0
+    publisher_nodes: tuple[str, ...] = ()
+    subscribers: int = 0
+    rate_hz: float | None = None
+    bandwidth_Bps: float | None = None  # noqa: N815  bytes a second, as the vocabulary spells it
+    age_s: float | None = None
+    lost: int | None = None
+    loss_ratio: float | None = None
+    new: bool = False
+    gone_s: float | None = None
+    rates: deque[float] = field(default_factory=lambda: deque(maxlen=RATES_KEPT))
+    newest: Message | None = None
+    previous: Message | None = None
+    received: int = 0
+    dropped: int = 0
+    decode_error: str | None = None
+    watched: bool = False
+    gone_since: float | None = None
+    last_stamp_ns: int | None = None
+    last_received: float | None = None
+
+    def facts(self) -> tuple[object, ...]:
+        """What changes seldom; a panel rebuilds its rows when one of these changes."""
+        return (self.msg_type, self.codec, self.publisher_nodes, self.new, self.gone_since is not None)
+
+
+class Topics:
+    """All topics, in the order in which they were first seen. One thread uses it (the window's)."""
+
+    def __init__(self) -> None:
+        """Know no topic yet."""
+        self._topics: dict[str, Topic] = {}
+        self._first_graph = True
+        self.revision = 0
+        self.values_revision = 0
+
+    def __iter__(self) -> Iterator[Topic]:
+        """Every topic, the vanished ones too for ten seconds."""
+        return iter(self._topics.values())
+
+    def __len__(self) -> int:
+        """How many `__iter__` gives."""
+        return len(self._topics)
+
+    def __getitem__(self, name: str) -> Topic:
+        """The topic of that name; KeyError when there is none."""
+        return self._topics[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether the name is known."""
+        return name in self._topics
+
+    def get(self, name: str) -> Topic | None:
+        """The topic of that name, or None."""
+        return self._topics.get(name)
+
+    def live(self) -> list[Topic]:
+        """Those that have not vanished."""
+        return [topic for topic in self._topics.values() if topic.gone_since is None]
+
+    def of_type(self, *msg_types: str) -> list[Topic]:
+        """The live topics of one of these types."""
+        return [topic for topic in self.live() if topic.msg_type in msg_types]
+
+    def mark_seen(self, name: str) -> None:
+        """A person looked at it: it is not new any more."""
+        topic = self._topics.get(name)
+        if topic is not None and topic.new:
+            topic.new = False
+            self.revision += 1
+
+    def update(self, view: GraphView, now: float) -> None:
+        """Take over a new graph; ``now`` is a monotonic clock in s."""
+        shown = {name: info for name, info in view.topics.items() if info.publishers or info.subscribers}
+        for name, info in shown.items():
+            topic = self._topics.get(name)
+            if topic is None:
+                topic = self._topics[name] = Topic(name, new=not self._first_graph)
+                self.revision += 1
+            self._take(topic, info, view)
+        for name, topic in self._topics.items():
+            if name not in shown and topic.gone_since is None:
+                self._vanish(topic, now)
+        self._first_graph = False
+        self.values_revision += 1
+
+    def forget(self, now: float) -> None:
+        """The master is gone: nothing is known to be there."""
+        for topic in self._topics.values():
+            if topic.gone_since is None:
+                self._vanish(topic, now)
+
+    def age(self, now: float, now_ns: int) -> None:
+        """Let time pass: ages grow, what vanished ten seconds ago leaves."""
+        for topic in list(self._topics.values()):
+            if topic.gone_since is not None:
+                topic.gone_s = now - topic.gone_since
+                if topic.gone_s >= GONE_SHOWN_S and not topic.watched:
+                    del self._topics[topic.name]
+                    self.revision += 1
+            else:
+                topic.age_s = _age(topic, now, now_ns)
+
+    def add(self, name: str, batch: Batch, now: float) -> None:
+        """Take over what arrived on a watched topic."""
+        topic = self._topics.get(name)
+        if topic is None:
+            topic = self._topics[name] = Topic(name, new=True)
+            self.revision += 1
+        if not batch.messages:
+            return
+        topic.previous = batch.messages[-2] if len(batch.messages) > 1 else topic.newest
+        topic.newest = batch.messages[-1]
+        topic.received += batch.arrived
+        topic.dropped += batch.dropped
+        topic.last_received = now
+        self.values_revision += 1
+
+    def check(self, topic: Topic) -> bool:
+        """Decode the newest message of a topic that somebody reads; the sentence is kept.
+
+        Whether it is good.
+        """
+        if topic.newest is None:
+            return True
+        try:
+            _ = topic.newest.payload
+        except NepError as error:
+            topic.decode_error = str(error)
+            return False
+        topic.decode_error = None
+        return True
+
+    def unwatch(self, name: str) -> None:
+        """Nobody looks any more: forget its messages."""
+        topic = self._topics.get(name)
+        if topic is not None:
+            topic.newest = topic.previous = None
+            topic.decode_error = None
+            topic.received = topic.dropped = 0
+            topic.last_received = None
+            topic.watched = False
+
+    def _vanish(self, topic: Topic, now: float) -> None:
+        topic.gone_since, topic.gone_s = now, 0.0
+        topic.publishers, topic.publisher_nodes = 0, ()
+        topic.rate_hz = topic.bandwidth_Bps = topic.age_s = None
+        self.revision += 1
+
+    def _take(self, topic: Topic, info: TopicInfo, view: GraphView) -> None:
+        before = topic.facts()
+        topic.msg_type, topic.codec = info.msg_type, info.codec
+        topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
+        topic.publisher_nodes = _names(info, view)
+        topic.rate_hz, topic.bandwidth_Bps = info.rate_hz, info.bandwidth_Bps
+        topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
+        if info.last_stamp_ns is not None:
+            topic.last_stamp_ns = max(info.last_stamp_ns, topic.last_stamp_ns or 0)
+        topic.gone_since = topic.gone_s = None
+        if info.rate_hz is not None:
+            topic.rates.append(info.rate_hz)
+        if topic.facts() != before:
+            self.revision += 1
+
+
+def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
+    names = {view.nodes[p.node_id].name for p in info.publishers if p.node_id in view.nodes}
+    return tuple(sorted(names))
+
+
+def _age(topic: Topic, now: float, now_ns: int) -> float | None:
+    stamp = topic.last_stamp_ns
+    if topic.newest is not None and topic.newest.stamp_ns is not None:
+        stamp = max(stamp or 0, topic.newest.stamp_ns)
+    if stamp is not None:
+        return max(0.0, (now_ns - stamp) / 1e9)
+    return now - topic.last_received if topic.last_received is not None else None
+
+
+def total_rate_hz(topics: Sequence[TopicInfo]) -> float | None:
+    """Messages a second of all topics together; None when no publisher told its rate."""
+    known = [info.rate_hz for info in topics if info.rate_hz is not None]
+    return sum(known) if known else None

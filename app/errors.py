@@ -1,0 +1,94 @@
+"""The errors of Studio.
+
+::
+
+    AppError
+    ├── DocumentError        a behaviour file that can't be read or written
+    ├── CompileError         a workspace that can't become a program
+    ├── RunnerError          a program that can't be started or reached
+    ├── SettingsError        settings that can't be kept
+    ├── DescriptionError     a robot's description that can't be understood
+    ├── RobotInputError      an action's input that the robot would refuse
+    └── RobotUnknownError    a robot that isn't there
+
+The attributes come first, the sentence is made from them: lower case, no full stop, values in quotes, the
+next step behind a semicolon.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class AppError(Exception):
+    """Anything that Studio can explain in one sentence: ``str(error)``."""
+
+    def __init__(self, sentence: str) -> None:
+        """Keep the sentence that a person reads."""
+        super().__init__(sentence)
+        self.sentence = sentence
+
+
+class DocumentError(AppError):
+    """A behaviour file can't be read or written; ``path`` names it, ``reason`` says why."""
+
+    def __init__(self, path: Path | None, reason: str) -> None:
+        """Make the sentence from the file's name and the reason."""
+        self.path = path
+        self.reason = reason
+        super().__init__(f"'{path.name}': {reason}" if path is not None else reason)
+
+
+class CompileError(AppError):
+    """A workspace can't become a program; ``block`` is the block's id when one is to blame."""
+
+    def __init__(self, reason: str, block: str | None = None) -> None:
+        """Make the sentence from the reason."""
+        self.reason = reason
+        self.block = block
+        super().__init__(reason)
+
+
+class RunnerError(AppError):
+    """The process of a program can't be started or reached."""
+
+
+class SettingsError(AppError):
+    """The settings can't be kept; ``path`` is their file."""
+
+    def __init__(self, path: Path, reason: str) -> None:
+        """Make the sentence from the file's name and the reason."""
+        self.path = path
+        self.reason = reason
+        super().__init__(f"settings can't be kept in '{path}': {reason}")
+
+
+class DescriptionError(AppError):
+    """A robot's description can't be understood; ``problems`` holds every sentence."""
+
+    def __init__(self, name: str, problems: tuple[str, ...]) -> None:
+        """Make the sentence from the first problem."""
+        self.name = name
+        self.problems = problems
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        super().__init__(
+            f"the description of '{name}' can't be used: {problems[0] if problems else 'empty'}{more}"
+        )
+
+
+class RobotInputError(AppError):
+    """An action's input that the robot would refuse; ``sentences`` has one for each wrong value."""
+
+    def __init__(self, sentences: tuple[str, ...]) -> None:
+        """Make the sentence from all of them."""
+        self.sentences = sentences
+        super().__init__("; ".join(sentences))
+
+
+class RobotUnknownError(AppError):
+    """A robot that isn't connected; ``name`` is the one asked for."""
+
+    def __init__(self, name: str) -> None:
+        """Make the sentence from the name."""
+        self.name = name
+        super().__init__(f"no robot '{name}' is connected; switch it on or use a virtual one")

@@ -1,0 +1,59 @@
+"""Alerts: present problems, worst first, gone when cured."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.alerts import Alerts
+
+
+def test_the_worst_is_first_then_the_oldest() -> None:
+    times = iter([1.0, 2.0, 3.0, 4.0])
+    alerts = Alerts(lambda: next(times))
+    alerts.put("a", "info", "a")
+    alerts.put("b", "warn", "b")
+    alerts.put("c", "error", "c")
+    alerts.put("d", "warn", "d")
+    assert [alert.id for alert in alerts.active] == ["c", "b", "d", "a"]
+
+
+def test_said_again_it_counts_and_keeps_its_age() -> None:
+    times = iter([1.0, 9.0])
+    alerts = Alerts(lambda: next(times))
+    alerts.put("a", "warn", "one message")
+    alerts.put("a", "warn", "five messages", count=4)
+    (alert,) = alerts.active
+    assert (alert.count, alert.title, alert.since_s) == (5, "five messages", 1.0)
+
+
+def test_saying_the_same_without_a_count_changes_nothing() -> None:
+    alerts = Alerts(lambda: 1.0)
+    alerts.put("a", "warn", "same")
+    revision = alerts.revision
+    alerts.put("a", "warn", "same", count=0)
+    assert alerts.revision == revision
+
+
+def test_a_cured_alert_is_gone_and_its_return_is_shown_again() -> None:
+    alerts = Alerts(lambda: 1.0)
+    alerts.put("a", "warn", "a")
+    alerts.dismiss("a")
+    assert alerts.dismissed("a")
+    assert alerts.active
+    alerts.cure("a")
+    assert not alerts.active
+    alerts.put("a", "warn", "a")
+    assert not alerts.dismissed("a")
+
+
+def test_cure_all_takes_a_prefix() -> None:
+    alerts = Alerts(lambda: 1.0)
+    for id in ("message:/a", "message:/b", "master"):
+        alerts.put(id, "warn", id)
+    alerts.cure_all("message:")
+    assert [alert.id for alert in alerts.active] == ["master"]
+
+
+def test_an_unknown_severity_is_refused() -> None:
+    with pytest.raises(ValueError, match="no severity 'bad'"):
+        Alerts().put("a", "bad", "a")

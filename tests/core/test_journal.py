@@ -1,0 +1,65 @@
+"""The journal: what a killed Studio leaves behind is offered, what a living one holds is not."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from app.core.journal import Journal, left_behind
+
+WORKSPACE: dict[str, object] = {"blocks": {"blocks": [{"type": "events_started", "id": "é\ud800"}]}}
+
+
+def _killed_writer(folder: Path) -> None:
+    code = (
+        "import os, sys, pathlib\n"
+        "from app.core.journal import Journal\n"
+        "j = Journal(pathlib.Path(sys.argv[1]), clock=lambda: 123.0)\n"
+        "j.write('Greeting', pathlib.Path('/a/greeting.nepb'),"
+        " {'blocks': 1}, {'Pepper': {'title': 'Pepper'}})\n"
+        "os.kill(os.getpid(), 9)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(folder)], check=False)
+
+
+def test_work_of_a_living_process_is_not_offered(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.write("Greeting", None, WORKSPACE, {})
+    assert left_behind(tmp_path) == []
+    journal.discard()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_work_of_a_killed_process_is_offered(tmp_path: Path) -> None:
+    _killed_writer(tmp_path)
+    (unsaved,) = left_behind(tmp_path)
+    assert unsaved.name == "Greeting"
+    assert unsaved.path == Path("/a/greeting.nepb")
+    assert unsaved.workspace == {"blocks": 1}
+    assert unsaved.robots == {"Pepper": {"title": "Pepper"}}
+    assert unsaved.edited_s == 123.0
+
+
+def test_a_pid_that_another_program_got_does_not_hide_the_work(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.write("Greeting", None, WORKSPACE, {})
+    (file,) = tmp_path.glob("*.json")
+    entry = json.loads(file.read_bytes())
+    entry["born_s"] -= 1000
+    file.write_text(json.dumps(entry))
+    (unsaved,) = left_behind(tmp_path)
+    assert unsaved.workspace == WORKSPACE
+
+
+def test_a_damaged_journal_is_skipped_and_kept(tmp_path: Path) -> None:
+    _killed_writer(tmp_path)
+    (good,) = tmp_path.glob("*.json")
+    (tmp_path / "bad.json").write_bytes(good.read_bytes()[:40])
+    assert len(left_behind(tmp_path)) == 1
+    assert (tmp_path / "bad.json").exists()
+
+
+def test_no_folder_is_no_work(tmp_path: Path) -> None:
+    assert left_behind(tmp_path / "none") == []

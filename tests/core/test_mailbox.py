@@ -1,0 +1,68 @@
+"""The bounded hand-over: newest kept, drops counted, nothing lost without a number."""
+
+from __future__ import annotations
+
+import threading
+
+from app.core.mailbox import Mailbox
+from nep.message import Message
+
+
+def message(topic: str, number: int, size: int = 10) -> Message:
+    data = memoryview(bytes(size)).toreadonly()
+    return Message(topic=topic, data=data, codec="bytes", msg_type="bytes", seq=number)
+
+
+def test_drain_gives_batches_by_topic_in_order() -> None:
+    mailbox = Mailbox()
+    mailbox.post([message("a", 1), message("b", 1), message("a", 2)])
+    drained = mailbox.drain()
+    assert [m.seq for m in drained.batches["a"].messages] == [1, 2]
+    assert [m.seq for m in drained.batches["b"].messages] == [1]
+    assert mailbox.drain().batches == {}
+
+
+def test_a_full_ring_keeps_the_newest_and_counts_the_rest() -> None:
+    mailbox = Mailbox(messages_per_topic=3)
+    mailbox.post([message("a", number) for number in range(10)])
+    batch = mailbox.drain().batches["a"]
+    assert [m.seq for m in batch.messages] == [7, 8, 9]
+    assert batch.dropped == 7
+    assert batch.arrived == 10
+
+
+def test_a_ring_is_bounded_in_bytes_but_keeps_one_message_of_any_size() -> None:
+    mailbox = Mailbox(bytes_per_topic=100)
+    mailbox.post([message("a", 1, 60), message("a", 2, 60), message("a", 3, 500)])
+    batch = mailbox.drain().batches["a"]
+    assert [m.seq for m in batch.messages] == [3]
+    assert batch.dropped == 2
+
+
+def test_events_keep_their_order_and_an_overflow_is_counted() -> None:
+    mailbox = Mailbox(events=2)
+    for event in ("one", "two", "three"):
+        mailbox.post_event(event)
+    drained = mailbox.drain()
+    assert drained.events == ["one", "two"]
+    assert drained.lost_events == 1
+    assert mailbox.drain().lost_events == 0
+
+
+def test_no_message_is_unaccounted_for_with_many_threads() -> None:
+    mailbox = Mailbox(messages_per_topic=50)
+    threads = [
+        threading.Thread(target=lambda: [mailbox.post([message("a", n)]) for n in range(2000)])
+        for _ in range(4)
+    ]
+    arrived = 0
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        batch = mailbox.drain().batches.get("a")
+        arrived += batch.arrived if batch else 0
+    for thread in threads:
+        thread.join()
+    batch = mailbox.drain().batches.get("a")
+    arrived += batch.arrived if batch else 0
+    assert arrived == 8000

@@ -1,0 +1,57 @@
+"""Settings survive restarts and damage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.core.settings import RECENT_LIMIT, Settings, home
+from app.errors import SettingsError
+
+
+def test_a_value_is_there_after_a_restart(tmp_path: Path) -> None:
+    Settings(tmp_path).set("theme", "dark")
+    assert Settings(tmp_path).get("theme", "light") == "dark"
+
+
+def test_a_value_of_another_type_gives_the_default(tmp_path: Path) -> None:
+    Settings(tmp_path).set("theme", 5)
+    assert Settings(tmp_path).get("theme", "light") == "light"
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b"[1]", b"\xff\xfe", b'{"theme": "da'])
+def test_a_damaged_file_is_kept_beside(tmp_path: Path, damage: bytes) -> None:
+    (tmp_path / "settings.json").write_bytes(damage)
+    settings = Settings(tmp_path)
+    assert settings.get("theme", "light") == "light"
+    assert settings.damaged is not None
+    assert settings.damaged.read_bytes() == damage
+    settings.set("theme", "dark")
+    assert Settings(tmp_path).get("theme", "light") == "dark"
+
+
+def test_recent_files_are_newest_first_without_doubles_or_missing_ones(tmp_path: Path) -> None:
+    settings = Settings(tmp_path / "home")
+    files = [tmp_path / f"{number}.nepb" for number in range(RECENT_LIMIT + 3)]
+    for file in files:
+        file.write_text("x")
+        settings.add_recent(file)
+    settings.add_recent(files[5], "Five")
+    files[-1].unlink()
+    recent = Settings(tmp_path / "home").recent
+    assert recent[0].path == files[5].resolve()
+    assert recent[0].name == "Five"
+    assert files[-1].resolve() not in [item.path for item in recent]
+    assert len({item.path for item in recent}) == len(recent) <= RECENT_LIMIT
+
+
+def test_a_folder_that_cant_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    with pytest.raises(SettingsError, match="settings can't be kept"):
+        Settings(tmp_path / "file").set("theme", "dark")
+
+
+def test_the_folder_can_be_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    assert home() == tmp_path
