@@ -1,0 +1,192 @@
+"""The alert under the run bar: one at a time, with its next step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from PySide6.QtCore import QRectF, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+
+from app.ui.icons import paint_icon
+from app.ui.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.button import Button, IconButton
+from app.ui.widgets.small import label
+
+LEAST_HEIGHT = 52
+ICON = 20
+BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
+
+
+class AlertLike(Protocol):
+    """What the banner needs of an alert (`app.core.alerts.Alert`)."""
+
+    @property
+    def id(self) -> str:
+        """Its identity."""
+
+    @property
+    def severity(self) -> str:
+        """Its severity: "error", "warn" or "info"."""
+
+    @property
+    def title(self) -> str:
+        """What is wrong, one sentence."""
+
+    @property
+    def detail(self) -> str:
+        """What it means."""
+
+    @property
+    def button(self) -> str | None:
+        """The words of the next step."""
+
+    @property
+    def action(self) -> str | None:
+        """The next step's name in the table of actions."""
+
+
+class Banner(QWidget):
+    """Icon, a bold sentence, a plain one, one button with the next step, perhaps a second one, and close."""
+
+    pressed = Signal()
+    second_pressed = Signal()
+    more_pressed = Signal()
+    closed = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._status = "error"
+        self.setMinimumHeight(LEAST_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.title = label("", "card")
+        self.detail = label("", "lead", role="textSecondary")
+        for words in (self.title, self.detail):
+            words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.more = Button(theme, "", kind="ghost", size="small")
+        self.button = Button(theme, "", size="form")
+        self.second = Button(theme, "", size="form")
+        self.close_button = IconButton(theme, "x", "Close this message", size=32)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(16 + ICON + 12, 8, 12, 8)
+        row.setSpacing(8)
+        row.addWidget(self.title)
+        row.addWidget(self.detail, 1)
+        for widget in (self.more, self.second, self.button, self.close_button):
+            row.addWidget(widget)
+        self.button.clicked.connect(self.pressed)
+        self.second.clicked.connect(self.second_pressed)
+        self.more.clicked.connect(self.more_pressed)
+        self.close_button.clicked.connect(self.closed)
+
+    def show_words(
+        self,
+        status: str,
+        title: str,
+        detail: str,
+        button: str | None,
+        others: int = 0,
+        second: str | None = None,
+    ) -> None:
+        """Say what is wrong; ``others`` counts the alerts that wait behind this one."""
+        self._status = status
+        self.title.setText(title)
+        self.title.setMinimumWidth(min(560, self.title.sizeHint().width()))
+        self.detail.setText(detail)
+        self.detail.setToolTip(detail)
+        self.setAccessibleName(f"{title} {detail}".strip())
+        for widget, text in ((self.button, button), (self.second, second)):
+            widget.set_word(text or "")
+            paint.show_when(widget, bool(text))
+        self.more.set_word(f"and {others} more" if others else "")
+        paint.show_when(self.more, others > 0)
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        status = theme.status(self._status)
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        edge = theme.colour(BORDERS.get(self._status, "borderStrong"))
+        paint.box(painter, rect, theme.radius("panel"), theme.colour(status.tint or "panel"), edge)
+        square = QRectF(16, rect.center().y() - ICON / 2, ICON, ICON)
+        paint_icon(painter, square, status.icon, theme.colour(status.colour))
+        painter.end()
+
+
+class BannerPlace(QWidget):
+    """Where the banner is: shows the worst alert that was not closed, and goes when it is cured."""
+
+    def __init__(self, theme: Theme, banner: Banner | None = None) -> None:
+        super().__init__()
+        self.banner = banner if banner is not None else Banner(theme)
+        self._alert: AlertLike | None = None
+        self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
+        self.on_action: Callable[[str], object] = lambda _name: None
+        self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
+        self.on_more: Callable[[], object] = lambda: None
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 8, 8, 0)
+        row.addWidget(self.banner)
+        self.banner.pressed.connect(self._next_step)
+        self.banner.second_pressed.connect(lambda: self._answer(1))
+        self.banner.more_pressed.connect(self._more)
+        self.banner.closed.connect(self._close)
+        self.hide()
+
+    @property
+    def alert(self) -> AlertLike | None:
+        """The alert that is shown."""
+        return self._alert
+
+    def offer(
+        self,
+        title: str,
+        detail: str,
+        yes: tuple[str, Callable[[], object]],
+        no: tuple[str, Callable[[], object]],
+    ) -> None:
+        """Offer something once, with two answers; alerts wait until it is answered."""
+        self._offer = (yes[1], no[1])
+        self.banner.show_words("info", title, detail, yes[0], second=no[0])
+        self.show()
+
+    def show_alerts(self, alerts: list[AlertLike]) -> None:
+        """The alerts that are active and not closed, worst first."""
+        if self._offer is not None:
+            return
+        first = alerts[0] if alerts else None
+        self._alert = first
+        if first is None:
+            self.hide()
+            return
+        others = len(alerts) - 1
+        self.banner.show_words(first.severity, first.title, first.detail, first.button, others)
+        self.show()
+
+    def _answer(self, which: int) -> None:
+        if self._offer is not None:
+            answer = self._offer[which]
+            self._offer = None
+            self.hide()
+            answer()
+
+    def _next_step(self) -> None:
+        if self._offer is not None:
+            self._answer(0)
+        elif self._alert is not None and self._alert.action is not None:
+            self.on_action(self._alert.action)
+
+    def _close(self) -> None:
+        if self._offer is not None:
+            self._offer = None
+        elif self._alert is not None:
+            self.on_dismiss(self._alert.id)
+        self._alert = None
+        self.hide()
+
+    def _more(self) -> None:
+        self.on_more()

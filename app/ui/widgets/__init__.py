@@ -1,0 +1,26 @@
+"""The small painted widgets of the design (UI.md §4); each takes the theme first."""
+
+from __future__ import annotations
+
+from app.ui.widgets.button import Button as Button
+from app.ui.widgets.button import IconButton as IconButton
+from app.ui.widgets.chip import Chip as Chip
+from app.ui.widgets.choices import Choice as Choice
+from app.ui.widgets.choices import ColourSwatches as ColourSwatches
+from app.ui.widgets.empty_state import EmptyAction as EmptyAction
+from app.ui.widgets.empty_state import EmptyState as EmptyState
+from app.ui.widgets.run_buttons import RunButton as RunButton
+from app.ui.widgets.run_buttons import StopButton as StopButton
+from app.ui.widgets.segments import Segments as Segments
+from app.ui.widgets.slider import NumberField as NumberField
+from app.ui.widgets.slider import SliderWithUnit as SliderWithUnit
+from app.ui.widgets.small import Bar as Bar
+from app.ui.widgets.small import Card as Card
+from app.ui.widgets.small import Line as Line
+from app.ui.widgets.small import SearchField as SearchField
+from app.ui.widgets.small import Sparkline as Sparkline
+from app.ui.widgets.small import StatusItem as StatusItem
+from app.ui.widgets.small import Switch as Switch
+from app.ui.widgets.small import label as label
+from app.ui.widgets.small import paint_sparkline as paint_sparkline
+from app.ui.widgets.small import set_role as set_role

@@ -1,0 +1,200 @@
+"""Buttons that paint their own icon, gap and word, as Fusion's gap is narrow and fixed."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
+
+from app.ui.icons import paint_icon
+from app.ui.theme import Theme
+from app.ui.widgets import paint
+
+Kind = Literal["plain", "primary", "ghost", "run", "stop"]
+Size = Literal["small", "normal", "form", "large"]
+
+
+class _Measure(NamedTuple):
+    height: int
+    font: str
+    icon: int
+    gap: int
+    padding: int
+    radius: str
+
+
+_MEASURES: dict[str, _Measure] = {
+    "small": _Measure(26, "body", 14, 6, 9, "small"),
+    "normal": _Measure(32, "body", 16, 8, 12, "control"),
+    "form": _Measure(36, "label", 16, 8, 14, "control"),
+    "large": _Measure(44, "button", 20, 10, 18, "large"),
+}
+# kind: fill, fill under the mouse, fill pressed, border, words
+_COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] = {
+    "plain": ("panel", "hover", "pressed", "borderStrong", "text"),
+    "ghost": (None, "hover", "pressed", None, "text"),
+    "primary": ("accent", "accentHover", "accentHover", None, "onAccent"),
+    "run": ("run", "runHover", "runHover", None, "onRun"),
+    "stop": ("stop", "stopHover", "stopHover", None, "onStop"),
+}
+
+
+class Button(QAbstractButton):
+    """A button with a word and perhaps an icon; filled kinds are for the one thing most people want next."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        text: str,
+        icon: str | None = None,
+        *,
+        kind: Kind = "plain",
+        size: Size = "normal",
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self.kind: Kind = kind
+        self.measure = _MEASURES[size]
+        self.icon_name = icon
+        self.fill_icon = False
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setCursor(Qt.CursorShape.ArrowCursor)
+        self.setProperty("focusRadius", theme.radius(self.measure.radius))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        theme.changed.connect(self.updateGeometry)
+
+    def set_word(self, text: str, icon: str | None = None) -> None:
+        """Another word, and another icon when one is given; the place stays."""
+        if text == self.text() and icon in {None, self.icon_name}:
+            return
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.icon_name = icon if icon is not None else self.icon_name
+        self.updateGeometry()
+        self.update()
+
+    def set_kind(self, kind: Kind) -> None:
+        """Filled or outlined from now on."""
+        if kind != self.kind:
+            self.kind = kind
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font(self.measure.font)
+        width = paint.width_of(font, self.text()) + 2 * self.measure.padding
+        if self.icon_name is not None:
+            width += self.measure.icon + (self.measure.gap if self.text() else 0)
+        height = max(self.measure.height, round(paint.height_of(font)) + 8)
+        return QSize(round(width) + 1, height)
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def frame(self) -> QRectF:
+        """Where the button's body is painted."""
+        return QRectF(self.rect())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        fill, border, ink = self._look()
+        paint.box(painter, self.frame(), self._theme.radius(self.measure.radius), fill, border)
+        self.paint_content(painter, ink)
+        painter.end()
+
+    def paint_content(self, painter: QPainter, ink: QColor) -> None:
+        """The icon and the word, centred together."""
+        font = self._theme.font(self.measure.font)
+        if self.measure.font == "body":
+            font.setWeight(font.Weight.Medium)
+        frame = self.frame()
+        text_width = paint.width_of(font, self.text())
+        icon = self.measure.icon if self.icon_name is not None else 0
+        gap = self.measure.gap if icon and self.text() else 0
+        left = frame.center().x() - (icon + gap + text_width) / 2
+        if self.icon_name is not None:
+            top = frame.center().y() - icon / 2
+            filled = self.fill_icon and self.isEnabled()
+            paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, ink, filled=filled)
+        area = QRectF(QPointF(left + icon + gap, frame.top()), frame.bottomRight())
+        paint.words(painter, area, self.text(), font, ink)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        """Fill, border and ink of the moment."""
+        theme = self._theme
+        rest, hover, pressed, border, ink = _COLOURS[self.kind]
+        if not self.isEnabled():
+            edge = "border" if self.kind != "ghost" else None
+            return None, theme.colour(edge) if edge else None, theme.colour("textDisabled")
+        role = pressed if self.isDown() or self.isChecked() else hover if self.underMouse() else rest
+        return (
+            theme.colour(role) if role else None,
+            theme.colour(border) if border else None,
+            theme.colour(ink),
+        )
+
+
+class IconButton(QAbstractButton):
+    """A button with only an icon; its name and shortcut are its tooltip and what a screen reader says."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        icon: str,
+        name: str,
+        shortcut: str = "",
+        *,
+        checkable: bool = False,
+        size: int = 28,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self._icon = icon
+        self._side = size
+        self.setCheckable(checkable)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", theme.radius("small"))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.set_name(name, shortcut)
+
+    def set_name(self, name: str, shortcut: str = "") -> None:
+        """What the button does, and its key."""
+        self.setAccessibleName(name)
+        self.setToolTip(f"{name} ({shortcut})" if shortcut else name)
+
+    def set_icon(self, icon: str) -> None:
+        """Another icon in the same place."""
+        self._icon = icon
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(self._side, self._side)
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        fill, ink = None, "textSecondary"
+        if self.isChecked():
+            fill, ink = "accentTint", "accentText"
+        elif self.isDown():
+            fill, ink = "pressed", "text"
+        elif self.underMouse() and self.isEnabled():
+            fill, ink = "hover", "text"
+        if fill is not None:
+            paint.box(painter, rect, theme.radius("small"), theme.colour(fill))
+        side = theme.size("icon", "normal" if self._side < 40 else "large")
+        square = QRectF(0, 0, side, side)
+        square.moveCenter(rect.center())
+        paint_icon(painter, square, self._icon, theme.colour(ink if self.isEnabled() else "textDisabled"))
+        painter.end()

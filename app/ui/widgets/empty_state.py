@@ -1,0 +1,108 @@
+"""What a panel says when it has nothing: what is missing, what will appear and how, and the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from app.ui.icons import paint_icon
+from app.ui.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.button import Button
+from app.ui.widgets.small import label
+
+TILE = 56
+TEXT_WIDTH = 400
+
+
+@dataclass(frozen=True)
+class EmptyAction:
+    """A next step: its words, what it does, its icon, and whether it is the filled one."""
+
+    text: str
+    run: Callable[[], object]
+    icon: str | None = None
+    primary: bool = False
+
+
+class _Tile(QWidget):
+    def __init__(self, theme: Theme, icon: str) -> None:
+        super().__init__()
+        self._theme, self.icon = theme, icon
+        self.setFixedSize(TILE, TILE)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        paint.box(painter, QRectF(self.rect()), theme.radius("palette"), theme.colour("sunken"))
+        side = theme.size("icon", "empty")
+        square = QRectF((TILE - side) / 2, (TILE - side) / 2, side, side)
+        paint_icon(painter, square, self.icon, theme.colour("textSecondary"))
+        painter.end()
+
+
+class EmptyState(QWidget):
+    """An icon in a tile, one line, one or two lines below, and one or two buttons; centred."""
+
+    def __init__(
+        self, theme: Theme, icon: str, title: str, text: str, actions: Sequence[EmptyAction] = ()
+    ) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._tile = _Tile(theme, icon)
+        self._title = label(title, "empty", wrap=True)
+        self._text = label(text, "bodyLarge", role="textSecondary", wrap=True)
+        for words in (self._title, self._text):
+            words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(16, 12, 16, 12)
+        column.setSpacing(0)
+        column.addStretch(1)
+        column.addWidget(self._tile, 0, Qt.AlignmentFlag.AlignHCenter)
+        column.addSpacing(16)
+        column.addWidget(self._title)
+        column.addSpacing(4)
+        inner = QHBoxLayout()
+        inner.addStretch(1)
+        self._text.setMaximumWidth(TEXT_WIDTH)
+        inner.addWidget(self._text, 100)
+        inner.addStretch(1)
+        column.addLayout(inner)
+        self._row = QHBoxLayout()
+        self._row.setSpacing(8)
+        self._row.setContentsMargins(0, 14, 0, 0)
+        column.addLayout(self._row)
+        column.addStretch(1)
+        self._buttons: list[Button] = []
+        self.set_actions(actions)
+
+    def say(self, title: str, text: str, icon: str | None = None) -> None:
+        """Other words in the same place."""
+        self._title.setText(title)
+        self._text.setText(text)
+        if icon is not None:
+            self._tile.icon = icon
+            self._tile.update()
+
+    def set_actions(self, actions: Sequence[EmptyAction]) -> None:
+        """Other next steps."""
+        while (item := self._row.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.deleteLater()
+        self._buttons = []
+        self._row.addStretch(1)
+        for action in actions:
+            button = Button(self._theme, action.text, action.icon, size="form")
+            button.set_kind("primary" if action.primary else "plain")
+            button.clicked.connect(lambda _on=False, run=action.run: run())
+            self._row.addWidget(button)
+            self._buttons.append(button)
+        self._row.addStretch(1)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(120, 120)

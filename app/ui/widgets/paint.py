@@ -1,0 +1,86 @@
+"""Small shapes that all painted widgets share: crisp boxes, one-line text, key caps."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
+from PySide6.QtWidgets import QWidget
+
+from app.ui.theme import Theme
+
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+CENTRE = Qt.AlignmentFlag.AlignCenter
+KEY_PADDING = 6.0
+SMALLEST_KEY = 18.0
+
+
+def box(
+    painter: QPainter,
+    rect: QRectF,
+    radius: float,
+    fill: QColor | None,
+    border: QColor | None = None,
+    width: float = 1.0,
+) -> None:
+    """A rounded box; its border lies inside ``rect`` on whole pixels."""
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setBrush(fill if fill is not None else Qt.BrushStyle.NoBrush)
+    if border is None:
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.drawRoundedRect(rect, radius, radius)
+        return
+    painter.setPen(QPen(border, width))
+    inner = rect.adjusted(width / 2, width / 2, -width / 2, -width / 2)
+    inside = max(0.0, radius - width / 2)
+    painter.drawRoundedRect(inner, inside, inside)
+
+
+def words(
+    painter: QPainter,
+    rect: QRectF,
+    text: str,
+    font: QFont,
+    colour: QColor,
+    align: Qt.AlignmentFlag = LEFT,
+) -> None:
+    """One line of text, elided at its end when it does not fit."""
+    painter.setFont(font)
+    painter.setPen(colour)
+    fitting = QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideRight, rect.width() + 1)
+    painter.drawText(rect, int(align), fitting)
+
+
+def width_of(font: QFont, text: str) -> float:
+    """How wide a line of text is."""
+    return QFontMetricsF(font).horizontalAdvance(text)
+
+
+def height_of(font: QFont) -> float:
+    """How high a line of text is."""
+    return QFontMetricsF(font).height()
+
+
+def key_width(theme: Theme, key: str) -> float:
+    """The width of a key cap."""
+    return max(SMALLEST_KEY, width_of(theme.font("caption"), key) + 2 * KEY_PADDING)
+
+
+def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: str) -> QRectF:
+    """A key's name in its cap, ending at ``right``; where it was painted."""
+    height = max(SMALLEST_KEY, theme.scaled(SMALLEST_KEY))
+    width = key_width(theme, key)
+    rect = QRectF(right - width, middle - height / 2, width, height)
+    box(painter, rect, theme.radius("key"), theme.colour("sunken"), theme.colour("borderStrong"))
+    words(painter, rect, key, theme.font("caption"), theme.colour("textSecondary"), CENTRE)
+    return rect
+
+
+def show_when(widget: QWidget, shown: bool) -> None:
+    """Show or hide a widget in its place; one that has no place yet does not become a window of its own."""
+    if not shown:
+        widget.hide()
+    elif widget.parentWidget() is not None:
+        widget.show()
+    else:
+        widget.setAttribute(Qt.WidgetAttribute.WA_WState_ExplicitShowHide, False)

@@ -1,0 +1,271 @@
+"""The smallest widgets: labels, lines, switch, sparkline, sensor bar, card, status item, search field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QAbstractButton, QFrame, QLabel, QLineEdit, QSizePolicy, QWidget
+
+from app.ui.icons import paint_icon
+from app.ui.theme import Theme
+from app.ui.widgets import paint
+
+SPARK = QSize(56, 16)
+SPARK_STROKE = 1.25
+BAR_HEIGHT = 6
+
+
+def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool = False) -> QLabel:
+    """A line of text of one kind ("body", "small", "title", ...) in the colour of one role."""
+    made = QLabel(text)
+    made.setTextFormat(Qt.TextFormat.PlainText)
+    made.setProperty("kind", kind)
+    made.setProperty("role", role)
+    made.setWordWrap(wrap)
+    return made
+
+
+def set_role(shown: QLabel, role: str) -> None:
+    """Give a label's words the colour of another role."""
+    if shown.property("role") != role:
+        shown.setProperty("role", role)
+        shown.style().unpolish(shown)
+        shown.style().polish(shown)
+
+
+class Line(QWidget):
+    """A line of 1 px: between groups of buttons (upright) or between parts of a panel."""
+
+    def __init__(self, theme: Theme, *, upright: bool = False, length: int = 0) -> None:
+        super().__init__()
+        self._theme = theme
+        if upright:
+            self.setFixedWidth(1)
+        else:
+            self.setFixedHeight(1)
+        if length:
+            (self.setFixedHeight if upright else self.setFixedWidth)(length)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.fillRect(event.rect(), self._theme.colour("border"))
+        painter.end()
+
+
+class Switch(QAbstractButton):
+    """Yes or no: a switch with the word beside it."""
+
+    TRACK = QSize(36, 20)
+
+    def __init__(self, theme: Theme, text: str, on: bool = False) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setCheckable(True)
+        self.setChecked(on)
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setProperty("focusRadius", 10)
+        theme.changed.connect(self.updateGeometry)
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("bodyLarge")
+        gap = 10 if self.text() else 0
+        width = self.TRACK.width() + gap + paint.width_of(font, self.text())
+        return QSize(round(width) + 2, max(24, round(paint.height_of(font))))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        track = QRectF(0, rect.center().y() - 10, self.TRACK.width(), self.TRACK.height())
+        on = self.isChecked()
+        if on and self.isEnabled():
+            paint.box(painter, track, 10, theme.colour("accent"))
+        else:
+            paint.box(painter, track, 10, theme.colour("sunken"), theme.colour("controlBorder"))
+        knob = QRectF(0, 0, 14, 14)
+        knob.moveCenter(QPointF(track.right() - 10 if on else track.left() + 10, track.center().y()))
+        paint.box(painter, knob, 7, theme.colour("onAccent" if on else "controlBorder"))
+        ink = theme.colour("text" if self.isEnabled() else "textDisabled")
+        paint.words(painter, rect.adjusted(46, 0, 0, 0), self.text(), theme.font("bodyLarge"), ink)
+        painter.end()
+
+
+def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], colour: QColor) -> None:
+    """One stroke through the values, oldest left, no axes; fewer than two values paint nothing.
+
+    The height shows how the values differ from 0 to their largest; equal values make a level line.
+    """
+    if len(values) < 2:
+        return
+    least, most = min(values), max(values)
+    steady = most - least <= 0.1 * abs(most) or most == least
+    points = QPolygonF()
+    for index, value in enumerate(values):
+        share = 0.5 + 0.5 * (value - most) / (abs(most) or 1) if steady else (value - least) / (most - least)
+        x = rect.left() + rect.width() * index / (len(values) - 1)
+        points.append(QPointF(x, rect.bottom() - 1 - share * (rect.height() - 2)))
+    painter.save()
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(QPen(colour, SPARK_STROKE))
+    painter.drawPolyline(points)
+    painter.restore()
+
+
+class Sparkline(QWidget):
+    """A small curve of 56 x 16."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._values: tuple[float, ...] = ()
+        self.setFixedSize(SPARK)
+
+    def set_values(self, values: Sequence[float]) -> None:
+        """What to draw, oldest first."""
+        if tuple(values) != self._values:
+            self._values = tuple(values)
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        paint_sparkline(painter, QRectF(self.rect()), self._values, self._theme.colour("textSecondary"))
+        painter.end()
+
+
+class Bar(QWidget):
+    """A sensor's value between its limits; None shows only the track."""
+
+    def __init__(self, theme: Theme, fraction: float | None = None) -> None:
+        super().__init__()
+        self._theme = theme
+        self._fraction: float | None = None
+        self.setFixedHeight(BAR_HEIGHT)
+        self.setMinimumWidth(40)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.set_fraction(fraction)
+
+    @property
+    def fraction(self) -> float | None:
+        """What is shown: 0 to 1, or None."""
+        return self._fraction
+
+    def set_fraction(self, fraction: float | None) -> None:
+        """Show a share from 0 to 1 (outside values are cut), or None for "not known"."""
+        value = None if fraction is None or fraction != fraction else min(max(fraction, 0.0), 1.0)  # noqa: PLR0124
+        if value != self._fraction:
+            self._fraction = value
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, rect.height() / 2, self._theme.colour("sunken"))
+        if self._fraction:
+            rect.setWidth(max(rect.height(), rect.width() * self._fraction))
+            paint.box(painter, rect, rect.height() / 2, self._theme.colour("accent"))
+        painter.end()
+
+
+class Card(QFrame):
+    """A surface with a border and large corners."""
+
+    def __init__(self, theme: Theme, *, radius: str = "card", fill: str = "panel") -> None:
+        super().__init__()
+        self._theme, self._radius, self.fill = theme, radius, fill
+        self.border = "border"
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        theme = self._theme
+        rect = QRectF(self.rect())
+        paint.box(
+            painter, rect, theme.radius(self._radius), theme.colour(self.fill), theme.colour(self.border)
+        )
+        painter.end()
+
+
+class StatusItem(QWidget):
+    """One fact in the status bar: perhaps an icon, and a few words."""
+
+    ICON = 14
+
+    def __init__(self, theme: Theme, icon: str = "", text: str = "", status: str | None = None) -> None:
+        super().__init__()
+        self._theme = theme
+        self._icon, self._text, self._status = "", "", status
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
+        theme.changed.connect(self.updateGeometry)
+        self.set(icon, text, status)
+
+    @property
+    def text(self) -> str:
+        """The words shown now."""
+        return self._text
+
+    def set(self, icon: str, text: str, status: str | None = None) -> None:
+        """Show another fact; without words the item is hidden. A status colours it."""
+        if (icon, text, status) == (self._icon, self._text, self._status):
+            return
+        self._icon, self._text, self._status = icon, text, status
+        self.setAccessibleName(text)
+        paint.show_when(self, bool(text))
+        self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("small")
+        width = paint.width_of(font, self._text) + (self.ICON + 6 if self._icon else 0)
+        return QSize(round(width) + 1, round(paint.height_of(font)))
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        theme = self._theme
+        rect = QRectF(self.rect())
+        loud = self._status in {"warn", "error"}
+        ink = theme.colour(theme.status(self._status).colour) if self._status and loud else None
+        if self._icon:
+            colour = ink or theme.colour(
+                theme.status(self._status).colour if self._status else "textSecondary"
+            )
+            square = QRectF(0, rect.center().y() - self.ICON / 2, self.ICON, self.ICON)
+            paint_icon(painter, square, self._icon, colour)
+            rect.setLeft(self.ICON + 6)
+        paint.words(painter, rect, self._text, theme.font("small"), ink or theme.colour("textSecondary"))
+        painter.end()
+
+
+class SearchField(QLineEdit):
+    """A field to filter or find, with its icon inside and the key that leads to it at the right."""
+
+    def __init__(self, theme: Theme, placeholder: str, key: str = "") -> None:
+        super().__init__()
+        self._theme, self._key = theme, key
+        self.setPlaceholderText(placeholder)
+        self.setAccessibleName(placeholder)
+        self.setProperty("quiet", "true")
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.setMinimumHeight(26)
+        self._arrange()
+        theme.changed.connect(self._arrange)
+
+    def _arrange(self) -> None:
+        right = round(paint.key_width(self._theme, self._key)) + 2 if self._key else 0
+        self.setTextMargins(20, 0, right, 0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self)
+        middle = self.height() / 2
+        paint_icon(painter, QRectF(9, middle - 7, 14, 14), "search", self._theme.colour("textTertiary"))
+        if self._key and not self.text():
+            paint.key_cap(painter, self._theme, self.width() - 5, middle, self._key)
+        painter.end()

@@ -1,0 +1,189 @@
+"""Show every widget of the design in light and dark; with a file name, take a picture of it and end.
+
+Usage: python tools/gallery.py [PICTURE.png] [--text PERCENT]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QPainter, QPixmap
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
+
+from app.ui import fonts
+from app.ui.banner import Banner
+from app.ui.theme import Theme
+from app.ui.widgets import (
+    Bar,
+    Button,
+    Card,
+    Chip,
+    Choice,
+    ColourSwatches,
+    EmptyAction,
+    EmptyState,
+    IconButton,
+    RunButton,
+    SearchField,
+    Segments,
+    SliderWithUnit,
+    Sparkline,
+    StatusItem,
+    StopButton,
+    Switch,
+    label,
+)
+
+WAVE = (1.0, 3.0, 2.0, 5.0, 4.0, 6.0, 2.0, 3.0, 1.0, 4.0)
+
+
+def row(*widgets: QWidget) -> QWidget:
+    """Widgets side by side."""
+    made = QWidget()
+    line = QHBoxLayout(made)
+    line.setContentsMargins(0, 0, 0, 0)
+    line.setSpacing(8)
+    for widget in widgets:
+        line.addWidget(widget)
+    line.addStretch(1)
+    return made
+
+
+def _buttons(theme: Theme) -> list[QWidget]:
+    run = RunButton(theme, "Run", "play", widest="Go on")
+    run.set_filled(True)
+    idle = RunButton(theme, "Pause", "pause")
+    idle.setEnabled(False)
+    stopping = StopButton(theme)
+    stopping.show_state("Stopping", ring=True)
+    outlined = StopButton(theme, "appBar")
+    outlined.show_state("Stop", filled=False)
+    again = StopButton(theme, "toolBar")
+    again.show_state("Stop again")
+    return [
+        row(run, idle, RunButton(theme, "Step", "step-forward"), StopButton(theme), stopping),
+        row(again, outlined, StopButton(theme, "toolBar")),
+        row(
+            Button(theme, "Use the virtual robot", "bot", kind="primary", size="large"),
+            Button(theme, "New behaviour", size="large"),
+            Button(theme, "Try", "play", size="form"),
+            Button(theme, "Connect NAO"),
+            Button(theme, "Small", "copy", size="small"),
+            Button(theme, "Ghost", kind="ghost"),
+            IconButton(theme, "ellipsis", "More"),
+            IconButton(theme, "snowflake", "Freeze", "Space", checkable=True),
+        ),
+    ]
+
+
+def _fields(theme: Theme) -> list[QWidget]:
+    layouts: list[tuple[str, str, str | None]] = [
+        ("b", "Behaviour", "blocks"), ("d", "Developer", "activity"),
+    ]  # fmt: skip
+    languages: list[tuple[str, str, str | None]] = [
+        ("en", "English", None), ("fr", "French", None), ("ja", "Japanese", None),
+    ]  # fmt: skip
+    wrong = SliderWithUnit(theme, 0, 1, step=0.05, value=0.5, unit="m", name="Distance")
+    wrong.field.setText("2.4")
+    wrong.field.editingFinished.emit()
+    return [
+        row(
+            *(Chip(theme, name, name) for name in ("ok", "warn", "error", "info", "off", "running")),
+            Chip(theme, "new", "info", ""),
+        ),
+        row(Segments(theme, layouts), Segments(theme, languages, check=True, size="form")),
+        row(
+            SearchField(theme, "Filter", "/"),
+            Choice(theme, [("a", "Live network")]),
+            Switch(theme, "loud", True),
+        ),
+        SliderWithUnit(theme, 0, 100, value=60, unit="%", name="Volume"),
+        wrong,
+        ColourSwatches(theme, "#3ab7ff"),
+    ]
+
+
+def _rest(theme: Theme) -> list[QWidget]:
+    spark = Sparkline(theme)
+    spark.set_values(WAVE)
+    bar = Bar(theme, 0.6)
+    bar.setFixedWidth(200)
+    banner = Banner(theme)
+    banner.show_words(
+        "error", "The camera of Pepper has been silent for 4 s.", "The behaviour waits.", "Look", 2
+    )
+    card = Card(theme)
+    inside = QVBoxLayout(card)
+    inside.addWidget(label("Make a new behaviour", "heading"))
+    inside.addWidget(label("Start with an empty page.", "bodyLarge", role="textSecondary"))
+    empty = EmptyState(
+        theme,
+        "radio-tower",
+        "No master is running",
+        "A master lets programs find each other. Start one here, or choose a computer that has one.",
+        [EmptyAction("Start a master here", print, "play", primary=True), EmptyAction("Choose", print)],
+    )
+    status = StatusItem(theme, "circle-check", "Master 127.0.0.1:7780", "ok")
+    lost = StatusItem(theme, "triangle-alert", "12 lost in 30 s", "warn")
+    return [row(spark, bar, status, lost), banner, card, empty]
+
+
+def page(theme: Theme) -> QWidget:
+    """Every widget once."""
+    made = QWidget()
+    made.setAutoFillBackground(True)
+    column = QVBoxLayout(made)
+    column.setSpacing(12)
+    column.addWidget(label("What would you like to do?", "display"))
+    for widget in (*_buttons(theme), *_fields(theme), *_rest(theme)):
+        column.addWidget(widget)
+    return made
+
+
+def pictures(percent: int) -> QPixmap:
+    """The page in light and in dark, side by side."""
+    shots = []
+    for mode in ("light", "dark"):
+        theme = Theme("light" if mode == "light" else "dark")
+        theme.set_text_percent(percent)
+        made = page(theme)
+        made.resize(820, 980)
+        made.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
+        made.show()
+        shots.append(made.grab())
+        made.close()
+    whole = QPixmap(sum(shot.width() for shot in shots), max(shot.height() for shot in shots))
+    whole.fill(QColor(Qt.GlobalColor.gray))
+    painter = QPainter(whole)
+    left = 0
+    for shot in shots:
+        painter.drawPixmap(left, 0, shot)
+        left += shot.width()
+    painter.end()
+    return whole
+
+
+def main() -> int:
+    """Show the gallery or save its picture."""
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("picture", nargs="?", type=Path)
+    asked.add_argument("--text", type=int, default=100)
+    options = asked.parse_args()
+    application = QApplication(sys.argv[:1])
+    fonts.load()
+    if options.picture is not None:
+        return 0 if pictures(options.text).save(str(options.picture)) else 1
+    theme = Theme("system")
+    theme.apply()
+    shown = page(theme)
+    shown.show()
+    return application.exec()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
