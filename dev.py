@@ -88,14 +88,18 @@ def _ask(command: Sequence[str]) -> str:
     return done.stdout
 
 
-def _do(command: Sequence[str], environ: Mapping[str, str]) -> int:
-    """Run a command in front of the person; its exit code. Ctrl+C reaches it first, then us."""
-    process = subprocess.Popen(command, cwd=ROOT, env=dict(environ))
-    try:
-        return process.wait()
-    except BaseException:
-        _end(process)
-        raise
+def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None = None) -> int:
+    """Run a command to its end and return its exit code; what it says goes to the person, or into `log`.
+
+    Ctrl+C reaches the command too (it is in our terminal's group): it may end in its own order, but must end.
+    """
+    with open(log, "ab") if log else contextlib.nullcontext() as output:  # noqa: PTH123 (a path or nothing)
+        process = subprocess.Popen(command, cwd=ROOT, env=dict(environ), stdout=output, stderr=output)
+        try:
+            return process.wait()
+        except BaseException:
+            _end(process)
+            raise
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -118,7 +122,7 @@ class Computer:
     has_ensurepip: bool = importlib.util.find_spec("ensurepip") is not None
     which: Callable[[str], str | None] = shutil.which
     ask: Callable[[Sequence[str]], str] = _ask
-    do: Callable[[Sequence[str], Mapping[str, str]], int] = _do
+    do: Callable[[Sequence[str], Mapping[str, str], Path | None], int] = watch
 
     @property
     def has_apt(self) -> bool:
@@ -193,19 +197,30 @@ def bring_system_packages(computer: Computer) -> None:
             "some system libraries are missing; type this one line, then start me again:\n"
             f"  sudo apt-get update && sudo apt-get install -y --no-install-recommends {line}"
         )
+    with timed(f"bringing {len(missing)} system packages with apt (the first time some 70 MB)"):
+        apt_install(computer, missing, names, unknown)
+
+
+def apt_install(computer: Computer, missing: Sequence[str], names: list[str], unknown: list[str]) -> None:
+    """Install `names` as root; raises Trouble with apt's own last words when it cannot."""
+    log = ROOT / "build" / "apt.log"
+    log.parent.mkdir(exist_ok=True)
+    log.unlink(missing_ok=True)
     environ = {**computer.environ, "DEBIAN_FRONTEND": "noninteractive"}
     apt = ["apt-get", "-q", "-o", "DPkg::Lock::Timeout=600", "-o", "Dpkg::Use-Pty=0"]
     install = [*apt, "install", "-y", "--no-install-recommends"]
-    with timed(f"bringing {len(missing)} system packages with apt"):
-        if not unknown and computer.do([*install, *names], environ) == 0:
-            return
-        # Only now: the package lists are absent or older than what the servers still have.
-        computer.do([*apt, "update"], environ)
-        names, unknown = available(computer, missing)
-        if unknown:
-            raise Trouble(f"apt knows no package for {', '.join(unknown)}; is its list of servers complete?")
-        if computer.do([*install, *names], environ) != 0:
-            raise Trouble("apt could not install the system libraries; its own words are above")
+    if not unknown and computer.do([*install, *names], environ, log) == 0:
+        return
+    # Only now: the package lists are absent, or older than what the servers still have.
+    computer.do([*apt, "update"], environ, log)
+    names, unknown = available(computer, missing)
+    if unknown:
+        raise Trouble(
+            f"apt knows no package for {', '.join(unknown)}; is its list of servers complete? ('{log}')"
+        )
+    if computer.do([*install, *names], environ, log) != 0:
+        words = "".join(log.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)[-12:])
+        raise Trouble(f"apt could not install the system libraries ('{log}'); its last words:\n{words}")
 
 
 # ---- the virtual environment ----------------------------------------------------------------------
@@ -242,21 +257,17 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
     (folder / ".venv" / "nep-stamp").unlink(missing_ok=True)
     if not computer.ask([str(python), "-c", "import pip; print(pip.__version__)"]):
         with timed("making the virtual environment .venv"):
-            if (
-                computer.do(
-                    [sys.executable, "-m", "venv", "--clear", str(folder / ".venv")], computer.environ
-                )
-                != 0
-            ):
+            make = [sys.executable, "-m", "venv", "--clear", str(folder / ".venv")]
+            if computer.do(make, computer.environ, None) != 0:
                 raise Trouble("the virtual environment could not be made; Python's own words are above")
     quiet = [] if sys.stdout.isatty() else ["--quiet"]
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *quiet]
     with timed("installing the pinned packages (the first time some 250 MB are brought)"):
-        if computer.do([*pip, "-c", "constraints.txt", "-e", f".[{extra}]"], computer.environ) != 0:
+        if computer.do([*pip, "-c", "constraints.txt", "-e", f".[{extra}]"], computer.environ, None) != 0:
             raise Trouble("the packages could not be installed; pip's own words are above")
     probe = [str(python), "-c", "import PySide6.QtWebEngineWidgets"]
     with timed("loading Qt WebEngine once"):
-        if computer.do(probe, computer.environ) != 0:
+        if computer.do(probe, computer.environ, None) != 0:
             raise Trouble("Qt WebEngine does not load; the library named above is missing on this computer")
     (folder / ".venv" / "nep-stamp").write_text(stamp(folder, extra), encoding="utf-8")
     return python
@@ -315,7 +326,7 @@ def demo(computer: Computer, arguments: Sequence[str]) -> int:
         print("· no screen here: Studio runs on a virtual one and does the main job alone", flush=True)
         command += ["--self-drive", str(pictures)]
     with screen(computer) as environ:
-        code = computer.do(command, environ)
+        code = computer.do(command, environ, None)
     if "--self-drive" in command:
         made = sorted(pictures.glob("*.png"))
         print(f"· {len(made)} pictures of the window are in {pictures}", flush=True)
@@ -331,7 +342,7 @@ def script(computer: Computer, name: str, arguments: Sequence[str]) -> int:
     if name == "test" and not (computer.which("node") and computer.which("npm")):
         print("· no node and npm here: the interop tests with programs in JavaScript are skipped", flush=True)
     with screen(computer) as environ:
-        return computer.do([str(python), path, *arguments], environ)
+        return computer.do([str(python), path, *arguments], environ, None)
 
 
 def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
@@ -357,7 +368,7 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
     return code
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, computer: Computer | None = None) -> int:
     """The command line: 0 well, 1 not well, 2 something is missing, 130 after Ctrl+C."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(
@@ -368,7 +379,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # A terminal that closes, or a CI that gives up, must not leave a virtual screen behind.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        return run(Computer(), command, given[1:])
+        return run(computer or Computer(), command, given[1:])
     except Trouble as trouble:
         print(f"dev.py: {trouble}", file=sys.stderr)
         return 2

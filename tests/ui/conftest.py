@@ -1,0 +1,46 @@
+"""Tests of widgets: no screen needed, and any Qt warning fails the test that caused it.
+
+While the test runs, pytest-qt watches for warnings; while its widgets are closed and deleted, we do.
+The few lines that are known noise are in pyproject.toml, ``qt_log_ignore``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Generator
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, QMessageLogContext, Qt, QtMsgType, qInstallMessageHandler
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+os.environ.setdefault("QT_QUICK_BACKEND", "software")
+if hasattr(os, "geteuid") and os.geteuid() == 0:
+    # Chromium refuses to run as root with its sandbox. Never in the product.
+    os.environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
+
+# Qt asks for it before the application exists, when a web view comes later.
+QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+
+BAD = {QtMsgType.QtWarningMsg, QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg}
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
+    """Fails a test whose widgets warn while they are closed and deleted."""
+    noise = [re.compile(pattern) for pattern in item.config.getini("qt_log_ignore")]
+    warnings: list[str] = []
+
+    def listen(kind: QtMsgType, _context: QMessageLogContext, text: str) -> None:
+        if kind in BAD and not any(pattern.search(text) for pattern in noise):
+            warnings.append(text)
+
+    previous = qInstallMessageHandler(listen)
+    try:
+        result = yield
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+    finally:
+        qInstallMessageHandler(previous)
+    if warnings:
+        pytest.fail("Qt warned while the test's widgets were closed:\n" + "\n".join(warnings), pytrace=False)
+    return result

@@ -1,0 +1,71 @@
+"""The net under all tests of widgets: a Qt warning at any time fails the test that caused it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+INNER = """
+from PySide6.QtCore import qWarning
+from PySide6.QtWidgets import QLabel
+
+kept = []
+
+class WarnsWhenClosed(QLabel):
+    def closeEvent(self, event):
+        qWarning("closing hurts")
+
+def test_quiet(qtbot):
+    label = QLabel("x")
+    qtbot.addWidget(label)
+    label.show()
+
+def test_warns(qtbot):
+    qWarning("running hurts")
+
+def test_known_noise(qtbot):
+    qWarning("This plugin does not support propagateSizeHints()")
+
+def test_warns_when_closed(qtbot):
+    kept.append(WarnsWhenClosed("x"))
+    qtbot.addWidget(kept[0])
+    kept[0].show()
+"""
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What pytest says about the inner tests, run with our own net and configuration."""
+    folder = tmp_path_factory.mktemp("inner")
+    (folder / "test_inner.py").write_text(INNER, encoding="utf-8")
+    (folder / "conftest.py").write_bytes((ROOT / "tests" / "ui" / "conftest.py").read_bytes())
+    command = [sys.executable, "-m", "pytest", "-c", str(ROOT / "pyproject.toml"), "--rootdir", str(folder)]
+    done = subprocess.run(
+        [*command, str(folder / "test_inner.py")],
+        cwd=folder,
+        env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+    )
+    return done.stdout
+
+
+def test_a_warning_fails_the_test_that_caused_it(report: str) -> None:
+    assert "FAILED test_inner.py::test_warns -" in report or "FAILED test_inner.py::test_warns\n" in report
+
+
+def test_a_warning_at_the_end_fails_it_too(report: str) -> None:
+    assert "ERROR test_inner.py::test_warns_when_closed" in report
+    assert "closing hurts" in report
+
+
+def test_known_noise_and_silence_pass(report: str) -> None:
+    assert "1 failed, 3 passed, 1 error" in report
