@@ -5,17 +5,16 @@ Found by their description, watched by their sensors, tried out by their actions
 
 from __future__ import annotations
 
-import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
 
 from nep.graph import GraphView
 from nep.nodes import Node
-from nep.pubsub import Publisher
 
+from app.core.heartbeat import Heartbeat
 from app.core.mailbox import Batch
+from app.core.robot_link import Invocation, Payload, RobotLink
 from app.core.watches import Watch, Watches
 from app.errors import DescriptionError, RobotInputError, RobotUnknownError
 from app.robots import rize
@@ -24,81 +23,7 @@ from nep.errors import NepError
 
 DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
-ALIVE_S = 0.2
 SENDER = "studio"
-FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
-
-Payload = Mapping[str, object]
-
-
-@dataclass(slots=True, eq=False)
-class Invocation:
-    """One action that a person tried: its state is a robot's answer (``sent`` until the first one)."""
-
-    id: str
-    action: str
-    state: str = "sent"
-    feedback: Payload = field(default_factory=dict)
-    output: Payload = field(default_factory=dict)
-    error: str | None = None
-    started_s: float = 0.0
-    ended_s: float | None = None
-    clock: Callable[[], float] = time.monotonic
-
-    @property
-    def running(self) -> bool:
-        """Whether the robot has not finished it."""
-        return self.state not in FINAL_STATES
-
-    @property
-    def elapsed_s(self) -> float:
-        """Seconds since it was sent, at most until it ended."""
-        return (self.ended_s if self.ended_s is not None else self.clock()) - self.started_s
-
-
-@dataclass(slots=True, eq=False)
-class RobotLink:
-    """One robot as Studio sees it now.
-
-    ``values`` has the newest value of each sensor while somebody looks.
-    """
-
-    name: str
-    robot: Robot
-    connected: bool = True
-    silent: str | None = None
-    values: dict[str, object] = field(default_factory=dict)
-    drawing: Payload | None = None
-    invocations: dict[str, Invocation] = field(default_factory=dict)
-    last_stop: str | None = None
-    publisher: Publisher | None = None
-    world: Publisher | None = None
-    watch: Watch | None = None
-
-    @property
-    def virtual(self) -> bool:
-        """Whether it exists only on this computer."""
-        return self.robot.virtual
-
-    @property
-    def can_confirm_stop(self) -> bool:
-        """Whether it answers a stop; robots of RIZE do not."""
-        return self.robot.safe_stop.confirmed
-
-    @property
-    def state(self) -> str:
-        """``away``, ``silent``, ``busy`` or ``ready``."""
-        if not self.connected:
-            return "away"
-        if self.silent is not None:
-            return "silent"
-        return "busy" if any(invocation.running for invocation in self.invocations.values()) else "ready"
-
-    @property
-    def chip(self) -> str:
-        """The words of its chip: ``virtual, ready``."""
-        words = self.silent if self.silent is not None and self.connected else self.state
-        return f"virtual, {words}" if self.virtual else words
 
 
 class Fleet:
@@ -117,7 +42,7 @@ class Fleet:
         self._links: dict[str, RobotLink] = {}
         self._descriptions: dict[str, Watch] = {}
         self._named: dict[str, str] = {}
-        self._alive = _Heartbeat()
+        self._alive = Heartbeat(SENDER)
         self.revision = 0
 
     @property
@@ -177,13 +102,13 @@ class Fleet:
         if link.world is not None:
             link.world.publish(dict(change))
 
-    def stopped(self, names: Iterable[str], words: Mapping[str, str]) -> None:
-        """These robots were told to stop; ``words`` says what each answered."""
-        for name in names:
+    def stopped(self, words: Mapping[str, str]) -> None:
+        """These robots were told to stop; the words say what each did, by its name."""
+        for name, said in words.items():
             link = self._links.get(name)
             if link is None:
                 continue
-            link.last_stop = words.get(name)
+            link.last_stop = said
             for invocation in link.invocations.values():
                 if invocation.running:
                     invocation.state, invocation.ended_s = "canceled", self._clock()
@@ -323,51 +248,6 @@ class Fleet:
                 invocation.ended_s = self._clock()
         if not any(invocation.running for invocation in link.invocations.values()):
             self._alive.rest(link.name)
-
-
-class _Heartbeat:
-    """Tells robots that a person's try-out goes on, five times a second, in a thread of its own."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._robots: dict[str, Publisher] = {}
-        self._changed = threading.Event()
-        self._closing = False
-        self._thread: threading.Thread | None = None
-
-    def beat(self, name: str, publisher: Publisher) -> None:
-        with self._lock:
-            self._robots[name] = publisher
-            if self._thread is None and not self._closing:
-                self._thread = threading.Thread(target=self._run, name="studio-alive", daemon=True)
-                self._thread.start()
-        self._changed.set()
-
-    def rest(self, name: str) -> None:
-        with self._lock:
-            self._robots.pop(name, None)
-
-    def close(self) -> None:
-        self._closing = True
-        self._changed.set()
-        if self._thread is not None:
-            self._thread.join(timeout=2)
-
-    def _run(self) -> None:
-        while not self._closing:
-            with self._lock:
-                robots = list(self._robots.values())
-            for publisher in robots:
-                _tell_alive(publisher)
-            self._changed.clear()
-            self._changed.wait(ALIVE_S if robots else None)
-
-
-def _tell_alive(publisher: Publisher) -> None:
-    try:
-        publisher.publish({"id": uuid.uuid4().hex, "op": "alive", "from": SENDER})
-    except NepError:
-        return  # it has gone; its robot's watchdog does the rest
 
 
 def _command(robot: Robot, invocation: Invocation, input: Payload) -> Payload:

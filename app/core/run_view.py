@@ -1,20 +1,55 @@
-"""What the run bar says: the six states of Run and Stop in plain words."""
+"""What the run bar says: the six states of Run and Stop in plain words, made from the state of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from app.core.stopping import StopReport
+from app.core.stopping import RobotStop, StopReport
+
+STOPPING_SHOWN_AFTER_S = 0.1
+
+
+@dataclass(slots=True)
+class RunState:
+    """Where the run is. ``state`` is ready, running, paused, stopping, proven or unanswered.
+
+    Times are monotonic seconds; the program's clock stands while it is paused (``held_s``,
+    ``pause_began_s``).
+    """
+
+    state: str = "ready"
+    name: str = ""
+    says: str = ""
+    paused_at: str = ""
+    started_s: float = 0.0
+    held_s: float = 0.0
+    pause_began_s: float | None = None
+    elapsed_s: float | None = None
+    pressed_s: float = 0.0
+    asked: tuple[str, ...] = ()
+    answered: list[RobotStop] = field(default_factory=list)
+    report: StopReport | None = None
+    finished: bool = False
+    dashed: bool = False
+    errors: Mapping[str, str] = field(default_factory=dict)
+    last_words: str = ""
+
+    def elapsed(self, now: float) -> float:
+        """Seconds that the program has run, pauses left out."""
+        held = self.held_s
+        if self.pause_began_s is not None:
+            held += now - self.pause_began_s
+        return max(0.0, now - self.started_s - held)
 
 
 @dataclass(frozen=True, slots=True)
 class RunView:
     """Everything the run bar shows, large and compact.
 
-    ``state`` is ``ready``, ``running``, ``paused``, ``stopping``, ``proven`` or ``unanswered``. ``result``
-    stands beside Stop with its colour (``result_ok``); ``last_stop`` is the small reminder while a program
-    runs; ``confirm`` are the words of the button with which a person says that the silent robot stands still.
+    ``result`` stands beside Stop with its colour (``result_ok``); ``last_stop`` is the small reminder while a
+    program runs; ``confirm`` are the words of the button with which a person says that a silent robot is
+    still.
     """
 
     state: str
@@ -33,12 +68,105 @@ class RunView:
     stop_filled: bool = True
 
 
+def view_of(run: RunState, connected: Sequence[str], now: float) -> RunView:
+    """The run bar for this state, the names of the connected robots, and the time."""
+    early = run.state == "stopping" and now - run.pressed_s < STOPPING_SHOWN_AFTER_S
+    views: dict[str, Callable[[RunState, float], RunView]] = {
+        "running": _running,
+        "paused": _paused,
+        "stopping": _stopping_early if early else _stopping,
+        "proven": _proven,
+        "unanswered": _unanswered,
+    }
+    if run.state in views:
+        return views[run.state](run, now)
+    return RunView(
+        "ready",
+        "Ready",
+        connected_words(connected),
+        "Ready",
+        can_run=True,
+        can_step=True,
+        stop_filled=bool(connected),
+    )
+
+
+def _running(run: RunState, now: float) -> RunView:
+    time_words = seconds(run.elapsed(now))
+    return RunView(
+        "running",
+        f"Running, {time_words}",
+        run.says,
+        f"{run.name} runs, {time_words}",
+        can_pause=True,
+        can_step=True,
+        last_stop=run.last_words or None,
+    )
+
+
+def _paused(run: RunState, _now: float) -> RunView:
+    return RunView(
+        "paused",
+        f"Paused at “{run.paused_at}”" if run.paused_at else "Paused",
+        "Robots hold still; the clock stands",
+        f"{run.name} is paused",
+        can_run=True,
+        can_step=True,
+        run_word="Go on",
+        last_stop=run.last_words or None,
+    )
+
+
+def _stopping_early(run: RunState, now: float) -> RunView:
+    # an answer within 100 ms is no state of its own: the words of before stay, only Run can't be pressed
+    title = f"Running, {seconds(run.elapsed_s)}" if run.elapsed_s is not None else "Ready"
+    return replace(
+        _stopping(run, now), state="running", title=title, detail=run.says, stop_word="Stop", result=None
+    )
+
+
+def _stopping(run: RunState, now: float) -> RunView:
+    done = {robot.name for robot in run.answered if robot.answered}
+    waiting = [name for name in run.asked if name not in done]
+    detail = f"Waiting for {listed(waiting)}, {now - run.pressed_s:.1f} s" if waiting else ""
+    result = f"{len(done)} of {len(run.asked)} robots stopped" if run.asked else None
+    return RunView("stopping", "Stopping", detail, "Stopping", stop_word="Stopping", result=result)
+
+
+def _proven(run: RunState, _now: float) -> RunView:
+    words, good = result_words(run.report) if run.report is not None else ("", True)
+    after = f" after {seconds(run.elapsed_s)}" if run.elapsed_s is not None else ""
+    title, detail = f"Stopped{after}", "The dashed outline shows where" if run.dashed else ""
+    if run.errors:
+        title, detail = f"Stopped by a problem{after}", next(iter(run.errors.values()))
+    elif run.finished:
+        title, detail = f"Finished{after}", "Every script came to its end"
+    return RunView(
+        "proven", title, detail, words or title, True, False, True, result=words or None, result_ok=good
+    )
+
+
+def _unanswered(run: RunState, now: float) -> RunView:
+    if run.report is None:
+        return _proven(run, now)
+    title, detail, compact, confirm = unanswered_words(run.report)
+    words, _ = result_words(run.report)
+    return RunView(
+        "unanswered",
+        title,
+        detail,
+        compact,
+        stop_word="Stop again",
+        result=words,
+        result_ok=False,
+        confirm=confirm,
+    )
+
+
 def seconds(value: float) -> str:
     """``14 s``, ``2 min 5 s``: whole seconds, as a person reads a clock."""
     whole = int(value)
-    if whole < 60:
-        return f"{whole} s"
-    return f"{whole // 60} min {whole % 60} s"
+    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
 
 
 def listed(names: Sequence[str]) -> str:
@@ -59,24 +187,23 @@ def result_words(report: StopReport) -> tuple[str, bool]:
     """``all 2 robots stopped (41 ms)`` and whether every robot that can answer did."""
     robots = report.robots
     silent = [robot for robot in robots if robot.can_confirm and not robot.answered]
-    unsure = [robot for robot in robots if not robot.can_confirm]
-    proven = [robot for robot in robots if robot.can_confirm and robot.answered]
+    unsure = [robot.name for robot in robots if not robot.can_confirm]
+    proven = [robot.name for robot in robots if robot.can_confirm and robot.answered]
     if silent:
         return f"{len(proven)} of {len(robots)} robots stopped", False
-    if unsure and not proven:
-        return f"stop sent; {listed([robot.name for robot in unsure])} cannot confirm", True
     if not robots:
-        return "nothing to stop", True
+        return "no robot to stop", True
+    if not proven:
+        return f"stop sent; {_cannot_confirm(unsure)}", True
     time_ms = max(1, round(report.elapsed_ms))
-    words = (
-        f"{robots[0].name} stopped ({time_ms} ms)"
-        if len(robots) == 1
-        else f"all {len(robots)} robots stopped ({time_ms} ms)"
-    )
+    everyone = f"{proven[0]} stopped" if len(robots) == 1 else f"all {len(robots)} robots stopped"
     if unsure:
-        words = f"{listed([robot.name for robot in proven])} stopped ({time_ms} ms); "
-        words += f"{listed([robot.name for robot in unsure])} cannot confirm"
-    return words, True
+        return f"{listed(proven)} stopped ({time_ms} ms); {_cannot_confirm(unsure)}", True
+    return f"{everyone} ({time_ms} ms)", True
+
+
+def _cannot_confirm(names: Sequence[str]) -> str:
+    return f"{listed(names)} cannot confirm"
 
 
 def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
@@ -95,3 +222,12 @@ def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
         f"{names} did not answer; switch {'it' if len(silent) == 1 else 'them'} off by hand",
         f"{names} {'is' if len(silent) == 1 else 'are'} still",
     )
+
+
+def stop_words(robot: RobotStop, clock: str) -> str:
+    """What one robot did with a stop, for its health: ``answered in 41 ms, at 8:40``."""
+    if not robot.can_confirm:
+        return f"sent at {clock}; this robot cannot confirm"
+    if robot.answered:
+        return f"answered in {max(1, round(robot.elapsed_ms or 0))} ms, at {clock}"
+    return f"not answered, at {clock}"

@@ -1,6 +1,7 @@
 """What is open now: the network, its topics and robots, the behaviour, its run.
 
-The window reads it 30 times a second. Nothing here waits: threads post into the mailbox, `Session.tick` takes over what they posted.
+The window reads it 30 times a second. Nothing here waits: threads post into the mailbox, `Session.tick` takes
+over what they posted.
 """
 
 from __future__ import annotations
