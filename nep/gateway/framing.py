@@ -93,7 +93,7 @@ class Shape:
         return not self.is_from_0546(subscription)
 
     def is_from_0546(self, subscription: bytes) -> bool:
-        """Whether this filter gives nep 0.5.4.6 away: it asks where frames are bare, and filters on the topic."""
+        """Whether this filter gives nep 0.5.4.6 away: it names the topic where frames are bare."""
         return self.framing == "bare" and bool(subscription) and self.topic.encode().startswith(subscription)
 
     def _strip(self, frame: bytes) -> bytes:
@@ -116,10 +116,11 @@ class Shape:
 
 
 def shield_javascript(data: bytes, topic: str) -> bytes:
-    """The same JSON without the topic's text in it.
+    r"""The same JSON without the topic's text in it.
 
-    nep-js cuts a frame at every occurrence of the topic and parses the second piece, so a payload that names its
-    own topic ends the program. In JSON a letter can be written as `\\uXXXX`, which every reader undoes.
+    nep-js cuts a frame at every occurrence of the topic and parses the second piece, so a payload that
+    names its own topic ends the program. In JSON a letter can be written as `\uXXXX`, which every reader
+    undoes.
     """
     word = topic.encode()
     if not word or word not in data:

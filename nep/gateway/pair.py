@@ -1,9 +1,10 @@
-"""The two sockets through which one line (a topic in one form) flows: originals publish into one, read the other."""
+"""The two sockets of one line (a topic in one form): originals publish into one and read from the other."""
 
 from __future__ import annotations
 
 import contextlib
 import socket
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -48,6 +49,8 @@ def port_to_tell(line: Line, base: int, socket_name: str) -> int:
 def is_free(port: int) -> bool:
     """Whether nobody has bound `port` of the loopback address."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        if sys.platform != "win32":  # elsewhere a closed connection holds its port for a minute
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((LOOPBACK, port))
         except OSError:

@@ -1,4 +1,4 @@
-"""Which original topic has which ports, and who asked for it; in a file, because originals never ask twice."""
+"""Which topic of the originals has which ports, and who asked; in a file, for originals never ask twice."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from nep.gateway.requests import Mode
 FIRST_PORT = 9000
 LAST_PORT = 9998
 _VERSION = 1
+_SAME_BOOT_S = 120.0
 
 
 @dataclass(frozen=True, order=True)
@@ -60,11 +61,13 @@ class PortMap:
     """The lines that have ports and the programs that asked for them.
 
     `save()` writes the file in one step, so that a killed master leaves either the old one or the new one.
-    Ports of lines that nobody uses any more stay theirs until the range is full.
+    Ports of lines that nobody uses any more stay theirs until the range is full. `boot` is when this computer
+    was started: no program that asked before then is still there.
     """
 
-    def __init__(self, file: Path | None) -> None:
+    def __init__(self, file: Path | None, boot: float = 0.0) -> None:
         self._file = file
+        self._boot = boot
         self._ports: dict[Line, int] = {}
         self._registrations: dict[tuple[str, Line, str], Registration] = {}
         if file is not None:
@@ -113,6 +116,7 @@ class PortMap:
             return
         document = {
             "version": _VERSION,
+            "boot": self._boot,
             "lines": [{**asdict(line), "port": port} for line, port in self._ports.items()],
             "programs": [asdict(registration) for registration in self._registrations.values()],
         }
@@ -136,6 +140,8 @@ class PortMap:
                 port = entry["port"]
                 if isinstance(port, int) and FIRST_PORT <= port <= LAST_PORT:
                     self._ports[_line(entry)] = port
+            if abs(document["boot"] - self._boot) > _SAME_BOOT_S:
+                return
             for entry in document["programs"]:
                 known = _registration(entry)
                 if known.line in self._ports:

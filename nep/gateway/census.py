@@ -1,0 +1,142 @@
+"""Which original programs are there, and what what each does: from its traffic, not from what it said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from nep.gateway.pair import End, Pair
+from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.processes import Processes
+from nep.gateway.requests import Member, Role
+
+_SAME_PROCESS_S = 5.0
+
+
+@dataclass(frozen=True)
+class Link:
+    """An original program publishes or subscribes a topic."""
+
+    topic: str
+    msg_type: str
+    codec: str
+    role: Role
+
+
+@dataclass(frozen=True)
+class Program:
+    """One original node, as the graph shows it."""
+
+    node_id: str
+    name: str
+    pid: int | None
+    generation: str
+    language: str | None
+    links: tuple[Link, ...]
+
+
+class Census:
+    """Follows the registrations of a port map. Belongs to the gateway's thread."""
+
+    def __init__(self, known: PortMap, processes: Processes, pair_of: Callable[[Line], Pair | None]) -> None:
+        self._known = known
+        self._processes = processes
+        self._pair_of = pair_of
+        self._roles: dict[Registration, frozenset[Role]] = {}
+        self._was_joined: set[Registration] = set()
+
+    def look(self, lines: Iterable[Line] | None = None) -> None:
+        """Find out who is joined to these lines (all, when none are named)."""
+        chosen = None if lines is None else set(lines)
+        for registration in self._known.registrations:
+            if chosen is None or registration.line in chosen:
+                roles = frozenset(self._roles_of(registration))
+                self._roles[registration] = roles
+                if roles:
+                    self._was_joined.add(registration)
+
+    def forget_the_gone(self) -> bool:
+        """Take out who is no more: its process ended, or it was joined and closed its connections."""
+        gone = {registration for registration in self._known.registrations if self._is_gone(registration)}
+        if gone:
+            self._known.remove(gone)
+            self._was_joined -= gone
+            for registration in gone:
+                self._roles.pop(registration, None)
+        return bool(gone)
+
+    def programs(self) -> tuple[Program, ...]:
+        """The original nodes that are there, each with what it does."""
+        grouped: dict[str, list[Registration]] = {}
+        for registration in self._known.registrations:
+            grouped.setdefault(registration.node_id, []).append(registration)
+        return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
+
+    def languages(self) -> dict[Line, frozenset[str]]:
+        """In which languages the programs on each line are written, as far as it is known."""
+        told: dict[Line, frozenset[str]] = {}
+        for registration in self._known.registrations:
+            if registration.language is not None:
+                known = told.get(registration.line, frozenset())
+                told[registration.line] = known | {registration.language}
+        return told
+
+    def members(self) -> list[Member]:
+        """What the originals' own broadcast tells: who asked for what."""
+        told: list[Member] = []
+        for registration in self._known.registrations:
+            line = registration.line
+            port = self._known.port_of(line)
+            if port is not None:
+                mode = None if line.is_service else line.mode
+                told.append(
+                    Member(
+                        line.topic,
+                        registration.node,
+                        port,
+                        registration.socket,
+                        mode,
+                        registration.msg_type,
+                        registration.pid,
+                    )
+                )
+        return told
+
+    def is_used(self, line: Line) -> bool:
+        """Whether a program that is there asked for this line, or is still joined to it."""
+        pair = self._pair_of(line)
+        if pair is not None and any(pair.connections.values()):
+            return True
+        return any(registration.line == line for registration in self._known.registrations)
+
+    def _program(self, node_id: str, asked: list[Registration]) -> Program:
+        links = {
+            Link(registration.line.topic, registration.msg_type, registration.line.codec, role): None
+            for registration in asked
+            for role in sorted(self._roles.get(registration, ()))
+        }
+        first = asked[0]
+        return Program(node_id, first.node, first.pid, first.generation, first.language, tuple(links))
+
+    def _roles_of(self, registration: Registration) -> Iterable[Role]:
+        pair = self._pair_of(registration.line)
+        if pair is None:
+            return
+        for end in pair.ends:
+            if pair.connections[end.role] and self._is_joined(registration, end):
+                yield end.role
+
+    def _is_joined(self, registration: Registration, end: End) -> bool:
+        """By the system's list of connections; where that cannot be had, by what the program said."""
+        if registration.pid is not None and registration.started is not None:
+            known = self._processes.is_joined(registration.pid, end.port, binds=end.bound_by_program)
+            if known is not None:
+                return known
+        return registration.socket == end.role
+
+    def _is_gone(self, registration: Registration) -> bool:
+        if registration.pid is not None and registration.started is not None:
+            started = self._processes.started(registration.pid)
+            if started is None or abs(started - registration.started) > _SAME_PROCESS_S:
+                return True
+        return registration in self._was_joined and not self._roles.get(registration)

@@ -1,0 +1,113 @@
+"""The ports that the originals know by heart: two where they ask for topics, one that tells all topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import zmq
+
+from nep.gateway.framing import PORT_A, PORT_B
+from nep.gateway.relay import Alerts
+from nep.gateway.requests import (
+    LOOPBACK,
+    Member,
+    Request,
+    RequestError,
+    broadcast,
+    grant,
+    read_request,
+    refuse,
+)
+
+
+@dataclass(frozen=True)
+class Ports:
+    """The originals' fixed ports. 0 leaves one out."""
+
+    requests_a: int = PORT_A
+    requests_b: int = PORT_B
+    broadcast: int = 7777
+
+
+class Desk:
+    """Answers every request, also a bad one. A port that is taken is an alert, and is tried again.
+
+    `decide` gives a request its port, or raises `RequestError`. Belongs to the gateway's thread.
+    """
+
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        ports: Ports,
+        alerts: Alerts,
+        decide: Callable[[Request], int],
+    ) -> None:
+        self._context = context
+        self._ports = ports
+        self._alerts = alerts
+        self._decide = decide
+        self._counters: dict[int, zmq.Socket[bytes]] = {}
+        self._board: zmq.Socket[bytes] | None = None
+
+    def open(self) -> bool:
+        """Bind what is not bound yet; whether anything was."""
+        before = len(self._counters)
+        for port, who in (
+            (self._ports.requests_a, "nep up to 0.5.4.5, nep-js and C#"),
+            (self._ports.requests_b, "nep 0.5.4.8"),
+        ):
+            if port and port not in self._counters:
+                bound = self._bind(zmq.REP, port, f"programs of {who} cannot join")
+                if bound is not None:
+                    self._counters[port] = bound
+        if self._ports.broadcast and self._board is None:
+            self._board = self._bind(
+                zmq.PUB, self._ports.broadcast, "tools of the original NEP show no topics"
+            )
+        return len(self._counters) != before
+
+    def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], int]]:
+        """The sockets where requests come in, each with its port."""
+        for port, counter in self._counters.items():
+            yield counter, port
+
+    def answer(self, counter: zmq.Socket[bytes], port: int) -> None:
+        """Answer the request that is waiting. Nothing that is asked can end this."""
+        try:
+            asked = b"".join(counter.recv_multipart(zmq.NOBLOCK))
+        except zmq.Again:
+            return
+        try:
+            request = read_request(asked, port)
+            reply = grant(request, self._decide(request))
+        except RequestError as error:
+            reply = refuse(error)
+        counter.send(reply)
+
+    def tell(self, members: Iterable[Member]) -> None:
+        """Broadcast all topics to the originals' tools."""
+        if self._board is not None:
+            self._board.send(broadcast(members))
+
+    def close(self) -> None:
+        """Give the ports back."""
+        for socket in (*self._counters.values(), *([self._board] if self._board is not None else [])):
+            socket.close(0)
+        self._counters.clear()
+        self._board = None
+
+    def _bind(self, kind: int, port: int, consequence: str) -> zmq.Socket[bytes] | None:
+        socket = self._context.socket(kind)
+        try:
+            socket.bind(f"tcp://{LOOPBACK}:{port}")
+        except zmq.ZMQError:
+            socket.close(0)
+            self._alerts.tell(
+                f"port:{port}",
+                f"port {port} is taken by another program; {consequence}",
+                "close that program: another master, or on macOS the AirPlay Receiver",
+            )
+            return None
+        self._alerts.cure(f"port:{port}")
+        return socket

@@ -1,0 +1,212 @@
+"""The gateway's thread: it answers the originals, lets the relay work, and tells the graph who is there."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import Protocol
+
+import zmq
+
+from nep.gateway.census import Census, Program
+from nep.gateway.desk import Desk, Ports
+from nep.gateway.inbox import Inbox
+from nep.gateway.pair import Pair, is_free, port_to_tell
+from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.processes import Processes
+from nep.gateway.relay import Alerts, NativeSide, Relay
+from nep.gateway.requests import Request, RequestError
+
+_LOOK_S = 1.0
+"""How often programs that ended are looked for, and taken ports are tried again."""
+_MAX_SOCKETS = 8192
+
+
+class Outside(NativeSide, Alerts, Protocol):
+    """All that the gateway needs of the native network; it is called in the gateway's thread."""
+
+    def start(self, inbox: Inbox) -> None:
+        """Join the native network; what native programs publish is posted to `inbox`."""
+
+    def show(self, programs: tuple[Program, ...]) -> None:
+        """These are the original programs now."""
+
+    def close(self) -> None:
+        """Leave the native network."""
+
+
+class Gateway:
+    """Programs of the original NEP, joined to `outside`. One thread; binds on the loopback address only.
+
+    `file` keeps who has which ports, so that a gateway that comes back finds everybody again; `boot` is when
+    this computer was started.
+    """
+
+    def __init__(
+        self,
+        outside: Outside,
+        processes: Processes,
+        file: Path | None = None,
+        *,
+        ports: Ports | None = None,
+        boot: float = 0.0,
+    ) -> None:
+        self._outside = outside
+        self._processes = processes
+        self._known = PortMap(file, boot)
+        self._inbox = Inbox()
+        self._ready = threading.Event()
+        self._ending = threading.Event()
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context.set(zmq.MAX_SOCKETS, _MAX_SOCKETS)
+        self._relay = Relay(self._context, outside, outside)
+        self._desk = Desk(self._context, ports or Ports(), outside, self._decide)
+        self._census = Census(self._known, processes, self._relay.pair)
+        self._poller: zmq.Poller | None = None
+        self._counters: dict[zmq.Socket[bytes], int] = {}
+        self._pairs: dict[zmq.Socket[bytes], Pair] = {}
+        self._look_at = 0.0
+        self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
+
+    def start(self, timeout_s: float = 5.0) -> bool:
+        """Start the thread; whether originals are answered within `timeout_s`."""
+        self._thread.start()
+        return self._ready.wait(timeout_s)
+
+    def close(self, timeout_s: float = 5.0) -> None:
+        """End the thread and give all ports back."""
+        self._ending.set()
+        self._inbox.wake()
+        if self._thread.ident is not None:
+            self._thread.join(timeout_s)
+        if not self._thread.is_alive():
+            self._inbox.close()
+
+    def _run(self) -> None:
+        try:
+            self._outside.start(self._inbox)
+            self._restore()
+            self._desk.open()
+            self._show()
+            self._ready.set()
+            while not self._ending.is_set():
+                self._step()
+        finally:
+            self._relay.close()
+            self._desk.close()
+            self._outside.close()
+            self._context.term()
+
+    def _step(self) -> None:
+        if self._poller is None:
+            self._poller = self._watch()
+        wait_s = max(0.0, self._look_at - time.monotonic())
+        ready = [socket for socket, _ in self._poller.poll(int(wait_s * 1000) + 1)]
+        changed: set[Line] = set()
+        for pair in {id(pair): pair for pair in map(self._pairs.get, ready) if pair is not None}.values():
+            if self._relay.serve(pair):
+                changed.add(pair.line)
+        for socket in ready:
+            if socket in self._counters:
+                self._desk.answer(socket, self._counters[socket])
+        for arrived in self._inbox.take():
+            self._relay.deliver(arrived.topic, arrived.codec, arrived.data)
+        if changed:
+            self._census.look(changed)
+            self._show()
+        if time.monotonic() >= self._look_at:
+            self._look()
+
+    def _watch(self) -> zmq.Poller:
+        poller = zmq.Poller()
+        self._counters = dict(self._desk.sockets())
+        self._pairs = dict(self._relay.sockets())
+        for socket in (*self._counters, *self._pairs):
+            poller.register(socket, zmq.POLLIN)
+        poller.register(self._inbox.fileno(), zmq.POLLIN)
+        return poller
+
+    def _look(self) -> None:
+        """Once a second: who has ended, which lines nobody uses, which taken ports are free now."""
+        self._look_at = time.monotonic() + _LOOK_S
+        self._census.look()
+        if self._census.forget_the_gone():
+            for line in [pair.line for pair in self._relay.pairs if not self._census.is_used(pair.line)]:
+                self._relay.close_line(line)
+            self._poller = None
+            self._save()
+            self._show()
+        if self._desk.open():
+            self._poller = None
+
+    def _show(self) -> None:
+        self._relay.know_languages(self._census.languages())
+        self._outside.show(self._census.programs())
+        self._desk.tell(self._census.members())
+
+    def _restore(self) -> None:
+        """Bind again what programs that are still there were told: they never ask a second time."""
+        self._census.forget_the_gone()
+        for line in {known.line for known in self._known.registrations if not known.line.is_service}:
+            base = self._known.port_of(line)
+            if base is not None and not self._open(line, base):
+                self._outside.tell(
+                    f"port:{base}",
+                    f"port {base} or {base + 1} of '{line.topic}' is taken by another program",
+                    "close that program, then restart the programs of the original NEP on this topic",
+                )
+
+    def _decide(self, request: Request) -> int:
+        """The port for a request, which is noted and kept. Raises `RequestError`."""
+        codec = "service" if request.is_service else request.codec
+        line = Line(request.topic, request.framing, codec, request.mode)
+        if line.is_service:
+            line = Line(request.topic, "bare", codec, "many2many")
+        base = self._port_for(line)
+        self._known.add(self._registration(request, line))
+        self._save()
+        self._census.look([line])
+        self._show()
+        return port_to_tell(line, base, request.socket)
+
+    def _port_for(self, line: Line) -> int:
+        known = self._known.port_of(line)
+        if known is not None and (line.is_service or self._relay.pair(line) or self._open(line, known)):
+            return known
+        for base in self._known.candidates(self._census.is_used):
+            if self._open(line, base):
+                self._known.give(line, base)
+                return base
+        raise RequestError("no ports are left between 9000 and 9999", line.topic)
+
+    def _open(self, line: Line, base: int) -> bool:
+        """Open a line's sockets on `base`; whether that port and the next were to be had."""
+        if line.is_service:
+            return is_free(base)
+        try:
+            self._relay.open(line, base)
+        except zmq.ZMQError:
+            return False
+        self._poller = None
+        return True
+
+    def _registration(self, request: Request, line: Line) -> Registration:
+        pid = request.pid
+        started = self._processes.started(pid) if pid is not None else None
+        language = request.language or (self._processes.language(pid) if pid is not None else None)
+        return Registration(
+            line, request.node, request.socket, request.msg_type, request.generation, language, pid, started
+        )
+
+    def _save(self) -> None:
+        try:
+            self._known.save()
+        except OSError as error:
+            self._outside.tell(
+                "gateway:file",
+                f"the list of the originals' ports cannot be kept ({error.strerror})",
+                "programs of the original NEP must be restarted when the master was",
+            )
+        else:
+            self._outside.cure("gateway:file")

@@ -1,0 +1,166 @@
+"""What enters on one line leaves on the others: re-framed once, to native once, never back again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Protocol
+
+import zmq
+
+from nep.gateway.framing import FrameError
+from nep.gateway.pair import Pair
+from nep.gateway.portmap import Line
+
+_BATCH = 200
+"""Frames taken from one line before the others have their turn."""
+
+
+class NativeSide(Protocol):
+    """The native network, as the relay uses it. A topic is carried by one codec at a time."""
+
+    def publish(self, topic: str, codec: str, data: bytes) -> None:
+        """Give a datum to the native subscribers; the first one makes the publisher."""
+
+    def stop_publishing(self, topic: str, codec: str) -> None:
+        """No original publishes this topic any more."""
+
+    def subscribe(self, topic: str, codec: str) -> None:
+        """An original wants this topic: what native programs publish comes to `Relay.deliver` from now on."""
+
+    def unsubscribe(self, topic: str, codec: str) -> None:
+        """No original wants this topic any more."""
+
+
+class Alerts(Protocol):
+    """Where present problems are told."""
+
+    def tell(self, id: str, sentence: str, hint: str = "") -> None:
+        """A problem is there; telling it again changes nothing."""
+
+    def cure(self, id: str) -> None:
+        """It is there no more."""
+
+
+Key = tuple[str, str]
+"""A topic and its codec: what is translated into one another."""
+
+
+class Relay:
+    """All lines that are open now. Belongs to the gateway's thread."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], native: NativeSide, alerts: Alerts) -> None:
+        self._context = context
+        self._native = native
+        self._alerts = alerts
+        self._pairs: dict[Line, Pair] = {}
+        self._subscribed: set[Key] = set()
+        self._publishing: set[Key] = set()
+
+    @property
+    def pairs(self) -> Iterable[Pair]:
+        """The open pairs."""
+        return self._pairs.values()
+
+    def pair(self, line: Line) -> Pair | None:
+        """The pair of `line`, if it is open."""
+        return self._pairs.get(line)
+
+    def open(self, line: Line, base: int) -> Pair:
+        """Open the sockets of `line`. Raises `zmq.ZMQError` when a port is taken."""
+        pair = self._pairs[line] = Pair(self._context, line, base)
+        return pair
+
+    def close_line(self, line: Line) -> None:
+        """Close the sockets of `line`, and what the native side keeps for it."""
+        pair = self._pairs.pop(line, None)
+        if pair is not None:
+            pair.close()
+            self.settle((line.topic, line.codec))
+
+    def close(self) -> None:
+        """Close everything."""
+        for line in list(self._pairs):
+            self.close_line(line)
+
+    def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], Pair]]:
+        """All sockets that are to be watched, each with its pair."""
+        for pair in self._pairs.values():
+            for socket in (pair.incoming, pair.outgoing, *pair.monitors.values()):
+                yield socket, pair
+
+    def serve(self, pair: Pair) -> bool:
+        """Do what is waiting on a pair; whether somebody came, left, subscribed or unsubscribed."""
+        changed = pair.read_connections()
+        changed |= pair.read_filters()
+        if changed:
+            self.settle((pair.line.topic, pair.line.codec))
+        for frame in pair.frames(_BATCH):
+            self._enter(pair, frame)
+        return changed
+
+    def know_languages(self, languages: Mapping[Line, frozenset[str]]) -> None:
+        """Who is on each line: some languages need their frames written with care."""
+        for line, pair in self._pairs.items():
+            pair.languages = languages.get(line, frozenset())
+
+    def deliver(self, topic: str, codec: str, data: bytes | memoryview) -> None:
+        """A native program has published: to every original that wants it, in its own form."""
+        for pair in self._of((topic, codec)):
+            pair.deliver(data)
+
+    def settle(self, key: Key) -> None:
+        """Hold native publishers and subscriptions exactly while originals need them."""
+        pairs = self._of(key)
+        wanted = any(pair.wanted for pair in pairs)
+        if wanted and key not in self._subscribed:
+            self._subscribed.add(key)
+            self._native.subscribe(*key)
+        elif not wanted and key in self._subscribed:
+            self._subscribed.discard(key)
+            self._native.unsubscribe(*key)
+        if key in self._publishing and not any(pair.connections["publisher"] for pair in pairs):
+            self._publishing.discard(key)
+            self._native.stop_publishing(*key)
+        for pair in pairs:
+            self._judge(pair)
+
+    def _of(self, key: Key) -> list[Pair]:
+        return [pair for pair in self._pairs.values() if (pair.line.topic, pair.line.codec) == key]
+
+    def _enter(self, pair: Pair, frame: bytes) -> None:
+        key = (pair.line.topic, pair.line.codec)
+        try:
+            data = pair.shape.read(frame)
+        except FrameError as error:
+            self._refuse(pair, error)
+            return
+        self._alerts.cure(f"message:{pair.line.topic}")
+        for other in self._of(key):
+            if other is pair:
+                other.pass_on(frame, data)
+            else:
+                other.deliver(data)
+        self._publishing.add(key)
+        self._native.publish(*key, data)
+
+    def _refuse(self, pair: Pair, error: FrameError) -> None:
+        if error.version is None:
+            self._alerts.tell(f"message:{pair.line.topic}", str(error))
+        else:
+            self._tell_version(f"version:{pair.line.topic}:publisher", pair, error.version)
+
+    def _judge(self, pair: Pair) -> None:
+        told = f"version:{pair.line.topic}:subscriber"
+        if pair.has_0546:
+            self._tell_version(told, pair, "0.5.4.6")
+        elif pair.line.framing == "bare":
+            self._alerts.cure(told)
+            if not pair.connections["publisher"]:
+                self._alerts.cure(f"version:{pair.line.topic}:publisher")
+
+    def _tell_version(self, id: str, pair: Pair, version: str) -> None:
+        self._alerts.tell(
+            id,
+            f"a program on '{pair.line.topic}' uses nep {version}, which no other version understands",
+            "install nep 0.5.4.8 or 0.5.4.5 for that program",
+        )

@@ -1,0 +1,236 @@
+"""The published packages of the original NEP as test peers, and the fixed ports for one run at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+CACHE = Path(__file__).resolve().parents[2] / ".cache" / "peers"
+SCRIPTS = Path(__file__).parent / "peers"
+FIXED_PORTS = (7000, 50000)
+PYTHON_PEERS = {
+    "0.5.3.5": ("nep==0.5.3.5", "pyzmq", "simplejson", "numpy", "tornado"),
+    "0.5.4.8": ("nep==0.5.4.8", "pyzmq", "simplejson", "numpy", "msgpack"),
+}
+JAVASCRIPT_PEER = "nep-js@0.1.1"
+MARK = "\x1e"
+LONG_S = 20.0
+
+
+class Program:
+    """A process that takes lines of JSON and says lines of JSON, in between whatever it likes to print."""
+
+    def __init__(self, command: Sequence[str], **environment: str) -> None:
+        self._said: list[object] = []
+        self._printed: list[str] = []
+        self._news = threading.Condition()
+        self.process = subprocess.Popen(
+            list(command),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8", **environment},
+            encoding="utf-8",
+            errors="replace",
+        )
+        self._reader = threading.Thread(target=self._read, name="test-peer-reader", daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        for line in self.process.stdout:
+            _, mark, said = line.partition(MARK)
+            with self._news:
+                if mark:
+                    self._said.append(json.loads(said))
+                else:
+                    self._printed.append(line)
+                self._news.notify_all()
+
+    def tell(self, value: object) -> None:
+        """Hand one value to the program."""
+        self.process.stdin.write(json.dumps(value) + "\n")
+        self.process.stdin.flush()
+
+    @property
+    def got(self) -> list[object]:
+        """Everything that it received so far."""
+        with self._news:
+            return [said["got"] for said in self._said if isinstance(said, dict)]
+
+    @property
+    def printed(self) -> str:
+        """What else it printed."""
+        with self._news:
+            return "".join(self._printed)
+
+    def wait(self, done: Callable[[], bool], what: str, timeout_s: float = LONG_S) -> None:
+        """Wait until something is true of what it said."""
+        with self._news:
+            if not self._news.wait_for(done, timeout_s):
+                raise AssertionError(
+                    f"{what} did not happen\nsaid: {self._said[-3:]}\n{''.join(self._printed)[-1500:]}"
+                )
+
+    def wait_ready(self) -> Program:
+        """Wait until it has its sockets."""
+        self.wait(lambda: "ready" in self._said, f"{self.process.args} being ready")
+        return self
+
+    def kill(self) -> None:
+        """End it as `kill -9` does, and give everything back."""
+        self.process.kill()
+        self.process.wait(LONG_S)
+        self._reader.join(LONG_S)
+        for pipe in (self.process.stdin, self.process.stdout):
+            with contextlib.suppress(OSError):
+                pipe.close()
+
+
+class Peers:
+    """Starts programs of the original NEP. A peer that cannot be had skips the test that asks for it."""
+
+    def __init__(self) -> None:
+        self._running: list[Program] = []
+        self._missing: dict[str, str] = {}
+
+    def start(
+        self,
+        version: str,
+        role: str,
+        topic: str,
+        msg_type: str = "json",
+        *,
+        mode: str = "many2many",
+        name: str = "",
+    ) -> Program:
+        """A program of `version` ("0.5.3.5", "0.5.4.8" or "nep-js") with its own node."""
+        arguments = [role, topic, msg_type, mode, name or f"{role}_{version.replace('.', '')}"]
+        if version == "nep-js":
+            folder = self._have(version, _install_javascript)
+            script = folder / "peer.js"
+            shutil.copyfile(SCRIPTS / "javascript_peer.js", script)
+            return self.run(["node", str(script), *arguments])
+        folder = self._have(version, _install_python)
+        return self.run([str(_python_of(folder)), str(SCRIPTS / "python_peer.py"), *arguments])
+
+    def run(self, command: Sequence[str], **environment: str) -> Program:
+        """Any program that speaks the same lines."""
+        program = Program(command, **environment)
+        self._running.append(program)
+        return program
+
+    def _have(self, version: str, install: Callable[[str, Path], str]) -> Path:
+        folder = CACHE / version
+        if version not in self._missing:
+            self._missing[version] = "" if (folder / "complete").is_file() else install(version, folder)
+        if self._missing[version]:
+            pytest.skip(self._missing[version])
+        return folder
+
+    def close(self) -> None:
+        """End all of them."""
+        for program in self._running:
+            program.kill()
+        self._running.clear()
+
+
+def _python_of(folder: Path) -> Path:
+    return folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+
+
+def _install_python(version: str, folder: Path) -> str:
+    shutil.rmtree(folder, ignore_errors=True)
+    commands = (
+        [sys.executable, "-m", "venv", str(folder)],
+        [str(_python_of(folder)), "-m", "pip", "install", "--quiet", *PYTHON_PEERS[version]],
+        [str(_python_of(folder)), "-c", "import nep; nep.node"],
+    )
+    return _run_all(commands, f"the test peer nep {version}", folder)
+
+
+def _install_javascript(version: str, folder: Path) -> str:
+    if shutil.which("node") is None or shutil.which("npm") is None:
+        return "the test peer nep-js needs node and npm, which this computer does not have"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    npm = shutil.which("npm") or "npm"
+    commands = (
+        [npm, "install", "--silent", "--no-audit", "--no-fund", "--prefix", str(folder), JAVASCRIPT_PEER],
+        ["node", "-e", f"require({json.dumps(str(folder / 'node_modules' / 'nep-js'))})"],
+    )
+    return _run_all(commands, "the test peer nep-js", folder)
+
+
+def _run_all(commands: Sequence[Sequence[str]], what: str, folder: Path) -> str:
+    """Run the commands that install a peer; the reason why it is not there, or nothing."""
+    for command in commands:
+        try:
+            subprocess.run(command, check=True, capture_output=True, text=True, timeout=240)
+        except subprocess.CalledProcessError as error:
+            lines = (error.stderr or error.stdout).strip().splitlines() or ["no reason given"]
+            return f"{what} could not be installed: {lines[-1]}"
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return f"{what} could not be installed: {error}"
+    (folder / "complete").touch()
+    return ""
+
+
+@contextlib.contextmanager
+def _one_run_at_a_time() -> Iterator[None]:
+    """Hold a lock file, so that two runs on one computer do not meet on the fixed ports."""
+    with (Path(tempfile.gettempdir()) / "nep-interop.lock").open("a+b") as stream:
+        deadline = time.monotonic() + 900
+        while not _try_lock(stream.fileno()):
+            if time.monotonic() > deadline:
+                pytest.fail("another run of the interop tests holds the fixed ports for 15 minutes")
+            threading.Event().wait(0.2)
+        yield
+
+
+def _try_lock(handle: int) -> bool:
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+@pytest.fixture(scope="session")
+def fixed_ports() -> Iterator[None]:
+    """The originals' ports, free and ours while the tests run."""
+    with _one_run_at_a_time():
+        for port in FIXED_PORTS:
+            with socket.socket() as probe:
+                probe.settimeout(0.5)
+                if probe.connect_ex(("127.0.0.1", port)) == 0:
+                    pytest.fail(
+                        f"port {port} is taken by another program; close it and run the interop tests again"
+                    )
+        yield
+
+
+@pytest.fixture
+def peers(fixed_ports: None) -> Iterator[Peers]:
+    """Programs of the original NEP, ended after the test."""
+    peers = Peers()
+    yield peers
+    peers.close()

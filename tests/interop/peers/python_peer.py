@@ -1,0 +1,44 @@
+"""A program of the original NEP (any Python version of it), driven by a test over its pipes.
+
+`publisher TOPIC TYPE MODE`: publishes each line of JSON that comes in. `subscriber TOPIC TYPE MODE`: writes each
+message that arrives as a line of JSON. `client TOPIC`, `server TOPIC`: one request per line; a server answers it.
+"""
+
+import json
+import sys
+
+import nep
+
+role, topic, msg_type, mode, name = sys.argv[1:6]
+
+
+def say(value):
+    sys.stdout.write("\x1e" + json.dumps(value) + "\n")
+    sys.stdout.flush()
+
+
+node = nep.node(name)
+if role == "publisher":
+    pub = node.new_pub(topic, msg_type, node.hybrid(mode=mode))
+    say("ready")
+    for line in sys.stdin:
+        pub.publish(json.loads(line))
+elif role == "subscriber":
+    sub = node.new_sub(topic, msg_type, node.hybrid(mode=mode))
+    say("ready")
+    while True:
+        ok, message = sub.listen(True)
+        if ok:
+            say({"got": message})
+elif role == "client":
+    client = node.new_client(topic)
+    say("ready")
+    for line in sys.stdin:
+        client.send_info(json.loads(line))
+        say({"got": client.listen_info()})
+elif role == "server":
+    server = node.new_server(topic)
+    say("ready")
+    while True:
+        asked = server.listen_info()
+        server.send_info({"echo": asked})
