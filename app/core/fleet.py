@@ -9,7 +9,6 @@ import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 
-from nep.graph import GraphView
 from nep.nodes import Node
 
 from app.core.heartbeat import Heartbeat
@@ -20,6 +19,7 @@ from app.errors import DescriptionError, RobotInputError, RobotUnknownError
 from app.robots import rize
 from app.robots.description import Robot, parse
 from nep.errors import NepError
+from nep.views import GraphView
 
 DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"

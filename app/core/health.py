@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from nep.graph import GraphView
-
 from app.core.alerts import Alerts
 from app.core.fleet import Fleet, RobotLink
 from app.core.mailbox import Batch
 from app.core.topics import Topics
 from nep.errors import NepError
 from nep.message import Message
+from nep.views import GraphView
 
 SILENT_S = 3.0
 DECODED_A_TICK = 200

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from nep.graph import GraphView
 from nep.masters import master_address
 from nep.nodes import Node
 
@@ -40,6 +39,7 @@ from app.core.source import (
 from app.core.stopping import RobotStopper
 from app.core.topics import Topics, total_rate_hz
 from app.core.watches import Watch, Watches
+from nep.views import GraphView
 
 LOSS_WINDOW_S = 30.0
 CHECK_S = 1.0

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from nep.graph import GraphView
 from nep.masters import is_running
 from nep.nodes import Node
 from nep.pubsub import Subscriber
@@ -17,6 +16,7 @@ from nep.pubsub import Subscriber
 import nep
 from nep.errors import NepError
 from nep.message import Message
+from nep.views import GraphView
 
 POLL_S = 0.4
 NODE_NAME = "studio"

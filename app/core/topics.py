@@ -6,11 +6,10 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from nep.graph import GraphView, TopicInfo
-
 from app.core.mailbox import Batch
 from nep.errors import NepError
 from nep.message import Message
+from nep.views import GraphView, TopicInfo
 
 GONE_SHOWN_S = 10.0
 RATES_KEPT = 60

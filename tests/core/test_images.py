@@ -1,0 +1,116 @@
+"""Picture streams: only the newest is decoded, and only while somebody looks."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+
+from app.core.images import Images, Rate, decode
+from nep.message import Message
+
+
+def jpeg(colour: tuple[int, int, int], topic: str = "/camera", seq: int = 1) -> Message:
+    frame = np.full((24, 32, 3), colour, np.uint8)
+    data = cv2.imencode(".png", frame)[1].tobytes()
+    return Message(
+        topic, data, "image", "image", seq=seq, extension={"shape": [24, 32, 3], "encoding": "png"}
+    )
+
+
+def until(true: Callable[[], bool], seconds: float = 5) -> None:
+    ended = threading.Event()
+    for _ in range(int(seconds * 100)):
+        if true():
+            return
+        ended.wait(0.01)
+    raise AssertionError("waited in vain")
+
+
+@pytest.fixture
+def watched() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def images(watched: list[str]):
+    def watch(topic: str) -> Callable[[], None]:
+        watched.append(topic)
+        return lambda: watched.remove(topic)
+
+    images = Images(watch)
+    yield images
+    images.close()
+
+
+def test_a_picture_is_decoded_for_its_stream(images: Images) -> None:
+    stream = images.stream("/camera")
+    images.offer([jpeg((10, 20, 30), seq=7)])
+    until(lambda: stream.picture is not None)
+    assert stream.picture is not None
+    assert stream.picture.bgra[0, 0].tolist() == [10, 20, 30, 255]
+    assert (stream.picture.width, stream.picture.height, stream.picture.seq) == (32, 24, 7)
+
+
+def test_of_a_batch_only_the_newest_is_decoded(images: Images) -> None:
+    stream = images.stream("/camera")
+    images.offer([jpeg((n, n, n), seq=n) for n in range(1, 50)])
+    until(lambda: stream.picture is not None and stream.picture.seq == 49)
+    assert stream.arriving_hz is not None
+
+
+def test_other_topics_and_closed_streams_get_nothing(images: Images, watched: list[str]) -> None:
+    stream = images.stream("/camera")
+    assert watched == ["/camera"]
+    images.offer([jpeg((1, 2, 3), "/other")])
+    stream.close()
+    images.offer([jpeg((1, 2, 3))])
+    assert stream.picture is None
+    assert watched == []
+
+
+def test_what_is_no_picture_gives_a_sentence_and_keeps_the_last_picture(images: Images) -> None:
+    stream = images.stream("/camera")
+    images.offer([jpeg((1, 2, 3))])
+    until(lambda: stream.picture is not None)
+    images.offer([Message("/camera", b"no picture", "image", "image")])
+    until(lambda: stream.error is not None)
+    assert stream.picture is not None
+    images.offer([jpeg((4, 5, 6))])
+    until(lambda: stream.error is None)
+
+
+def test_two_panels_may_look_at_one_topic(images: Images) -> None:
+    one, two = images.stream("/camera"), images.stream("/camera")
+    images.offer([jpeg((1, 2, 3))])
+    until(lambda: one.picture is not None and two.picture is not None)
+    one.close()
+    images.offer([jpeg((9, 9, 9), seq=2)])
+    until(lambda: two.picture is not None and two.picture.seq == 2)
+    assert one.picture is not None
+    assert one.picture.seq == 1
+
+
+def test_grey_and_alpha_pictures_can_be_shown() -> None:
+    for channels, encoding in ((1, "mono8"), (3, "bgr8"), (3, "rgb8")):
+        shape = [4, 6, 3] if channels == 3 else [4, 6]
+        data = bytes(range(4 * 6 * channels))
+        picture, error = decode(
+            Message("/c", data, "image", "image", extension={"shape": shape, "encoding": encoding}), 0.0
+        )
+        assert error is None
+        assert picture is not None
+        assert picture.bgra.shape == (4, 6, 4)
+
+
+def test_a_rate_needs_two_events_and_forgets() -> None:
+    rate = Rate()
+    rate.add(0.0)
+    assert rate.per_second(0.0) is None
+    for number in range(1, 61):
+        rate.add(number / 30)
+    assert rate.per_second(2.0) == pytest.approx(30, rel=0.05)
+    assert rate.per_second(10.0) is None

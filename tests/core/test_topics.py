@@ -1,0 +1,112 @@
+"""The topics as the window shows them: new, live, vanished; newest messages only while watched."""
+
+from __future__ import annotations
+
+from app.core.mailbox import Batch
+from app.core.topics import GONE_SHOWN_S, Topics, total_rate_hz
+from nep.message import Message
+from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+
+NODE = NodeInfo("n1", "camera_driver", "here", 5, "python", "native", 0)
+
+
+def publisher(rate: float | None = 10.0) -> PublisherInfo:
+    return PublisherInfo(1, "n1", (), False, 5, 50, 5, 1_000_000_000, rate, 100.0)
+
+
+def info(name: str, *, publishers: int = 1, **values: object) -> TopicInfo:
+    given = {"rate_hz": 10.0, "bandwidth_Bps": 100.0, "last_stamp_ns": 1_000_000_000, **values}
+    return TopicInfo(name, "json", "json", tuple(publisher() for _ in range(publishers)), **given)  # type: ignore[arg-type]
+
+
+def view(*topics: TopicInfo) -> GraphView:
+    return GraphView(1, 1, {"n1": NODE}, {topic.name: topic for topic in topics})
+
+
+def message(number: int, data: bytes = b"{}", stamp_ns: int | None = None) -> Message:
+    return Message("/a", data, "json", "json", seq=number, stamp_ns=stamp_ns)
+
+
+def test_topics_of_the_first_graph_are_not_new_later_ones_are() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    topics.update(view(info("/a"), info("/b")), 1)
+    assert [topic.new for topic in topics] == [False, True]
+    topics.mark_seen("/b")
+    assert not topics["/b"].new
+
+
+def test_the_figures_are_the_publishers_and_names_are_sorted() -> None:
+    topics = Topics()
+    topics.update(view(info("/a", rate_hz=30.0, lost=3, loss_ratio=0.1)), 0)
+    topic = topics["/a"]
+    assert (topic.rate_hz, topic.bandwidth_Bps, topic.lost, topic.loss_ratio) == (30.0, 100.0, 3, 0.1)
+    assert topic.publisher_nodes == ("camera_driver",)
+    topics.age(0, 1_500_000_000)
+    assert topic.age_s == 0.5
+
+
+def test_a_vanished_topic_stays_ten_seconds_and_its_figures_are_unknown() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    topics.update(view(), 5)
+    topics.age(9, 0)
+    assert topics["/a"].gone_s == 4
+    assert (topics["/a"].rate_hz, topics["/a"].age_s, topics["/a"].publishers) == (None, None, 0)
+    assert topics.live() == []
+    topics.age(5 + GONE_SHOWN_S, 0)
+    assert len(topics) == 0
+
+
+def test_a_topic_that_comes_back_is_live_again() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    topics.update(view(), 1)
+    topics.update(view(info("/a")), 2)
+    assert topics["/a"].gone_s is None
+    assert topics["/a"].rate_hz == 10.0
+
+
+def test_the_revision_grows_only_when_the_rows_change() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    revision, values = topics.revision, topics.values_revision
+    topics.update(view(info("/a", rate_hz=11.0)), 1)
+    assert topics.revision == revision
+    assert topics.values_revision > values
+
+
+def test_newest_and_previous_message_and_all_that_arrived() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    topics.add("/a", Batch([message(1)]), 1)
+    topics.add("/a", Batch([message(2), message(3)], dropped=4), 2)
+    topic = topics["/a"]
+    assert topic.newest is not None
+    assert topic.previous is not None
+    assert (topic.newest.seq, topic.previous.seq, topic.received, topic.dropped) == (3, 2, 7, 4)
+    topics.unwatch("/a")
+    assert topic.newest is None
+
+
+def test_a_message_that_cant_be_decoded_gives_its_sentence_and_a_good_one_cures_it() -> None:
+    topics = Topics()
+    topics.add("/a", Batch([message(1, b"{bad")]), 0)
+    assert not topics.check(topics["/a"])
+    assert topics["/a"].decode_error
+    topics.add("/a", Batch([message(2)]), 0)
+    assert topics.check(topics["/a"])
+    assert topics["/a"].decode_error is None
+
+
+def test_age_without_stamps_counts_from_the_arrival() -> None:
+    topics = Topics()
+    topics.update(view(info("/a", last_stamp_ns=None)), 0)
+    topics.add("/a", Batch([message(1)]), 10)
+    topics.age(12, 999)
+    assert topics["/a"].age_s == 2
+
+
+def test_the_total_rate_is_unknown_when_nobody_tells_one() -> None:
+    assert total_rate_hz([info("/a", rate_hz=None)]) is None
+    assert total_rate_hz([info("/a"), info("/b", rate_hz=None)]) == 10.0
