@@ -1,0 +1,69 @@
+"""Messages: publishing on topics and reading what others publish."""
+
+from __future__ import annotations
+
+from app.blocks.block import Block
+from app.blocks.category import Category
+from app.blocks.fields import PathField, TextField, TopicField, ValueInput
+
+CATEGORY = Category(
+    name="messages",
+    title="Messages",
+    style="messages",
+    icon="radio",
+    order=60,
+    blocks=(
+        Block(
+            type="messages_publish",
+            text="publish %VALUE on %TOPIC",
+            shape="statement",
+            style="messages",
+            icon="megaphone",
+            tooltip="Sends a value to everybody who listens to this topic.",
+            python="publish(%TOPIC, %VALUE)",
+            arguments=(ValueInput("VALUE", None, "hello"), TopicField("TOPIC")),
+        ),
+        Block(
+            type="messages_publish_field",
+            text="publish %FIELD : %VALUE on %TOPIC",
+            shape="statement",
+            style="messages",
+            icon="megaphone",
+            tooltip="Sends a message with one named field, such as {“name”: “Ada”}.",
+            python="publish(%TOPIC, {%FIELD: %VALUE})",
+            arguments=(TextField("FIELD", "name"), ValueInput("VALUE", None, "Ada"), TopicField("TOPIC")),
+        ),
+        Block(
+            type="messages_newest",
+            text="newest %FIELD of %TOPIC",
+            shape="value",
+            style="messages",
+            icon="radio",
+            tooltip="The field of the newest message on this topic. Not known until the first message.",
+            python="newest(%TOPIC, %FIELD)",
+            arguments=(PathField("FIELD", "name"), TopicField("TOPIC", "/faces")),
+        ),
+        Block(
+            type="messages_message",
+            text="message",
+            shape="value",
+            style="messages",
+            icon="mail",
+            tooltip="What the message says that started this script.",
+            python="message",
+            fails=False,
+            needs_message=True,
+        ),
+        Block(
+            type="messages_field",
+            text="%FIELD of the message",
+            shape="value",
+            style="messages",
+            icon="mail",
+            tooltip="One field of the message that started this script.",
+            python="part(message, %FIELD)",
+            arguments=(PathField("FIELD", "name", topic=""),),
+            needs_message=True,
+        ),
+    ),
+)

@@ -1,0 +1,222 @@
+"""The blocks of robots, made from their descriptions: what they can do, what they tell, what happens to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from app.blocks.block import Block, RobotUse
+from app.blocks.category import Category, Entry, Group
+from app.blocks.fields import ChoiceField, LiveField, NumberField, robot_field
+from app.blocks.robot_text import TextParts, field_of, input_of, type_of
+from app.robots.description import Action, Event, Robot, Sensor
+
+_ICONS = {
+    "Speech": "message-circle",
+    "Movement": "footprints",
+    "Face and lights": "smile",
+    "Sensors": "eye",
+}
+_ORDER = tuple(_ICONS)
+_TITLES = {
+    "": "Movement",
+    "actions": "Movement",
+    "control": "Movement",
+    "motion": "Movement",
+    "looks": "Face and lights",
+}
+_TELLS = ("boolean", "number", "integer", "text", "choice")
+_NUMBERS = ("number", "integer")
+
+
+def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
+    """All blocks of a robot; `known` are all robots, so that its drop-down can name those of its model."""
+    alike = [other.name for other in known if other.model == robot.model] or [robot.name]
+    blocks = [_action(robot, action, alike) for action in robot.actions]
+    blocks += [_sensor(robot, sensor, alike) for sensor in robot.sensors if _has_block(sensor)]
+    blocks += [_event(robot, event, alike) for event in robot.events if event.text]
+    return (*blocks, *_change_hats(robot, alike))
+
+
+def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
+    """The categories under a robot's heading, its sensors and events last."""
+    titles = {action.name: _group_title(action) for action in robot.actions}
+    groups: dict[str, list[Entry]] = {title: [] for title in _ORDER}
+    for block in robot_blocks(robot, known):
+        use = block.robot
+        if use is None:
+            continue
+        title = titles.get(use.name, "Movement") if use.kind == "action" else "Sensors"
+        groups.setdefault(title, []).append(Entry(block, {"ROBOT": robot.name}))
+    sensors = groups.pop("Sensors")
+    return tuple(
+        Group(title, _ICONS.get(title, "bot"), "sensors" if title == "Sensors" else "robot", tuple(entries))
+        for title, entries in (*groups.items(), ("Sensors", sensors))
+        if entries
+    )
+
+
+def _group_title(action: Action) -> str:
+    return _TITLES.get(action.category.lower(), action.category)
+
+
+def _has_block(sensor: Sensor) -> bool:
+    return bool(sensor.text) and (sensor.kind in _TELLS or (sensor.kind == "object" and bool(sensor.fields)))
+
+
+def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
+    parts = TextParts(action.text, [parameter.name for parameter in action.parameters])
+    arguments = [robot_field(robot.model, alike)]
+    inputs = [
+        (parameter, input_of(parameter, parts.arguments[parameter.name]))
+        for parameter in action.parameters
+        if parameter.name in parts.shown
+    ]
+    returns = _returned(robot, action)
+    do = "robot(%ROBOT).do(%X_NAME, **%X_INPUT)"
+    ask = "robot(%ROBOT).ask(%X_NAME, %X_FIELD, **%X_INPUT)"
+    return Block(
+        type=type_of(robot.model, "do", action.name),
+        text=parts.text,
+        shape="statement" if returns is None else "value",
+        style="robot",
+        icon=action.icon or "bot",
+        tooltip=_tooltip(robot, action),
+        python=do if returns is None else ask,
+        arguments=(*arguments, *(argument for _, argument in inputs)),
+        constants={"X_NAME": action.name} | ({} if returns is None else {"X_FIELD": returns}),
+        keywords={
+            "X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)
+        },
+        robot=RobotUse("action", action.name, action.title, robot.model),
+    )
+
+
+def _tooltip(robot: Robot, action: Action) -> str:
+    document = _member(robot, "actions", action.name).get("description")
+    told = str(document) if isinstance(document, str) else f"{robot.title}: {action.title}."
+    return f"{told} The next block waits until it is done."
+
+
+def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
+    parts = TextParts(sensor.text, [])
+    robots = robot_field(robot.model, alike)
+    if sensor.kind == "object":
+        fields = tuple((field.title or field.name, field.name) for field in sensor.fields)
+        return Block(
+            type=type_of(robot.model, "get", sensor.name),
+            text=f"{parts.text} %FIELD",
+            shape="value",
+            style="sensors",
+            icon=sensor.icon or "eye",
+            tooltip=f"What the robot tells: {sensor.title}.",
+            python="robot(%ROBOT).get(%X_NAME, %FIELD)",
+            arguments=(robots, ChoiceField("FIELD", fields)),
+            constants={"X_NAME": sensor.name},
+            robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
+        )
+    boolean = sensor.kind == "boolean"
+    return Block(
+        type=type_of(robot.model, "get", sensor.name),
+        text=parts.text if boolean else f"{parts.text} %LIVE",
+        shape="boolean" if boolean else "value",
+        style="sensors",
+        icon=sensor.icon or "eye",
+        tooltip=f"What the robot tells: {sensor.title}.",
+        python="robot(%ROBOT).get(%X_NAME)",
+        arguments=(robots,) if boolean else (robots, LiveField("LIVE")),
+        check="Boolean" if boolean else "Number" if sensor.kind in _NUMBERS else "String",
+        constants={"X_NAME": sensor.name},
+        robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
+    )
+
+
+def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
+    parts = TextParts(event.text, list(event.filters))
+    fields = {field.name: field for field in event.fields}
+    filters = [
+        (name, field_of(fields.get(name), parts.arguments[name]))
+        for name in event.filters
+        if name in parts.shown
+    ]
+    return Block(
+        type=type_of(robot.model, "when", event.name),
+        text=parts.text,
+        shape="hat",
+        style="events",
+        icon=event.icon or "zap",
+        tooltip=f"The blocks below run each time the robot tells: {event.title}.",
+        python="robot(%ROBOT).on(%X_NAME, **%X_INPUT)",
+        arguments=(robot_field(robot.model, alike), *(argument for _, argument in filters)),
+        constants={"X_NAME": event.name},
+        keywords={"X_INPUT": tuple((argument.name, name) for name, argument in filters)},
+        robot=RobotUse("event", event.name, event.title, robot.model),
+    )
+
+
+def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
+    """ "when Pepper battery changes" and "when Pepper distance goes below 0.5"."""
+    told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _TELLS]
+    numbers = [sensor for sensor in told if sensor.kind in _NUMBERS]
+    hats = []
+    if told:
+        hats.append(
+            Block(
+                type=type_of(robot.model, "when", "changes", plain=True),
+                text="when %ROBOT %SENSOR changes",
+                shape="hat",
+                style="events",
+                icon="activity",
+                tooltip="The blocks below run each time this sensor tells another value.",
+                python="robot(%ROBOT).on_change(%SENSOR)",
+                arguments=(robot_field(robot.model, alike), _sensor_field(told)),
+                robot=RobotUse("sensor", "", "changes", robot.model),
+            )
+        )
+    if numbers:
+        hats.append(
+            Block(
+                type=type_of(robot.model, "when", "passes", plain=True),
+                text="when %ROBOT %SENSOR goes %SIDE %LIMIT",
+                shape="hat",
+                style="events",
+                icon="activity",
+                tooltip="The blocks below run each time this sensor passes the limit.",
+                python="robot(%ROBOT).on_pass(%SENSOR, %SIDE, %LIMIT)",
+                arguments=(
+                    robot_field(robot.model, alike),
+                    _sensor_field(numbers),
+                    ChoiceField("SIDE", (("below", "below"), ("above", "above"))),
+                    NumberField("LIMIT", 20),
+                ),
+                robot=RobotUse("sensor", "", "passes", robot.model),
+            )
+        )
+    return tuple(hats)
+
+
+def _sensor_field(sensors: Sequence[Sensor]) -> ChoiceField:
+    return ChoiceField("SENSOR", tuple((sensor.title or sensor.name, sensor.name) for sensor in sensors))
+
+
+def _returned(robot: Robot, action: Action) -> str | None:
+    """The field of an action's output that its block gives back, if the description names one."""
+    look = _member(robot, "actions", action.name).get("rb:block")
+    returns = look.get("returns") if isinstance(look, Mapping) else None
+    return returns if isinstance(returns, str) and returns else None
+
+
+def _member(robot: Robot, kind: str, name: str) -> Mapping[str, object]:
+    group = robot.source.get(kind)
+    member = group.get(name) if isinstance(group, Mapping) else None
+    return member if isinstance(member, Mapping) else {}
+
+
+CATEGORY = Category(
+    name="robot",
+    title="Robots",
+    style="robot",
+    icon="bot",
+    order=70,
+    make=robot_blocks,
+    groups=robot_groups,
+)

@@ -1,0 +1,49 @@
+"""Variables: names for values, shared by all scripts. Blockly's own variables, with its fields' names."""
+
+from __future__ import annotations
+
+from app.blocks.block import Block
+from app.blocks.category import Category
+from app.blocks.fields import ValueInput, VariableField
+
+CATEGORY = Category(
+    name="variables",
+    title="Variables",
+    style="variables",
+    icon="variable",
+    order=40,
+    button=("New variable", "CREATE_VARIABLE"),
+    blocks=(
+        Block(
+            type="variables_set",
+            text="set %VAR to %VALUE",
+            shape="statement",
+            style="variables",
+            icon="variable",
+            tooltip="Gives the variable this value; all scripts see it.",
+            python="%VAR = %VALUE",
+            arguments=(VariableField("VAR"), ValueInput("VALUE", None, 0)),
+        ),
+        Block(
+            type="variables_change",
+            text="change %VAR by %BY",
+            shape="statement",
+            style="variables",
+            icon="diff",
+            tooltip="Adds this number to the variable.",
+            python="%VAR += %BY",
+            arguments=(VariableField("VAR"), ValueInput("BY", "Number", 1)),
+        ),
+        Block(
+            type="variables_get",
+            text="%VAR",
+            shape="value",
+            style="variables",
+            icon="variable",
+            tooltip="The value of the variable.",
+            python="%VAR",
+            arguments=(VariableField("VAR"),),
+            fails=False,
+        ),
+    ),
+)

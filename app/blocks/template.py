@@ -1,0 +1,125 @@
+"""Python templates: text with ``%HOLES``, parsed once, filled with syntax trees.
+
+A template is written by us, in a category. What comes out of a file only ever goes into its holes, as a tree
+(`literal`), never as text: so no text of a file can become code.
+
+``%NAME`` where an expression may stand takes an expression, ``%NAME`` alone on a line takes statements,
+``**%NAME`` takes keyword arguments.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+_HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
+_PREFIX = "_hole_"
+
+
+def literal(value: object) -> ast.expr:
+    """The expression for a plain value (None, bool, int, float, str, lists and dicts of them).
+
+    ValueError for anything else, and for numbers that are not finite.
+    """
+    if isinstance(value, str) or value is None or isinstance(value, bool):
+        return ast.Constant(value)
+    if isinstance(value, (int, float)):
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is not a number that a program can hold")
+        # -1 as one constant would be written "-1 ** 2", which is another number: parse what Python writes.
+        return ast.parse(repr(value), mode="eval").body
+    if isinstance(value, (list, tuple)):
+        return ast.List([literal(item) for item in value], ast.Load())
+    if isinstance(value, Mapping):
+        keys: list[ast.expr | None] = [literal(str(key)) for key in value]
+        return ast.Dict(keys, [literal(item) for item in value.values()])
+    raise ValueError(f"a {type(value).__name__} can't stand in a program")
+
+
+def statements(
+    text: str,
+    expressions: Mapping[str, ast.expr],
+    bodies: Mapping[str, Sequence[ast.stmt]] | None = None,
+    keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
+) -> list[ast.stmt]:
+    """The statements of a template with its holes filled; KeyError names a hole that got nothing."""
+    tree = copy.deepcopy(_parsed(text))
+    filled: list[ast.stmt] = []
+    filler = _Filler(expressions, bodies or {}, keywords or {})
+    for statement in tree.body:
+        made = filler.visit(statement)
+        filled.extend(made if isinstance(made, list) else [made])
+    return filled
+
+
+def expression(
+    text: str,
+    expressions: Mapping[str, ast.expr],
+    keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
+) -> ast.expr:
+    """The expression of a template with its holes filled."""
+    (statement,) = statements(text, expressions, None, keywords)
+    if not isinstance(statement, ast.Expr):
+        raise ValueError(f"not an expression: {text}")
+    return statement.value
+
+
+def holes(text: str) -> frozenset[str]:
+    """The names of a template's holes."""
+    return frozenset(_HOLE.findall(text))
+
+
+@lru_cache(maxsize=1024)
+def _parsed(text: str) -> ast.Module:
+    return ast.parse(_HOLE.sub(_PREFIX + r"\1", text))
+
+
+def _hole(node: ast.AST | None) -> str | None:
+    if isinstance(node, ast.Name) and node.id.startswith(_PREFIX):
+        return node.id[len(_PREFIX) :]
+    return None
+
+
+class _Filler(ast.NodeTransformer):
+    def __init__(
+        self,
+        expressions: Mapping[str, ast.expr],
+        bodies: Mapping[str, Sequence[ast.stmt]],
+        keywords: Mapping[str, Sequence[ast.keyword]],
+    ) -> None:
+        self._expressions = expressions
+        self._bodies = bodies
+        self._keywords = keywords
+
+    def visit_Expr(self, node: ast.Expr) -> ast.stmt | list[ast.stmt]:  # noqa: N802 (ast's name)
+        name = _hole(node.value)
+        if name is not None and name in self._bodies:
+            return list(self._bodies[name]) or [ast.Pass()]
+        node.value = self.visit(node.value)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802 (ast's name)
+        name = _hole(node)
+        if name is None:
+            return node
+        filling = self._expressions[name]
+        # A variable may stand in several holes, read here and written there: each gets a node of its own.
+        return ast.Name(filling.id, node.ctx) if isinstance(filling, ast.Name) else filling
+
+    def visit_Call(self, node: ast.Call) -> ast.Call:  # noqa: N802 (ast's name)
+        keywords: list[ast.keyword] = []
+        for keyword in node.keywords:
+            name = _hole(keyword.value)
+            if keyword.arg is None and name is not None and name in self._keywords:
+                keywords.extend(self._keywords[name])
+            else:
+                keyword.value = self.visit(keyword.value)
+                keywords.append(keyword)
+        node.func = self.visit(node.func)
+        node.args = [self.visit(argument) for argument in node.args]
+        node.keywords = keywords
+        return node

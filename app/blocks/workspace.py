@@ -1,0 +1,123 @@
+"""A workspace: Blockly's JSON, parsed once into typed blocks.
+
+A file may hold anything. What has not the right form is left out; nothing raises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+MAX_DEPTH = 40
+_MANUAL = "MANUALLY_DISABLED"
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A block as it was placed: its fields as saved, and what is in its inputs (a list: statements follow)."""
+
+    id: str
+    type: str
+    fields: Mapping[str, object] = field(default_factory=dict)
+    inputs: Mapping[str, tuple[Placed, ...]] = field(default_factory=dict)
+    enabled: bool = True
+    shadow: bool = False
+    too_deep: bool = False  # something inside was left out because it is nested too deep
+
+    def field_id(self, name: str) -> str:
+        """The saved text of a field, "" when it has none."""
+        saved = self.fields.get(name)
+        return saved if isinstance(saved, str) else ""
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """All scripts (the blocks that hang together from each top block) and the variables: id -> name."""
+
+    scripts: tuple[tuple[Placed, ...], ...]
+    variables: Mapping[str, str]
+
+    def all_blocks(self) -> list[Placed]:
+        """Every block, shadows too."""
+        found: list[Placed] = []
+        waiting = [block for script in self.scripts for block in script]
+        while waiting:
+            block = waiting.pop()
+            found.append(block)
+            for inner in block.inputs.values():
+                waiting.extend(inner)
+        return found
+
+
+def parse_workspace(saved: Mapping[str, object]) -> Workspace:
+    """The workspace of Blockly's JSON, whatever it holds."""
+    blocks = saved.get("blocks")
+    tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
+    numbers = _Numbers()
+    scripts = tuple(_chain(top, 0, numbers, shadow=False) for top in _list(tops))
+    variables: dict[str, str] = {}
+    for variable in _list(saved.get("variables")):
+        if isinstance(variable, Mapping) and isinstance(variable.get("id"), str):
+            variables[str(variable["id"])] = str(variable.get("name") or variable["id"])
+    return Workspace(tuple(script for script in scripts if script), variables)
+
+
+class _Numbers:
+    """Ids for blocks that have none, or one that another has already."""
+
+    def __init__(self) -> None:
+        self._seen: set[str] = set()
+
+    def id(self, saved: object) -> str:
+        made, number = (saved if isinstance(saved, str) and saved else "block"), 2
+        stem = made
+        while made in self._seen:
+            made, number = f"{stem}~{number}", number + 1
+        self._seen.add(made)
+        return made
+
+
+def _list(saved: object) -> Sequence[object]:
+    return saved if isinstance(saved, (list, tuple)) else ()
+
+
+def _chain(saved: object, depth: int, numbers: _Numbers, *, shadow: bool) -> tuple[Placed, ...]:
+    """A block and all that follow it; a loop, because a script may be long."""
+    chain: list[Placed] = []
+    while isinstance(saved, Mapping) and isinstance(saved.get("type"), str):
+        chain.append(_block(saved, depth, numbers, shadow=shadow))
+        following = saved.get("next")
+        saved = following.get("block") if isinstance(following, Mapping) else None
+    return tuple(chain)
+
+
+def _block(saved: Mapping[str, object], depth: int, numbers: _Numbers, *, shadow: bool) -> Placed:
+    fields = saved.get("fields")
+    raw = saved.get("inputs")
+    connections = raw if isinstance(raw, Mapping) else {}
+    inputs: dict[str, tuple[Placed, ...]] = {}
+    id = numbers.id(saved.get("id"))
+    if depth < MAX_DEPTH:
+        for name, connection in connections.items():
+            if isinstance(connection, Mapping):
+                real = connection.get("block")
+                inner = real if isinstance(real, Mapping) else connection.get("shadow")
+                inputs[str(name)] = _chain(
+                    inner, depth + 1, numbers, shadow=not isinstance(real, Mapping)
+                )
+    return Placed(
+        id=id,
+        type=str(saved["type"]),
+        fields=dict(fields) if isinstance(fields, Mapping) else {},
+        inputs=inputs,
+        enabled=_enabled(saved),
+        shadow=shadow,
+        too_deep=depth >= MAX_DEPTH and bool(connections),
+    )
+
+
+def _enabled(saved: Mapping[str, object]) -> bool:
+    """Whether a person switched the block off; other reasons (an absent robot) are ours to judge."""
+    if saved.get("enabled") is False:
+        return False
+    return _MANUAL not in _list(saved.get("disabledReasons"))
