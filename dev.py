@@ -333,9 +333,14 @@ def demo(computer: Computer, arguments: Sequence[str]) -> int:
     return code
 
 
-def script(computer: Computer, name: str, arguments: Sequence[str]) -> int:
+def script(
+    computer: Computer,
+    name: str,
+    arguments: Sequence[str],
+    scripts: Mapping[str, tuple[str, str]] = SCRIPTS,
+) -> int:
     """Run one of the project's own scripts in the environment; its exit code."""
-    path, extra = SCRIPTS[name]
+    path, extra = scripts[name]
     if not (ROOT / path).is_file():
         raise Trouble(f"'{name}' needs '{path}', which this revision does not have")
     python = make_environment(computer, ROOT, extra)

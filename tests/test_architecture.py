@@ -1,0 +1,292 @@
+"""What holds everywhere: layers, Qt only in app.ui, nobody sleeps, plug-ins apart, an honest distribution.
+
+lint-imports (tools/check.py) decides the layers by the import graph; here the sources themselves are read, so
+that a plain ``pytest`` notices too, also imports inside functions and under TYPE_CHECKING.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from importlib.metadata import distribution
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.version import Version
+
+ROOT = Path(__file__).parents[1]
+# Downwards: a module may import from its own line and from those below it.
+LAYERS = (
+    ("app.__main__",),
+    ("app.ui",),
+    ("app.core",),
+    ("app.blocks",),
+    ("app.robots",),
+    ("app.errors", "app.resources", "app"),
+    ("nep",),
+)
+PLUG_INS = {"PANEL", "CATEGORY", "ROBOT", "BACKEND"}
+QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
+
+
+class Import(NamedTuple):
+    """One import statement's target, and where it stands."""
+
+    target: str
+    line: int
+    in_function: bool
+
+
+class Module(NamedTuple):
+    """One source file of the product."""
+
+    name: str
+    path: Path
+    tree: ast.Module
+
+
+@cache
+def modules() -> tuple[Module, ...]:
+    """Every module of nep and app."""
+    found = []
+    for path in sorted([*ROOT.glob("nep/**/*.py"), *ROOT.glob("app/**/*.py")]):
+        if "node_modules" in path.parts:
+            continue
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        found.append(Module(name, path, ast.parse(path.read_text(encoding="utf-8"), str(path))))
+    return tuple(found)
+
+
+def imports(tree: ast.AST, in_function: bool = False) -> Iterator[Import]:
+    """Every import below a node, as dotted names; ``from a import b`` gives ``a.b``."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(alias.name, node.lineno, in_function)
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                yield Import(f"{node.module}.{alias.name}", node.lineno, in_function)
+        else:
+            yield from imports(node, in_function or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+
+
+def layer(name: str) -> int | None:
+    """The layer of a dotted name, 0 on top; None for what is not ours."""
+    for number, prefixes in enumerate(LAYERS):
+        if any(name == prefix or name.startswith(f"{prefix}.") for prefix in prefixes):
+            return number
+    return None
+
+
+def faults_of_layers(module: Module) -> list[str]:
+    """The imports of a module that point up."""
+    own = layer(module.name)
+    assert own is not None
+    found = []
+    for item in imports(module.tree):
+        target = layer(item.target)
+        if target is not None and target < own:
+            found.append(f"{module.name}:{item.line} imports {item.target}")
+    return found
+
+
+def sleeps(tree: ast.AST) -> list[int]:
+    """The lines in which something sleeps: ``x.sleep()``, ``sleep()``, ``msleep``."""
+    names = {"sleep", "msleep", "usleep"}
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and (
+            (isinstance(node.func, ast.Attribute) and node.func.attr in names)
+            or (isinstance(node.func, ast.Name) and node.func.id in names)
+        )
+    ]
+
+
+def bound_plug_ins(tree: ast.Module) -> set[str]:
+    """Which of the plug-in names a module binds."""
+    targets = [
+        target
+        for node in tree.body
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
+    ]
+    return {target.id for target in targets if isinstance(target, ast.Name)} & PLUG_INS
+
+
+def environ_without_screen() -> dict[str, str]:
+    return {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+
+
+def test_the_product_is_read_at_all() -> None:
+    names = {module.name for module in modules()}
+    assert {"nep", "app", "app.__main__", "app.ui", "app.core", "app.blocks", "app.robots"} <= names
+
+
+def test_imports_point_down() -> None:
+    assert [fault for module in modules() for fault in faults_of_layers(module)] == []
+
+
+def test_an_import_that_points_up_is_found() -> None:
+    tree = ast.parse("def f():\n    from app.ui import theme\n")
+    assert faults_of_layers(Module("app.core.x", Path("x.py"), tree)) == ["app.core.x:2 imports app.ui.theme"]
+
+
+def test_qt_is_only_in_app_ui() -> None:
+    faults = [
+        f"{module.name}:{item.line} imports {item.target}"
+        for module in modules()
+        if not module.name.startswith("app.ui")
+        for item in imports(module.tree)
+        if item.target.split(".")[0] in QT
+    ]
+    assert faults == []
+
+
+def test_imports_inside_functions_are_of_heavy_packages_only() -> None:
+    # Entries choose what to load: `python -m app run` must not load Qt, `nep --help` not all of nep.
+    entries = {"app.__main__", "nep.__main__"}
+    own_or_standard = {"nep", "app", *sys.stdlib_module_names}
+    faults = [
+        f"{module.name}:{item.line} imports {item.target}"
+        for module in modules()
+        if module.name not in entries
+        for item in imports(module.tree)
+        if item.in_function and item.target.split(".")[0] in own_or_standard
+    ]
+    assert faults == []
+
+
+def test_plug_ins_do_not_import_each_other() -> None:
+    plug_ins = {module.name for module in modules() if bound_plug_ins(module.tree)}
+    faults = [
+        f"{module.name}:{item.line} imports {item.target}"
+        for module in modules()
+        if module.name in plug_ins
+        for item in imports(module.tree)
+        if item.target in plug_ins or item.target.rpartition(".")[0] in plug_ins
+    ]
+    assert faults == []
+
+
+def test_nobody_sleeps() -> None:
+    folders = ("nep", "app", "tools", "bench", "tests")
+    paths = [ROOT / "dev.py", *(path for folder in folders for path in ROOT.glob(f"{folder}/**/*.py"))]
+    faults = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in paths
+        if "node_modules" not in path.parts
+        for line in sleeps(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert faults == []
+
+
+@pytest.mark.parametrize(
+    "source", ["time.sleep(1)", "sleep(1)", "QThread.msleep(5)", "await asyncio.sleep(0)"]
+)
+def test_a_sleep_is_found(source: str) -> None:
+    assert sleeps(ast.parse(f"async def f():\n    {source}\n")) == [2]
+
+
+def test_qt_does_not_lose_references_of_none() -> None:
+    """PySide6 6.12.0 for Linux loses one at every void call; Python 3.10 and 3.11 then abort."""
+    program = (
+        "import sys\n"
+        "from PySide6.QtWidgets import QApplication, QLabel\n"
+        "application = QApplication([])\n"
+        "label = QLabel()\n"
+        "before = sys.getrefcount(None)\n"
+        "for number in range(1000):\n"
+        "    label.setText('x')\n"
+        "print(sys.getrefcount(None) - before)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environ_without_screen(),
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=True,
+    )
+    assert abs(int(done.stdout)) < 100
+
+
+def test_nep_loads_without_qt_and_pictures() -> None:
+    heavy = sorted({*QT, "numpy", "cv2"})
+    program = f"import sys, nep\nprint([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=50, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def requirements(extra: str = "") -> list[Requirement]:
+    """What the installed distribution asks for, with an extra or without."""
+    found = [Requirement(text) for text in distribution("nep-studio").requires or []]
+    return [item for item in found if item.marker is None or item.marker.evaluate({"extra": extra})]
+
+
+def test_the_distribution_says_what_it_needs() -> None:
+    metadata = distribution("nep-studio").metadata
+    assert metadata["License-Expression"] == "MIT"
+    assert metadata["Requires-Python"] == "<3.14,>=3.10"
+    assert metadata["Summary"]
+    plain = {normalised(item.name) for item in requirements()}
+    assert {"pyzmq", "msgpack", "orjson"} <= plain
+    assert plain.isdisjoint({"pyside6", "numpy", "opencv-python-headless"})
+    studio = {normalised(item.name): item.specifier for item in requirements("studio")}
+    assert "6.11.3" in studio["pyside6"]
+    assert "6.12.0" not in studio["pyside6"]
+    image = {normalised(item.name): item.specifier for item in requirements("image")}
+    assert "5.0.0.93" not in image["opencv-python-headless"]
+
+
+def test_the_commands_of_the_distribution_exist() -> None:
+    commands = {item.name: item.value for item in distribution("nep-studio").entry_points}
+    assert set(commands) == {"nep", "nep-studio"}
+    for value in commands.values():
+        module, name = value.split(":")
+        assert callable(getattr(import_module(module), name))
+
+
+def pinned() -> dict[str, list[Requirement]]:
+    """The lines of constraints.txt by normalised name."""
+    found: dict[str, list[Requirement]] = {}
+    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines():
+        if line and not line.startswith("#"):
+            item = Requirement(line)
+            found.setdefault(normalised(item.name), []).append(item)
+    return found
+
+
+def normalised(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def test_everything_that_is_installed_for_us_is_pinned() -> None:
+    pins = pinned()
+    waiting = [item for extra in ("", "studio", "image", "test", "dev") for item in requirements(extra)]
+    seen: set[str] = set()
+    while waiting:
+        item = waiting.pop()
+        name = normalised(item.name)
+        if name in seen or name == "nep-studio":
+            continue
+        seen.add(name)
+        found = distribution(item.name)
+        versions = [pin.specifier for pin in pins[name] if pin.marker is None or pin.marker.evaluate()]
+        assert len(versions) == 1, f"{name} is pinned {len(versions)} times for this Python"
+        assert Version(found.version) in versions[0], f"{name} {found.version} is not the pinned one"
+        needs = [Requirement(text) for text in found.requires or []]
+        waiting += [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
+    assert len(seen) > 20

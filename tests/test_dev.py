@@ -1,0 +1,260 @@
+"""dev.py: what it finds missing, what it would run, and that nothing is left behind."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+
+import dev
+
+ROOT = Path(dev.__file__).parent
+PACKAGES = [name.split("|")[-1] for name in dev.QT_LIBRARIES]
+
+
+@dataclass
+class FakeSystem:
+    """A Debian of which we say what is installed and what its servers have."""
+
+    installed: set[str] = field(default_factory=set)
+    listed: set[str] = field(default_factory=set)
+    served: set[str] = field(default_factory=set)
+    ran: list[tuple[str, ...]] = field(default_factory=list)
+    fails: bool = False
+
+    def which(self, name: str) -> str | None:
+        return f"/usr/bin/{name}"
+
+    def ask(self, command: Sequence[str]) -> str:
+        if command[0] == "dpkg-query":
+            known = self.installed.intersection(command)
+            return "".join(f"{name} installed\n" for name in sorted(known)) + "libgone config-files\n"
+        assert command[:2] == ["apt-cache", "policy"]
+        return "".join(
+            f"{name}:\n  Installed: (none)\n  Candidate: {'1.0' if name in self.listed else '(none)'}\n"
+            for name in command[2:]
+            if name in self.listed | self.installed | {"libasound2"}
+        )
+
+    def do(self, command: Sequence[str], environ: Mapping[str, str], log: Path | None) -> int:
+        self.ran.append(tuple(command))
+        if log:
+            log.parent.mkdir(exist_ok=True)
+            log.write_text("E: no space left\n", encoding="utf-8")
+        if "update" in command:
+            self.listed |= self.served
+        elif "install" in command:
+            if self.fails:
+                return 100
+            self.installed.update(command[command.index("install") + 1 :])
+        return 0
+
+    def computer(self, **changes: object) -> dev.Computer:
+        known: dict[str, object] = {
+            "platform": "linux",
+            "environ": {"DISPLAY": ":0"},
+            "root": True,
+            "version": (3, 11),
+            "has_ensurepip": True,
+        }
+        return dev.Computer(which=self.which, ask=self.ask, do=self.do, **(known | changes))
+
+
+def test_nothing_is_run_when_nothing_is_missing() -> None:
+    system = FakeSystem(installed=set(PACKAGES))
+    dev.bring_system_packages(system.computer())
+    assert system.ran == []
+
+
+def test_only_what_is_missing_is_installed_and_lists_that_are_good_are_not_renewed() -> None:
+    system = FakeSystem(installed=set(PACKAGES) - {"libnss3"}, listed={"libnss3"})
+    dev.bring_system_packages(system.computer())
+    assert [command[-1] for command in system.ran] == ["libnss3"]
+    assert "DPkg::Lock::Timeout=600" in system.ran[0]
+
+
+def test_absent_lists_are_renewed_first() -> None:
+    system = FakeSystem(served={*PACKAGES, "xvfb", "python3.11-venv"})
+    dev.bring_system_packages(system.computer(environ={}, has_ensurepip=False))
+    assert ["update" in command for command in system.ran] == [True, False]
+    assert {*PACKAGES, "xvfb", "python3.11-venv"} <= system.installed
+
+
+def test_old_lists_are_renewed_after_a_failure_and_a_second_one_is_told() -> None:
+    system = FakeSystem(listed=set(PACKAGES), fails=True)
+    with pytest.raises(dev.Trouble, match="no space left"):
+        dev.bring_system_packages(system.computer())
+    assert [("update" in command) for command in system.ran] == [False, True, False]
+
+
+def test_a_package_that_nobody_has_is_named() -> None:
+    system = FakeSystem(served=set(PACKAGES) - {"libnss3"})
+    with pytest.raises(dev.Trouble, match="no package for libnss3"):
+        dev.bring_system_packages(system.computer())
+
+
+@pytest.mark.parametrize("name", ["libasound2", "libasound2t64"])
+def test_a_package_is_known_by_its_old_and_its_new_name(name: str) -> None:
+    system = FakeSystem(installed=set(PACKAGES) - {"libasound2"} | {name})
+    assert dev.missing_packages(system.computer()) == []
+    found, unknown = dev.available(FakeSystem(listed={name}).computer(), ["libasound2t64|libasound2"])
+    assert (found, unknown) == ([name], [])
+
+
+def test_an_ordinary_user_gets_the_one_line_to_type() -> None:
+    system = FakeSystem(installed=set(PACKAGES) - {"libnss3", "libgl1"}, listed={"libgl1"})
+    with pytest.raises(dev.Trouble) as trouble:
+        dev.bring_system_packages(system.computer(root=False))
+    line = str(trouble.value).splitlines()[-1]
+    assert line.startswith("  sudo apt-get update && sudo apt-get install -y")
+    assert line.endswith("libgl1 libnss3")
+    assert system.ran == []
+
+
+def test_other_systems_are_left_alone() -> None:
+    system = FakeSystem()
+    for platform in ("win32", "darwin"):
+        computer = system.computer(platform=platform, environ={})
+        assert computer.has_screen
+        dev.bring_system_packages(computer)
+    dev.bring_system_packages(replace(system.computer(), which=lambda name: None))
+    assert system.ran == []
+
+
+def test_a_python_that_is_too_old_or_new_is_refused_with_the_range() -> None:
+    for version in ((3, 9), (3, 14)):
+        with pytest.raises(dev.Trouble, match=r"3\.10 to 3\.13 is needed"):
+            dev.run(FakeSystem().computer(version=version), "test", [])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A checkout with an environment in it."""
+    for name in ("pyproject.toml", "constraints.txt"):
+        (tmp_path / name).write_text(name, encoding="utf-8")
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    (tmp_path / ".venv" / "bin" / "python").touch()
+    return tmp_path
+
+
+def fake_pip(system: FakeSystem) -> dev.Computer:
+    """A computer with a virtual environment whose pip works."""
+    return replace(system.computer(), ask=lambda command: "26.0\n")
+
+
+def test_packages_are_installed_once_and_again_when_the_pins_change(folder: Path) -> None:
+    system = FakeSystem()
+    for _ in range(2):
+        assert dev.make_environment(fake_pip(system), folder, "dev") == folder / ".venv" / "bin" / "python"
+    assert [("install" in command) for command in system.ran] == [True, False]
+    (folder / "constraints.txt").write_text("other", encoding="utf-8")
+    dev.make_environment(fake_pip(system), folder, "dev")
+    assert len(system.ran) == 4
+
+
+def test_what_demo_installed_is_not_enough_for_tests_but_the_other_way_round(folder: Path) -> None:
+    system = FakeSystem()
+    dev.make_environment(fake_pip(system), folder, "studio")
+    assert not dev.is_fresh(folder, "dev")
+    dev.make_environment(fake_pip(system), folder, "dev")
+    assert dev.is_fresh(folder, "studio")
+
+
+def test_an_installation_that_failed_is_tried_again(folder: Path) -> None:
+    failing = replace(fake_pip(FakeSystem()), do=lambda command, environ, log: 1)
+    with pytest.raises(dev.Trouble, match="packages could not be installed"):
+        dev.make_environment(failing, folder, "dev")
+    assert not dev.is_fresh(folder, "dev")
+
+
+def test_the_interpreter_is_found_on_every_system() -> None:
+    assert dev.venv_python(Path("v"), "win32") == Path("v/Scripts/python.exe")
+    assert dev.venv_python(Path("v"), "darwin") == Path("v/bin/python")
+
+
+def test_the_sandbox_is_off_only_for_root() -> None:
+    system = FakeSystem()
+    with dev.screen(system.computer(root=True)) as environ:
+        assert environ["QTWEBENGINE_DISABLE_SANDBOX"] == "1"
+    with dev.screen(system.computer(root=False)) as environ:
+        assert environ == {"DISPLAY": ":0"}
+
+
+@pytest.mark.skipif(sys.platform != "linux" or not shutil.which("Xvfb"), reason="no Xvfb")
+def test_a_virtual_screen_lives_as_long_as_its_block() -> None:
+    with dev.screen(FakeSystem().computer(environ={})) as environ:
+        address = f"/tmp/.X11-unix/X{environ['DISPLAY'][1:]}"
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(address)
+        assert Path(environ["XDG_RUNTIME_DIR"]).is_dir()
+    assert not Path(environ["XDG_RUNTIME_DIR"]).exists()
+    with socket.socket(socket.AF_UNIX) as client, pytest.raises((FileNotFoundError, ConnectionRefusedError)):
+        client.connect(address)
+
+
+WATCHING = """
+import os, sys
+import dev
+
+STUBBORN = '''
+import signal, sys
+{handler}
+print("up", flush=True)
+sys.stdin.read()
+'''
+
+try:
+    dev.watch([sys.executable, "-c", STUBBORN], os.environ)
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="process groups of POSIX")
+@pytest.mark.parametrize("handler", ["", "signal.signal(signal.SIGINT, signal.SIG_IGN)"])
+def test_ctrl_c_ends_what_was_started_also_when_it_does_not_want_to(handler: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", WATCHING.replace("{handler}", handler)],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    with process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"up\n"
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.wait(30) == 130
+        # The pipe ends only when the last process that holds it has gone.
+        assert process.stdout.read() == b""
+
+
+def test_a_script_that_this_revision_lacks_is_told_in_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    lacking = {"nothing": ("tools/nothing.py", "dev")}
+    with pytest.raises(dev.Trouble, match=r"'nothing' needs 'tools/nothing.py'"):
+        dev.script(FakeSystem().computer(), "nothing", [], lacking)
+
+
+def test_trouble_ends_with_code_2_and_its_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    previous = signal.getsignal(signal.SIGTERM)
+    try:
+        code = dev.main(["demo"], FakeSystem().computer(version=(3, 9)))
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+    assert code == 2
+    assert capsys.readouterr().err.startswith("dev.py: Python 3.10 to 3.13 is needed")
+
+
+def test_ci_runs_exactly_the_command_of_the_readme() -> None:
+    last = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()[-1]
+    assert last == "exec python3 dev.py test"
+    assert "\npython3 dev.py test" in (ROOT / "README.md").read_text(encoding="utf-8")
