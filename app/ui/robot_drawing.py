@@ -1,4 +1,4 @@
-"""A picture of a virtual robot in its room, drawn from its state; where its parts are, so it can be touched."""
+"""A picture of a virtual robot in its room, drawn from its state; where its parts are, to touch them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPixmap
 
 from app.ui.robot_figure import HEAD, limbs, paint_figure
-from app.ui.robot_room import Spot, Stage, paint_room, paint_table, paint_thing, thing_area
+from app.ui.robot_room import Spot, Stage, paint_room, paint_thing, thing_area
 from app.ui.robot_state import RobotState, Thing
 
 BUBBLE_WIDTH = 190.0
 BUBBLE_LINES = 4
-TABLE_FOOT = 239.0
+
+# What a preview shows while no robot has told its state.
+PREVIEW = RobotState(
+    x=0.58,
+    arm_left_deg=124.0,
+    objects=(Thing("ball", 0.35, -1.65), Thing("table", -0.13, 1.95)),
+)
 
 
 class RobotDrawing:
@@ -35,21 +41,15 @@ class RobotDrawing:
         robot = stage.spot(state.x, state.y)
         things = sorted(((stage.spot(t.x, t.y), t) for t in state.objects), key=lambda pair: pair[0].v)
         _paint_reach(painter, robot, state)
-        table_drawn = False
         for spot, thing in _in_order(things, robot):
-            if not table_drawn and spot.v > TABLE_FOOT:
-                paint_table(painter)
-                table_drawn = True
-            if thing is None:
-                painter.save()
-                painter.translate(robot.u, robot.v)
-                painter.scale(robot.scale, robot.scale)
-                paint_figure(painter, state)
-                painter.restore()
-            else:
+            if thing is not None:
                 paint_thing(painter, thing, spot)
-        if not table_drawn:
-            paint_table(painter)
+                continue
+            painter.save()
+            painter.translate(robot.u, robot.v)
+            painter.scale(robot.scale, robot.scale)
+            paint_figure(painter, state)
+            painter.restore()
         if state.speech:
             self._bubble(painter, stage, robot, state.speech)
         painter.restore()
@@ -142,9 +142,7 @@ class RobotDrawing:
             painter.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
 
 
-def _in_order(
-    things: list[tuple[Spot, Thing]], robot: Spot
-) -> list[tuple[Spot, Thing | None]]:
+def _in_order(things: list[tuple[Spot, Thing]], robot: Spot) -> list[tuple[Spot, Thing | None]]:
     """What is far first; the robot between what is behind and before it."""
     behind: list[tuple[Spot, Thing | None]] = [pair for pair in things if pair[0].v <= robot.v]
     before: list[tuple[Spot, Thing | None]] = [pair for pair in things if pair[0].v > robot.v]

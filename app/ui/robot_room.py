@@ -29,6 +29,9 @@ class Spot:
     scale: float
 
 
+TABLE = Spot(315.0, 239.0, (239.0 - HORIZON) / START)
+
+
 @dataclass(frozen=True, slots=True)
 class Stage:
     """How a room fills a rectangle: uniform scale, centred; wall and floor go on to the edges."""
@@ -145,8 +148,12 @@ def _picture(p: QPainter) -> None:
     p.drawPolygon(QPolygonF([QPointF(x, y) for x, y in points]))
 
 
-def paint_table(p: QPainter) -> None:
-    """The table with the plant, at the right."""
+def _table(p: QPainter, spot: Spot) -> None:
+    """A table with a plant on it, drawn where the design has it and moved from there."""
+    p.save()
+    p.translate(spot.u, spot.v)
+    p.scale(spot.scale / TABLE.scale, spot.scale / TABLE.scale)
+    p.translate(-TABLE.u, -TABLE.v)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(60, 40, 20, 46))
     p.drawEllipse(QPointF(315, 239.5), 52, 5)
@@ -164,6 +171,7 @@ def paint_table(p: QPainter) -> None:
     p.fillPath(leaves, QColor("#3E7D4C"))
     p.setBrush(QColor("#4E8C7A"))
     p.drawRoundedRect(QRectF(304, 153, 21, 25.5), 2.4, 2.4)
+    p.restore()
 
 
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
@@ -171,6 +179,9 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
     if thing.kind == "ball":
         r = max(4.0, (thing.size_m or BALL_M) * UNITS_PER_M * spot.scale)
         return QRectF(spot.u - r, spot.v - 2 * r + r * 0.08, 2 * r, 2 * r)
+    if thing.kind == "table":
+        share = spot.scale / TABLE.scale
+        return QRectF(spot.u - 53 * share, spot.v - 61 * share, 106 * share, 61 * share)
     wide = max(10.0, (thing.size_m or CARD_M) * UNITS_PER_M * spot.scale)
     return QRectF(spot.u - wide / 2, spot.v - 78 * spot.scale - wide * 0.6, wide, wide * 1.2)
 
@@ -179,6 +190,9 @@ def paint_thing(p: QPainter, thing: Thing, spot: Spot) -> None:
     """A ball, or a card on a stand (a face, a marker, anything else as a plain card)."""
     area = thing_area(thing, spot)
     p.setPen(Qt.PenStyle.NoPen)
+    if thing.kind == "table":
+        _table(p, spot)
+        return
     if thing.kind == "ball":
         _ball(p, area, QColor(thing.colour or "#D8403F"))
         return

@@ -23,20 +23,20 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """The floor in m; the person looks from the side of ``x_max`` towards ``x_min``."""
+    """The floor in m; the person looks from ``x_max`` towards ``x_min``, and has ``y_max`` at the right."""
 
-    x_min: float = -2.0
-    x_max: float = 2.0
-    y_min: float = -2.0
-    y_max: float = 2.0
+    x_min: float = -3.0
+    x_max: float = 3.0
+    y_min: float = -2.5
+    y_max: float = 2.5
 
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
     """One drawable moment of a robot.
 
-    ``x``, ``y`` in m, ``theta_deg`` 0 looks at the person and grows to the robot's left. Head yaw grows to the
-    robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
+    ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
+    grows to the robot's left, pitch grows upwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
     """
 
     x: float = 0.0
@@ -121,17 +121,6 @@ def _thing(one: Mapping[str, object]) -> Thing:
 def _room(value: object) -> Room:
     if not isinstance(value, Mapping):
         return Room()
-    plain = Room()
-    if "x_min" in value or "x_max" in value:
-        made = Room(
-            _number(value.get("x_min"), plain.x_min),
-            _number(value.get("x_max"), plain.x_max),
-            _number(value.get("y_min"), plain.y_min),
-            _number(value.get("y_max"), plain.y_max),
-        )
-    else:
-        depth = _number(value.get("depth", value.get("length")), 4.0)
-        width = _number(value.get("width"), 4.0)
-        made = Room(-depth / 2, depth / 2, -width / 2, width / 2)
-    good = made.x_max - made.x_min > 0.1 and made.y_max - made.y_min > 0.1
-    return made if good else plain
+    wide = _number(value.get("width"), 6.0)
+    deep = _number(value.get("depth"), 5.0)
+    return Room(-wide / 2, wide / 2, -deep / 2, deep / 2) if min(wide, deep) > 0.1 else Room()

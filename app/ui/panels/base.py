@@ -1,12 +1,13 @@
 """What a panel is: one dockable view of the session, described by one `Panel`.
 
-A panel reads the session in `PanelWidget.refresh`, 30 times a second while it can be seen, and does nothing there
-when nothing changed. It never imports another panel; what concerns the window goes through `PanelContext`.
+A panel reads the session in `PanelWidget.refresh`, 30 times a second while it can be seen, and does nothing
+there when nothing changed. It never imports another panel; what concerns the window goes through
+`PanelContext`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -34,8 +35,8 @@ class Toast(Protocol):
 class PanelContext:
     """What a panel may use of the window.
 
-    ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run`` does
-    one of the window's commands by its name (`app.ui.actions`).
+    ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
+    does one of the window's commands by its name (`app.ui.actions`).
     """
 
     session: Session
@@ -49,8 +50,8 @@ class PanelContext:
 class Panel:
     """A panel's description.
 
-    ``name`` is its id in saved layouts, ``icon`` a Lucide name, ``accepts`` the codecs of the topics that it can
-    show ("image"), or `ANY_TYPE`; ``make`` builds one.
+    ``name`` is its id in saved layouts, ``icon`` a Lucide name, ``accepts`` the codecs of the topics that it
+    can show ("image"), or `ANY_TYPE`; ``make`` builds one.
     """
 
     name: str
@@ -63,8 +64,8 @@ class Panel:
 class PanelWidget(QWidget):
     """The inside of a panel, and what stands in its title.
 
-    The window shows in the title: `title` (or `title_widget` in its place), `subtitle` in mono, `chips` beside
-    them, `header` at the right, and `menu_actions` in "more". `title_changed` when title or subtitle did.
+    The window shows in the title: `title` and `subtitle` in mono (or `replaces_title` in their place), then
+    `header_widgets`, and `more_actions` in "more". `title_changed` when title or subtitle did.
     """
 
     title_changed = Signal()
@@ -76,7 +77,6 @@ class PanelWidget(QWidget):
         self.session = context.session
         self.theme = context.theme
         self.density: Density = "compact"
-        self.title_widget: QWidget | None = None
         self.chips: list[QWidget] = []
         self.header: list[QWidget] = []
         self._title = title
@@ -84,15 +84,27 @@ class PanelWidget(QWidget):
         self.setAccessibleName(title)
         self.theme.changed.connect(self.theme_changed)
 
-    @property
     def title(self) -> str:
         """Its name in the title."""
         return self._title
 
-    @property
     def subtitle(self) -> str:
         """What it shows: a topic; empty when it shows one thing only."""
         return self._subtitle
+
+    def header_widgets(self) -> Sequence[QWidget]:
+        """Chips, which have ``place`` "start" and stand right after the title, then buttons, at the right."""
+        for chip in self.chips:
+            chip.setProperty("place", "start")
+        return [*self.chips, *self.header]
+
+    def replaces_title(self) -> QWidget | None:
+        """A widget that fills the title's row in place of the name; None in most panels."""
+        return None
+
+    def more_actions(self) -> Sequence[QAction]:
+        """What "more" offers above floating and closing."""
+        return ()
 
     def set_title(self, title: str, subtitle: str | None = None) -> None:
         """Change title and subtitle; nothing is told when they are the same."""
@@ -128,10 +140,6 @@ class PanelWidget(QWidget):
     def focus_filter(self) -> bool:
         """Go to the panel's filter (`/`); False when it has none."""
         return False
-
-    def menu_actions(self) -> list[QAction]:
-        """What "more" offers beside floating and closing."""
-        return []
 
     def save_state(self) -> dict[str, object]:
         """What is to be as it was when the layout comes back."""

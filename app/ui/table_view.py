@@ -1,0 +1,321 @@
+"""How a table looks: rows without lines, a quiet head, the chosen row with its bar, figures at the right."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+from PySide6.QtCore import (
+    QEvent,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPointF,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QFont, QFontMetricsF, QFocusEvent, QKeyEvent, QPainter, QPen, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+)
+
+from app.ui.icons import paint_icon
+from app.ui.table import CELL_ROLE, Cell, Column, Order, TableModel
+from app.ui.theme import Theme
+
+Row = TypeVar("Row")
+Index = QModelIndex | QPersistentModelIndex
+EDGE, PADDING, ICON = 12, 6, 14
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+KEYBOARD = frozenset(
+    {
+        Qt.FocusReason.TabFocusReason,
+        Qt.FocusReason.BacktabFocusReason,
+        Qt.FocusReason.ShortcutFocusReason,
+        Qt.FocusReason.OtherFocusReason,
+    }
+)
+
+
+def padded(rect: QRect, column: int, columns: int) -> QRectF:
+    """The inside of a cell: the outer columns keep further from the edge."""
+    left = EDGE if column == 0 else PADDING
+    right = EDGE if column == columns - 1 else PADDING
+    return QRectF(rect.adjusted(left, 0, -right, 0))
+
+
+class CellDelegate(QStyledItemDelegate):
+    """Paints a `Cell`."""
+
+    def __init__(self, theme: Theme, view: TableView[Row]) -> None:
+        super().__init__(view)
+        self._theme = theme
+        self._view = view
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
+        return QSize(40, self._view.row_height)
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        cell = index.data(CELL_ROLE)
+        if not isinstance(cell, Cell):
+            return
+        theme, rect = self._theme, QRect(option.rect)  # type: ignore[attr-defined]
+        chosen = bool(option.state & QStyle.StateFlag.State_Selected)  # type: ignore[attr-defined]
+        painter.save()
+        if chosen:
+            painter.fillRect(rect, theme.colour("selected"))
+        elif self._view.hovered_row == index.row():
+            painter.fillRect(rect, theme.colour("hover"))
+        if chosen and index.column() == 0:
+            painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
+        figures = self._view.columns[index.column()].figures
+        inside = padded(rect, index.column(), len(self._view.columns))
+        role = "selectedText" if chosen and cell.role == "text" else cell.role
+        if chosen and role == "textTertiary":
+            role = "accentText"
+        self._paint_cell(painter, inside, cell, role, figures=figures)
+        painter.restore()
+
+    def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, figures: bool) -> None:
+        theme = self._theme
+        font = self._view.cell_font(cell)
+        metrics = QFontMetricsF(font)
+        colour = theme.colour(role)
+        taken = (ICON + 5.0 if cell.icon else 0.0) + (self._chip_width(cell.chip) + 8 if cell.chip else 0.0)
+        text = metrics.elidedText(cell.text, Qt.TextElideMode.ElideRight, max(0.0, box.width() - taken))
+        advance = metrics.horizontalAdvance(text)
+        x = box.right() - advance - taken if figures else box.left()
+        if cell.icon:
+            top = box.center().y() - ICON / 2
+            paint_icon(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
+            x += ICON + 5.0
+        painter.setFont(font)
+        painter.setPen(colour)
+        painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
+        if cell.chip:
+            self._paint_chip(painter, QPointF(x + advance + 8, box.center().y()), cell.chip)
+
+    def _chip_font(self) -> QFont:
+        return self._theme.font("caption")
+
+    def _chip_width(self, words: str) -> float:
+        return QFontMetricsF(self._chip_font()).horizontalAdvance(words) + 14
+
+    def _paint_chip(self, painter: QPainter, middle: QPointF, words: str) -> None:
+        box = QRectF(middle.x(), middle.y() - 9, self._chip_width(words), 18)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(self._theme.colour("accentTint"))
+        painter.drawRoundedRect(box, 9, 9)
+        painter.setFont(self._chip_font())
+        painter.setPen(self._theme.colour("accentText"))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, words)
+
+
+class Head(QHeaderView):
+    """The head: small words, the sorted one in the text's colour with its arrow."""
+
+    def __init__(self, theme: Theme, view: TableView[Row]) -> None:
+        super().__init__(Qt.Orientation.Horizontal, view)
+        self._theme = theme
+        self._view = view
+        self.setHighlightSections(False)
+        self.setSectionsClickable(True)
+        self.setMinimumSectionSize(28)
+        self.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+
+    def sizeHint(self) -> QSize:
+        return QSize(super().sizeHint().width(), self._view.row_height + 1)
+
+    def paintSection(self, painter: QPainter, rect: QRect, section: int) -> None:
+        columns = self._view.columns
+        if not rect.isValid() or section >= len(columns):
+            return
+        theme, column = self._theme, columns[section]
+        painter.save()
+        painter.fillRect(rect, theme.colour("panel"))
+        painter.setPen(theme.colour("border"))
+        painter.drawLine(rect.bottomLeft(), rect.bottomRight())
+        font = theme.font("small")
+        font.setWeight(QFont.Weight.Medium)
+        box = padded(rect, section, len(columns))
+        ordered = self._view.order.column is column
+        metrics = QFontMetricsF(font)
+        arrow = 16.0 if ordered else 0.0
+        text = metrics.elidedText(column.title, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
+        advance = metrics.horizontalAdvance(text)
+        x = box.right() - advance - arrow if column.figures else box.left()
+        painter.setFont(font)
+        painter.setPen(theme.colour("text" if ordered else "textTertiary"))
+        painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
+        if ordered:
+            name = "chevron-up" if self._view.order.falling else "chevron-down"
+            at = QRectF(x + advance + 3, box.center().y() - 6.5, 13, 13)
+            paint_icon(painter, at, name, theme.colour("textSecondary"))
+        painter.restore()
+
+
+class TableView(QTableView, Generic[Row]):
+    """A table of `Column`s. `opened` with the key of a row that was clicked or entered."""
+
+    opened = Signal(str)
+    filter_wanted = Signal()
+    order_changed = Signal()
+
+    def __init__(self, theme: Theme, model: TableModel[Row], key: str = "") -> None:
+        """Show ``model``; ``key`` is the column sorted by at first."""
+        super().__init__()
+        self.theme = theme
+        self.columns: tuple[Column[Row], ...] = model.columns
+        self.order: Order[Row] = Order(next((c for c in self.columns if c.name == key), None))
+        self.row_height = 26
+        self.hovered_row = -1
+        self.keyboard = False
+        self._fonts: dict[tuple[bool, bool, bool], QFont] = {}
+        self._large = False
+        self.setModel(model)
+        self._model = model
+        self.setItemDelegate(CellDelegate(theme, self))
+        self.setHorizontalHeader(Head(theme, self))
+        self.horizontalHeader().sectionClicked.connect(self._sort)
+        self.verticalHeader().hide()
+        self.setShowGrid(False)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setTabKeyNavigation(False)
+        self.setWordWrap(False)
+        self.setMouseTracking(True)
+        self.clicked.connect(self._open)
+        self.set_row_height(26, large=False)
+        for place, column in enumerate(self.columns):
+            self.setColumnWidth(place, column.width)
+
+    def set_row_height(self, height: int, *, large: bool) -> None:
+        """The height of all rows; ``large`` words for the comfortable density."""
+        self.row_height, self._large = height, large
+        self._fonts.clear()
+        rows = self.verticalHeader()
+        rows.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        rows.setMinimumSectionSize(height)
+        rows.setDefaultSectionSize(height)
+        self.horizontalHeader().setFixedHeight(height + 1)
+        self.viewport().update()
+
+    def cell_font(self, cell: Cell) -> QFont:
+        """The font of a cell."""
+        key = (cell.mono, cell.bold, cell.struck)
+        if key not in self._fonts:
+            font = self.theme.font("bodyLarge" if self._large else "body")
+            if cell.mono:
+                mono = self.theme.font("mono")
+                mono.setPixelSize(font.pixelSize())
+                font = mono
+            if cell.bold:
+                font.setWeight(QFont.Weight.Bold)
+            font.setStrikeOut(cell.struck)
+            self._fonts[key] = font
+        return self._fonts[key]
+
+    def visible_rows(self) -> tuple[int, int]:
+        """First and last row that can be seen; the last is before the first when there is none."""
+        first = self.rowAt(0)
+        if first < 0:
+            return 0, -1
+        last = self.rowAt(self.viewport().height() - 1)
+        return first, last if last >= 0 else self._model.rowCount() - 1
+
+    def tell_visible_changed(self) -> None:
+        """Figures changed: repaint what can be seen, with one signal."""
+        first, last = self.visible_rows()
+        self._model.tell_changed(first, last)
+
+    def chosen_key(self) -> str | None:
+        """The key of the chosen row."""
+        row = self._model.row_at(self.currentIndex())
+        return self._model.key_of(row) if row is not None else None
+
+    def choose(self, key: str) -> None:
+        """Choose the row of this key without opening it; nothing when it is not shown."""
+        index = self._model.index_of(key)
+        if index.isValid() and index.row() != self.currentIndex().row():
+            self.setCurrentIndex(index)
+            self.selectRow(index.row())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        self.keyboard = True
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._open(self.currentIndex())
+        elif event.text() == "/":
+            self.filter_wanted.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        self.keyboard = event.reason() in KEYBOARD
+        super().focusInEvent(event)
+        if self.keyboard and not self.currentIndex().isValid() and self._model.rowCount():
+            self.setCurrentIndex(self._model.index(0, 0))
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self._hover(-1)
+        super().leaveEvent(event)
+
+    def viewportEvent(self, event: QEvent) -> bool:
+        if event.type() in {QEvent.Type.MouseMove, QEvent.Type.HoverMove}:
+            self._hover(self.rowAt(round(event.position().y())))  # type: ignore[attr-defined]
+        elif event.type() in {QEvent.Type.MouseButtonPress, QEvent.Type.Leave, QEvent.Type.HoverLeave}:
+            self.keyboard = False
+        return super().viewportEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.fit_columns()
+
+    def fit_columns(self) -> None:
+        """Give the stretching column what the others leave, at least its own width."""
+        for place, column in enumerate(self.columns):
+            if column.stretch:
+                others = sum(self.columnWidth(other) for other in range(len(self.columns)) if other != place)
+                self.setColumnWidth(place, max(column.width, self.viewport().width() - others))
+
+    def paintEvent(self, event: QEvent) -> None:  # type: ignore[override]
+        super().paintEvent(event)  # type: ignore[arg-type]
+        index = self.currentIndex()
+        if self.keyboard and self.hasFocus() and index.isValid():
+            painter = QPainter(self.viewport())
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(QPen(self.theme.colour("focus"), 2))
+            top = self.rowViewportPosition(index.row())
+            painter.drawRoundedRect(
+                QRectF(1, top + 1, self.viewport().width() - 2, self.row_height - 2), 4, 4
+            )
+            painter.end()
+
+    def _hover(self, row: int) -> None:
+        if row != self.hovered_row:
+            self.hovered_row = row
+            self.viewport().update()
+
+    def _open(self, index: QModelIndex) -> None:
+        row = self._model.row_at(index)
+        if row is not None:
+            self.opened.emit(self._model.key_of(row))
+
+    def _sort(self, section: int) -> None:
+        column = self.columns[section]
+        if column.key is None:
+            return
+        same = self.order.column is column
+        self.order = Order(column, not self.order.falling if same else column.figures)
+        self.horizontalHeader().viewport().update()
+        self.order_changed.emit()

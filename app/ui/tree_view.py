@@ -1,0 +1,186 @@
+"""How the inspector's tree looks: key left, value right in mono, what changed with a bar and a tint that fade."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QMouseEvent, QPainter, QPen
+from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem, QTreeView
+
+from app.ui.icons import paint_icon
+from app.ui.theme import Theme
+from app.ui.tree import NODE_ROLE, Node, TreeModel, words_of
+
+Index = QModelIndex | QPersistentModelIndex
+INDENT, LEFT_EDGE, CHEVRON, VALUE_EDGE = 14, 8, 14, 10
+BAR = 3
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+
+
+def mixed(under: QColor, over: QColor, share: float) -> QColor:
+    """``share`` (0 to 1) of ``over`` upon ``under``."""
+    keep = 1.0 - share
+    return QColor.fromRgbF(
+        under.redF() * keep + over.redF() * share,
+        under.greenF() * keep + over.greenF() * share,
+        under.blueF() * keep + over.blueF() * share,
+    )
+
+
+class _Height(QStyledItemDelegate):
+    """Rows of one height; everything else is painted by the view."""
+
+    def __init__(self, view: TreeView) -> None:
+        super().__init__(view)
+        self._view = view
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
+        return QSize(80, self._view.row_height)
+
+
+class TreeView(QTreeView):
+    """The tree of one message."""
+
+    def __init__(self, theme: Theme, model: TreeModel, clock: Callable[[], float] = time.monotonic) -> None:
+        """Show ``model``; ``clock`` is that of the changes' times."""
+        super().__init__()
+        self.theme = theme
+        self._clock = clock
+        self._tree = model
+        self.row_height = theme.size("row", "tree")
+        self._keyboard = False
+        self.setModel(model)
+        self.setItemDelegate(_Height(self))
+        self.setHeaderHidden(True)
+        self.setUniformRowHeights(True)
+        self.setIndentation(INDENT)
+        self.setRootIsDecorated(True)
+        self.setVerticalScrollMode(QTreeView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setEditTriggers(QTreeView.EditTrigger.NoEditTriggers)
+        self.setExpandsOnDoubleClick(False)
+        self.setMouseTracking(True)
+
+    def share_changed(self, node: Node) -> float:
+        """How strongly a node is marked now: 1 just changed, 0 long ago."""
+        if node.changed_s is None:
+            return 0.0
+        fade_s = self.theme.duration("changedFade") / 1000
+        age = self._clock() - node.changed_s
+        if fade_s <= 0:  # reduced motion: no fade, shown for a second
+            return 1.0 if age < 1.0 else 0.0
+        return max(0.0, 1.0 - age / fade_s)
+
+    def fading(self) -> bool:
+        """Whether any mark may still be fading: then the view wants to be painted again."""
+        changed = self._tree.changed_at_s
+        return changed is not None and self._clock() - changed < 1.2
+
+    def drawBranches(self, painter: QPainter, rect: QRect, index: Index) -> None:
+        return
+
+    def drawRow(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        node = index.data(NODE_ROLE)
+        if not isinstance(node, Node):
+            return
+        rect = QRect(option.rect)
+        rect.setLeft(0)
+        chosen = index == self.currentIndex()
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        ground = self.theme.colour("selected" if chosen else "panel")
+        if chosen:
+            painter.fillRect(rect, ground)
+        share = self.share_changed(node)
+        if share > 0:
+            painter.fillRect(QRect(0, rect.top() + 4, BAR, rect.height() - 8), self._bar(ground, share))
+        key_end = self._paint_key(painter, rect, node, chosen=chosen)
+        if not node.is_container:
+            self._paint_value(painter, rect, node, key_end, ground, share)
+        if chosen and self._keyboard and self.hasFocus():
+            painter.setPen(QPen(self.theme.colour("focus"), 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(QRectF(rect).adjusted(1, 1, -1, -1), 4, 4)
+        painter.restore()
+
+    def _bar(self, ground: QColor, share: float) -> QColor:
+        return mixed(ground, self.theme.colour("changed"), share)
+
+    def _paint_key(self, painter: QPainter, rect: QRect, node: Node, *, chosen: bool) -> float:
+        theme = self.theme
+        left = LEFT_EDGE + node.depth * INDENT
+        if node.is_container and self._tree.hasChildren(self._tree.index_of(node)):
+            name = "chevron-down" if self.isExpanded(self._tree.index_of(node)) else "chevron-right"
+            box = QRectF(left, rect.center().y() - CHEVRON / 2 + 0.5, CHEVRON, CHEVRON)
+            paint_icon(painter, box, name, theme.colour("textSecondary"))
+        font = theme.font("code")
+        metrics = QFontMetricsF(font)
+        x = float(left + CHEVRON + 4)
+        room = rect.width() - x - VALUE_EDGE
+        key = metrics.elidedText(str(node.key), Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
+        painter.setFont(font)
+        painter.setPen(theme.colour("selectedText" if chosen else "text"))
+        width = metrics.horizontalAdvance(key)
+        painter.drawText(QRectF(x, rect.top(), width + 2, rect.height()), LEFT, key)
+        x += width
+        if node.is_container:
+            count = words_of(node.value)
+            painter.setPen(theme.colour("accentText" if chosen else "textTertiary"))
+            painter.drawText(QRectF(x + 7, rect.top(), 90, rect.height()), LEFT, count)
+        return x
+
+    def _paint_value(
+        self, painter: QPainter, rect: QRect, node: Node, key_end: float, ground: QColor, share: float
+    ) -> None:
+        theme = self.theme
+        metrics = QFontMetricsF(theme.font("code"))
+        right = rect.right() - VALUE_EDGE - 5
+        room = max(30.0, right - key_end - 16)
+        text = metrics.elidedText(words_of(node.value), Qt.TextElideMode.ElideRight, room)
+        width = metrics.horizontalAdvance(text)
+        colour = theme.colour(_role(node.value))
+        if share > 0:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(mixed(ground, theme.colour("changedTint"), share))
+            painter.drawRoundedRect(
+                QRectF(right - width - 5, rect.top() + 3, width + 10, rect.height() - 6), 4, 4
+            )
+            colour = mixed(colour, theme.colour("changed"), share)
+        painter.setFont(theme.font("code"))
+        painter.setPen(colour)
+        painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._keyboard = False
+        index = self.indexAt(event.position().toPoint())
+        node = index.data(NODE_ROLE) if index.isValid() else None
+        if isinstance(node, Node) and event.button() == Qt.MouseButton.LeftButton:
+            self.setCurrentIndex(index)
+            self.setFocus(Qt.FocusReason.MouseFocusReason)
+            if node.is_container and _on_chevron(event.position(), node):
+                self.setExpanded(index, not self.isExpanded(index))
+            return
+        super().mousePressEvent(event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        index = self.indexAt(event.position().toPoint())
+        node = index.data(NODE_ROLE) if index.isValid() else None
+        if isinstance(node, Node) and node.is_container and not _on_chevron(event.position(), node):
+            self.setExpanded(index, not self.isExpanded(index))
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        self._keyboard = event.reason() != Qt.FocusReason.MouseFocusReason
+        super().focusInEvent(event)
+
+
+def _on_chevron(position: QPointF, node: Node) -> bool:
+    left = LEFT_EDGE + node.depth * INDENT
+    return left - 4 <= position.x() <= left + CHEVRON + 4
+
+
+def _role(value: object) -> str:
+    if isinstance(value, str):
+        return "ok"
+    return "textTertiary" if value is None else "text"
