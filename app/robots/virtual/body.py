@@ -1,0 +1,218 @@
+"""The virtual robot's body in its room: what it is asked to do, stepped in time; no clock, no threads."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+from app.robots.virtual.motion import Joint, Motion, Wave
+from app.robots.virtual.room import Room
+
+RADIUS = 0.27
+EYE_HEIGHT = 1.12
+START = (-0.5, 0.0, 0.0)
+START_PITCH = 8.0
+EYES = "#35b0fa"
+SHOULDERS = "#3ab5ff"
+FULL_RANGE = 5.0
+_SECONDS_PER_LETTER = 0.06
+_SHORTEST_SPEECH_S = 0.6
+_LONGEST_STEP_S = 0.02
+_DRAIN_PER_S = 1 / 180  # % of the battery, standing
+_DRAIN_MOVING_PER_S = 1 / 60
+
+
+@dataclass(frozen=True)
+class Happening:
+    """Something that the body noticed: an event of the robot's description and its data."""
+
+    event: str
+    data: dict[str, object]
+
+
+@dataclass
+class Speech:
+    """Words being spoken; ``done`` when the last one is out."""
+
+    text: str
+    seconds: float
+    spoken_s: float = 0.0
+    done: bool = False
+
+    @classmethod
+    def of(cls, text: str, speed_percent: float = 100.0) -> Speech:
+        """As long as its letters take."""
+        return cls(text, max(_SHORTEST_SPEECH_S, len(text) * _SECONDS_PER_LETTER) * 100.0 / speed_percent)
+
+    @property
+    def word(self) -> str:
+        """The word that is being spoken now."""
+        words = self.text.split()
+        place = int(len(words) * min(0.999, self.spoken_s / self.seconds))
+        return words[place] if words else ""
+
+
+@dataclass
+class Body:
+    """Where everything is now. The owner holds a lock around every call."""
+
+    room: Room = field(default_factory=Room)
+    x: float = START[0]
+    y: float = START[1]
+    theta_deg: float = START[2]
+    head_yaw: Joint = field(default_factory=lambda: Joint(120.0, -119.0, 119.0))
+    head_pitch: Joint = field(default_factory=lambda: Joint(90.0, -40.0, 36.0, START_PITCH, START_PITCH))
+    arms: dict[str, Joint] = field(
+        default_factory=lambda: {side: Joint(200.0, 0.0, 180.0) for side in ("left", "right")}
+    )
+    elbows: dict[str, Joint] = field(
+        default_factory=lambda: {side: Joint(220.0, 0.0, 90.0) for side in ("left", "right")}
+    )
+    eyes: str = EYES
+    shoulders: str = SHOULDERS
+    emotion: str = "neutral"
+    battery: float = 84.4
+    touched: set[str] = field(default_factory=set)
+    heard: str = ""
+    happenings: deque[Happening] = field(default_factory=lambda: deque(maxlen=200))
+    _base: Motion | None = field(default=None, repr=False)
+    _turning: bool = field(default=False, repr=False)
+    _speech: Speech | None = field(default=None, repr=False)
+    _waves: list[Wave] = field(default_factory=list, repr=False)
+
+    # ---- what it is asked to do -------------------------------------------------------------------
+
+    def walk(self, distance: float, speed: float) -> Motion:
+        """Start to walk straight, backwards when negative."""
+        return self._start(Motion.walk(distance, speed), turning=False)
+
+    def turn(self, angle_deg: float, speed_deg: float) -> Motion:
+        """Start to turn on the spot, to the left when positive."""
+        return self._start(Motion.turn(angle_deg, speed_deg), turning=True)
+
+    def _start(self, motion: Motion, *, turning: bool) -> Motion:
+        if self._base is not None:
+            self._base.block()
+        self._base, self._turning = motion, turning
+        return motion
+
+    def say(self, text: str, speed_percent: float = 100.0) -> Speech:
+        """Start to speak; what was being said ends."""
+        self.hush()
+        self._speech = Speech.of(text, speed_percent)
+        return self._speech
+
+    def hush(self) -> None:
+        """Say nothing more."""
+        if self._speech is not None:
+            self._speech.done = True
+            self._speech = None
+
+    def wave(self, side: str) -> Wave:
+        """Start to wave with the left or right hand."""
+        made = Wave(self.arms[side], self.elbows[side])
+        self._waves.append(made)
+        return made
+
+    def stand(self) -> None:
+        """Let the arms hang and look straight ahead."""
+        for joint in (*self.arms.values(), *self.elbows.values(), self.head_yaw):
+            joint.aim(0.0)
+        self.head_pitch.aim(START_PITCH)
+
+    def halt(self) -> None:
+        """Brake and be quiet: the base brakes in the next steps, all else holds at once."""
+        if self._base is not None:
+            self._base.halt()
+        for wave in self._waves:
+            wave.halt()
+        for joint in self._joints():
+            joint.hold()
+        self.hush()
+        self.emotion = "neutral"
+
+    @property
+    def speech(self) -> str | None:
+        """The words in the bubble."""
+        return None if self._speech is None else self._speech.text
+
+    @property
+    def rolling(self) -> bool:
+        """True while the base moves."""
+        return self._base is not None and not self._base.done
+
+    @property
+    def still(self) -> bool:
+        """True when nothing at all moves."""
+        return not self.rolling and not self._waves and all(joint.arrived for joint in self._joints())
+
+    @property
+    def distance(self) -> float:
+        """From the rim of the base to what is ahead, at most 5 m."""
+        ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
+        return min(FULL_RANGE, max(0.0, ahead))
+
+    # ---- what people do to it ---------------------------------------------------------------------
+
+    def touch(self, place: str, *, down: bool) -> None:
+        """A hand on the head or on a hand, or away again."""
+        if down and place not in self.touched:
+            self.touched.add(place)
+            self.happenings.append(Happening("touched", {"place": place}))
+        elif not down and place in self.touched:
+            self.touched.discard(place)
+            self.happenings.append(Happening("released", {"place": place}))
+
+    def hear(self, word: str) -> None:
+        """Somebody said something."""
+        self.heard = word
+        self.happenings.append(Happening("heard", {"word": word}))
+
+    # ---- time -------------------------------------------------------------------------------------
+
+    def step(self, seconds: float) -> None:
+        """Let time pass, in small steps so that nothing is walked through."""
+        while seconds > 1e-9:
+            dt = min(seconds, _LONGEST_STEP_S)
+            seconds -= dt
+            self._step(dt)
+
+    def _step(self, dt: float) -> None:
+        if self._base is not None:
+            self._roll(self._base, dt)
+        for wave in self._waves:
+            wave.step()
+        self._waves = [wave for wave in self._waves if not wave.done]
+        for joint in self._joints():
+            joint.step(dt)
+        if self._speech is not None:
+            self._speech.spoken_s += dt
+            if self._speech.spoken_s >= self._speech.seconds:
+                self.hush()
+        self.battery = max(0.0, self.battery - dt * (_DRAIN_PER_S if self.still else _DRAIN_MOVING_PER_S))
+
+    def _roll(self, motion: Motion, dt: float) -> None:
+        way = motion.step(dt)
+        if self._turning:
+            self.theta_deg = _wrapped(self.theta_deg + way)
+        elif way:
+            x = self.x + way * math.cos(math.radians(self.theta_deg))
+            y = self.y + way * math.sin(math.radians(self.theta_deg))
+            if self.room.free(x, y, RADIUS):
+                self.x, self.y = x, y
+                self.room = self.room.pushed_ball(x, y, RADIUS)
+            else:
+                motion.moved -= way
+                motion.block()
+                self.happenings.append(Happening("bumped", {"side": "front" if way > 0 else "back"}))
+        if motion.done:
+            self._base = None
+
+    def _joints(self) -> tuple[Joint, ...]:
+        return (self.head_yaw, self.head_pitch, *self.arms.values(), *self.elbows.values())
+
+
+def _wrapped(angle_deg: float) -> float:
+    """The same direction between -180 and 180."""
+    return (angle_deg + 180.0) % 360.0 - 180.0

@@ -1,0 +1,105 @@
+"""Painting pictures on parallelograms in the room, as the camera sees them, with OpenCV."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.robots.virtual.lens import Lens, Matrix
+
+Picture: TypeAlias = NDArray[np.uint8]
+_SHIFT = 4  # fractional bits of polygon corners
+
+
+class Texture:
+    """A picture (height, width, 3 or 4: BGR and alpha, not multiplied in), with smaller copies of itself."""
+
+    def __init__(self, picture: Picture) -> None:
+        self.has_alpha = picture.shape[2] == 4
+        if self.has_alpha:
+            picture = _multiplied(picture)
+        self.levels = [picture]
+        while min(picture.shape[:2]) > 8 and len(self.levels) < 6:
+            size = (max(1, picture.shape[1] // 2), max(1, picture.shape[0] // 2))
+            picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+            self.levels.append(picture)
+
+    def level_for(self, shrink: float) -> Picture:
+        """The copy to sample when `shrink` texels of the full picture fall on one pixel."""
+        level = round(np.log2(max(1.0, shrink)))
+        return self.levels[min(int(level), len(self.levels) - 1)]
+
+
+def _multiplied(picture: Picture) -> Picture:
+    alpha = picture[:, :, 3:].astype(np.uint16)
+    colour = (picture[:, :, :3].astype(np.uint16) * alpha + 127) // 255
+    return np.concatenate([colour, alpha], axis=2).astype(np.uint8)
+
+
+class Canvas:
+    """One picture in the making, painted from far to near."""
+
+    def __init__(self, lens: Lens) -> None:
+        self.lens = lens
+        self.picture: Picture = np.zeros((lens.height, lens.width, 3), dtype=np.uint8)
+
+    def fill(self, points: Matrix, colour: tuple[int, int, int]) -> None:
+        """A polygon of the room in one colour."""
+        outline = self.lens.outline(points)
+        if len(outline) >= 3:
+            cv2.fillConvexPoly(self.picture, _fixed(outline), colour, cv2.LINE_AA, _SHIFT)
+
+    def put(
+        self, texture: Texture, corner: Sequence[float], across: Sequence[float], along: Sequence[float]
+    ) -> None:
+        """A texture on a parallelogram: `corner` is its upper left, `across` and `along` its sides, in metres."""
+        start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, across, along))
+        outline = self.lens.outline(np.stack([start, start + right, start + right + down, start + down]))
+        box = self._box(outline)
+        if box is None:
+            return
+        x0, y0, x1, y1 = box
+        area = max(1.0, abs(float(cv2.contourArea(outline.astype(np.float32)))))
+        full = texture.levels[0].shape
+        level = texture.level_for(float(np.sqrt(full[0] * full[1] / area)))
+        matrix = self.lens.texture_to_pixels(start, right, down, (level.shape[1], level.shape[0]))
+        matrix = np.array([[1, 0, -x0], [0, 1, -y0], [0, 0, 1]], dtype=np.float64) @ matrix
+        if abs(np.linalg.det(matrix)) < 1e-9:
+            return
+        mode = cv2.BORDER_CONSTANT if texture.has_alpha else cv2.BORDER_REPLICATE
+        warped = cv2.warpPerspective(
+            level, matrix, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR, borderMode=mode
+        )
+        target = self.picture[y0:y1, x0:x1]
+        mask = np.zeros(target.shape[:2], dtype=np.uint8)
+        cv2.fillConvexPoly(mask, _fixed(outline - (x0, y0)), 255, cv2.LINE_8, _SHIFT)
+        if texture.has_alpha:
+            _blend(target, np.asarray(cv2.copyTo(warped, mask), dtype=np.uint8))
+        else:
+            cv2.copyTo(warped, mask, target)
+
+    def _box(self, outline: Matrix) -> tuple[int, int, int, int] | None:
+        """The part of the picture that an outline can touch."""
+        if len(outline) < 3:
+            return None
+        low, high = np.floor(outline.min(axis=0)), np.ceil(outline.max(axis=0)) + 1
+        x0, y0 = max(0, int(max(low[0], 0))), max(0, int(max(low[1], 0)))
+        x1, y1 = int(min(high[0], self.lens.width)), int(min(high[1], self.lens.height))
+        return (x0, y0, x1, y1) if x1 > x0 and y1 > y0 else None
+
+
+def _blend(target: Picture, over: Picture) -> None:
+    """Lay a picture with multiplied alpha over the target, in place."""
+    through = cv2.merge([255 - over[:, :, 3]] * 3)
+    under = cv2.multiply(target, through, scale=1 / 255)
+    cv2.add(under, over[:, :, :3], dst=target)
+
+
+def _fixed(outline: Matrix) -> NDArray[np.int32]:
+    # Far outside is cut: OpenCV counts in 16.16 bits, and the near plane keeps real corners below this.
+    limited = np.clip(outline, -32000.0, 32000.0)
+    return np.round(limited * (1 << _SHIFT)).astype(np.int32)

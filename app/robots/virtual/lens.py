@@ -1,0 +1,75 @@
+"""The pinhole of the virtual camera: points in the room to pixels in the picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix: TypeAlias = NDArray[np.float64]
+NEAR = 0.06
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A camera at `place` (m) that looks along `yaw_deg` (left positive) and `pitch_deg` (down positive)."""
+
+    place: tuple[float, float, float]
+    yaw_deg: float
+    pitch_deg: float
+    width: int = 320
+    height: int = 240
+    hfov_deg: float = 56.3
+
+    @property
+    def focal(self) -> float:
+        """Pixels per unit of x/z."""
+        return self.width / 2 / math.tan(math.radians(self.hfov_deg / 2))
+
+    def rotation(self) -> Matrix:
+        """Rows right, down, forward: room directions to camera directions."""
+        yaw, up = math.radians(self.yaw_deg), math.radians(-self.pitch_deg)
+        forward = np.array([math.cos(yaw) * math.cos(up), math.sin(yaw) * math.cos(up), math.sin(up)])
+        right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
+        return np.stack([right, np.cross(forward, right), forward])
+
+    def to_camera(self, points: Matrix) -> Matrix:
+        """Points (n, 3) of the room seen from the camera: right, down, forward in metres."""
+        seen: Matrix = (points - np.asarray(self.place)) @ self.rotation().T
+        return seen
+
+    def to_pixels(self, seen: Matrix) -> Matrix:
+        """Camera points (n, 3), all in front of it, to pixels (n, 2)."""
+        scale = self.focal / seen[:, 2]
+        return np.stack([seen[:, 0] * scale + self.width / 2, seen[:, 1] * scale + self.height / 2], axis=1)
+
+    def outline(self, points: Matrix) -> Matrix:
+        """The pixels (n, 2) of a flat polygon's part in front of the camera; n is 0 when it is behind."""
+        clipped = _clipped(self.to_camera(points))
+        return self.to_pixels(clipped) if len(clipped) else np.empty((0, 2))
+
+    def texture_to_pixels(
+        self, corner: Matrix, across: Matrix, along: Matrix, size: tuple[int, int]
+    ) -> Matrix:
+        """The homography from a texture (width, height) on a parallelogram in the room to the picture."""
+        rotation = self.rotation()
+        columns = [across / size[0], along / size[1], corner - np.asarray(self.place)]
+        seen = rotation @ np.stack(columns, axis=1)
+        half = np.array([[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]])
+        made: Matrix = half @ seen
+        return made
+
+
+def _clipped(seen: Matrix) -> Matrix:
+    """The part of a polygon in front of the camera."""
+    kept = []
+    for here, there in zip(seen, np.roll(seen, -1, axis=0), strict=True):
+        if here[2] >= NEAR:
+            kept.append(here)
+        if (here[2] >= NEAR) != (there[2] >= NEAR):
+            part = (NEAR - here[2]) / (there[2] - here[2])
+            kept.append(here + part * (there - here))
+    return np.array(kept) if kept else np.empty((0, 3))

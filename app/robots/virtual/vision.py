@@ -1,0 +1,125 @@
+"""What the virtual robot recognises in its picture: the ball by its colour, markers by OpenCV, faces.
+
+The face is where the camera's geometry puts it, not searched for in the pixels: a cascade costs a third of a
+core. It counts only when most of it is in the picture and nothing stands before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from app.robots.virtual.camera import looking_across
+from app.robots.virtual.canvas import Picture
+from app.robots.virtual.lens import NEAR, Lens
+from app.robots.virtual.room import Person, Room
+
+_SMALLEST_BALL = 24  # pixels of area
+_SMALLEST_FACE = 8  # pixels across
+_ENOUGH_OF_A_FACE = 0.6
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Something recognised: its name, how sure (0 to 1), and its box x, y, width, height in pixels."""
+
+    name: str
+    confidence: float
+    box: tuple[int, int, int, int]
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """The middle of its box."""
+        x, y, width, height = self.box
+        return x + width / 2, y + height / 2
+
+
+def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
+    """Detections as they are published; ``name`` is that of the largest, or null."""
+    listed = sorted(found, key=lambda one: -one.box[2] * one.box[3])
+    return {
+        "count": len(listed),
+        "name": listed[0].name if listed else None,
+        "width": lens.width,
+        "height": lens.height,
+        "items": [
+            {"name": one.name, "confidence": round(one.confidence, 2), "box": list(one.box)} for one in listed
+        ],
+    }
+
+
+class Eyes:
+    """Looks at pictures; keeps only what OpenCV needs."""
+
+    def __init__(self) -> None:
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+        self._markers = cv2.aruco.ArucoDetector(dictionary)
+
+    def balls(self, picture: Picture) -> list[Detection]:
+        """Round red things."""
+        hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
+        red = cv2.inRange(hsv, (0, 135, 60), (7, 255, 255)) | cv2.inRange(
+            hsv, (171, 135, 60), (180, 255, 255)
+        )
+        red = cv2.morphologyEx(red, cv2.MORPH_CLOSE, np.ones((5, 5), dtype=np.uint8))
+        count, _, stats, _ = cv2.connectedComponentsWithStats(red)
+        found = []
+        for x, y, width, height, area in stats[1:count].tolist():
+            roundness = area / (np.pi / 4 * max(width, height) ** 2)
+            if area >= _SMALLEST_BALL and roundness > 0.72:
+                found.append(Detection("ball", min(0.99, roundness), (x, y, width, height)))
+        return found
+
+    def markers(self, picture: Picture) -> list[Detection]:
+        """ArUco cards of the dictionary 4x4, 50."""
+        corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+        if ids is None:
+            return []
+        return [
+            Detection(f"marker {number}", 1.0, _box_of(outline[0]))
+            for outline, number in zip(corners, np.asarray(ids).ravel().tolist(), strict=True)
+        ]
+
+    def faces(self, room: Room, lens: Lens) -> list[Detection]:
+        """People who look at the camera."""
+        found = _face(room, room.person, lens)
+        return [] if found is None else [found]
+
+
+def _face(room: Room, person: Person, lens: Lens) -> Detection | None:
+    middle = np.array([person.x, person.y, person.face_z])
+    half_across = looking_across(lens, person.x, person.y) * person.face_width / 2
+    half_down = np.array([0.0, 0.0, person.face_height / 2])
+    corners = np.array([middle + a * half_across + d * half_down for a in (-1, 1) for d in (-1, 1)])
+    seen = lens.to_camera(corners)
+    if seen[:, 2].min() < NEAR or room.hidden(lens.place, (person.x, person.y, person.face_z)):
+        return None
+    pixels = lens.to_pixels(seen)
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    inside_low = np.maximum(low, 0.0)
+    inside_high = np.minimum(high, (lens.width, lens.height))
+    if (inside_high <= inside_low).any() or high[0] - low[0] < _SMALLEST_FACE:
+        return None
+    part = float(np.prod(inside_high - inside_low) / np.prod(high - low))
+    if part < _ENOUGH_OF_A_FACE:
+        return None
+    sure = part * min(1.0, 0.7 + 0.009 * float(high[0] - low[0]))
+    return Detection(person.name, min(0.99, sure), _box_of(np.stack([inside_low, inside_high])))
+
+
+def _box_of(points: ArrayLike) -> tuple[int, int, int, int]:
+    array = np.asarray(points, dtype=np.float64)
+    low, high = array.min(axis=0), array.max(axis=0)
+    x, y = int(low[0]), int(low[1])
+    return x, y, int(np.ceil(high[0])) - x, int(np.ceil(high[1])) - y
+
+
+def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
+    """How far the head must turn to have a pixel in the middle: degrees to the left, degrees down."""
+    left = -np.degrees(np.arctan2(pixel[0] - lens.width / 2, lens.focal))
+    down = np.degrees(np.arctan2(pixel[1] - lens.height / 2, lens.focal))
+    return float(left), float(down)
