@@ -1,0 +1,117 @@
+"""The form on the wire of what nodes and the master say. Pure functions; the specification is `docs/wire.md`.
+
+A body is one msgpack map. Requests carry `do` (what is asked) and `call` (a number that the reply repeats as
+`re`); replies and pushes carry `is`; `what` holds the fields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from nep.errors import WireError
+from nep.packing import pack, unpack
+from nep.plain import read, write
+from nep.requests import (
+    Added,
+    AddPublisher,
+    AddSubscriber,
+    Done,
+    Found,
+    Join,
+    Leave,
+    Look,
+    Ping,
+    Probe,
+    PublisherCame,
+    PublisherGone,
+    Push,
+    Refused,
+    RemovePublisher,
+    RemoveSubscriber,
+    Renew,
+    Renewed,
+    Reply,
+    ReportMissing,
+    Request,
+    Seen,
+)
+
+_REQUESTS: Mapping[str, type[Request]] = {
+    "join": Join,
+    "publisher+": AddPublisher,
+    "subscriber+": AddSubscriber,
+    "publisher-": RemovePublisher,
+    "subscriber-": RemoveSubscriber,
+    "leave": Leave,
+    "renew": Renew,
+    "missing": ReportMissing,
+    "look": Look,
+    "ping": Ping,
+}
+_ANSWERS: Mapping[str, type[Reply | Push]] = {
+    "done": Done,
+    "added": Added,
+    "found": Found,
+    "renewed": Renewed,
+    "seen": Seen,
+    "refused": Refused,
+    "publisher+": PublisherCame,
+    "publisher-": PublisherGone,
+    "probe": Probe,
+}
+_REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
+_ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
+
+
+class Asked(NamedTuple):
+    """A request as it came in: the number to repeat, and the request or the sentence why it is none."""
+
+    call: int
+    request: Request | str
+
+
+def encode_request(request: Request, call: int) -> bytes:
+    """The body of a request."""
+    return pack({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
+
+
+def decode_request(body: bytes) -> Asked:
+    """The request in a body; never raises, so that every sender gets an answer."""
+    call = 0
+    try:
+        envelope = _envelope(body)
+        number = envelope.get("call", 0)
+        call = number if isinstance(number, int) else 0
+        name = envelope.get("do")
+        kind = _REQUESTS.get(name) if isinstance(name, str) else None
+        if kind is None:
+            raise WireError(f"'{name}' is no request of this version")
+        return Asked(call, read(kind, envelope.get("what", {})))
+    except WireError as error:
+        return Asked(call, error.reason)
+
+
+def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
+    """The body of a reply to `call`, or of a push."""
+    return pack({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
+
+
+def decode_answer(body: bytes) -> tuple[int, Reply | Push]:
+    """(call, answer) in a body; call is 0 for a push. Raises `WireError`."""
+    envelope = _envelope(body)
+    name, call = envelope.get("is"), envelope.get("re", 0)
+    kind = _ANSWERS.get(name) if isinstance(name, str) else None
+    if kind is None or not isinstance(call, int):
+        raise WireError(f"'{name}' is no answer of this version")
+    return call, read(kind, envelope.get("what", {}))
+
+
+def _envelope(body: bytes) -> Mapping[str, object]:
+    try:
+        value = unpack(body)
+    except ValueError as error:
+        raise WireError(f"the body is no msgpack: {error}", len(body)) from error
+    if not isinstance(value, dict):
+        raise WireError("the body is no map", len(body))
+    return value

@@ -1,0 +1,150 @@
+"""Codecs: bytes ↔ payload. A codec is chosen by its name, on the wire by its number.
+
+| name    | number | payload                                                                  |
+|---------|--------|--------------------------------------------------------------------------|
+| json    | 1      | what JSON has; also numpy arrays and scalars, dataclasses, date and time |
+| string  | 2      | `str`, as UTF-8                                                          |
+| bytes   | 3      | `bytes`                                                                  |
+| msgpack | 4      | what msgpack has, bytes included; numpy as lists                         |
+| image   | 5      | a picture: `uint8` array (height, width, 3) in BGR order, see `nep.images` |
+
+JSON has no NaN and no infinity: they are sent as `null`. Keys that are numbers become strings.
+Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import orjson
+
+from nep import images
+from nep.encoded import Encoded
+from nep.errors import DecodeError, EncodeError, did_you_mean
+from nep.packing import pack, unpack
+
+__all__ = ["CODECS", "Codec", "Encoded", "codec", "codec_for", "codec_numbered"]
+
+
+@dataclass(frozen=True)
+class Codec:
+    """One way to turn payloads into bytes and back.
+
+    `encode` raises `EncodeError`, `decode` raises `DecodeError`; `empty` makes what `listen()` hands out
+    when nothing came; `number` goes into the message's header.
+    """
+
+    name: str
+    number: int
+    encode: Callable[[object], Encoded]
+    decode: Callable[[memoryview, Mapping[str, object]], object]
+    empty: Callable[[], object]
+
+
+def _plain(value: object) -> object:
+    """What neither orjson nor msgpack know: things with `tolist()` (numpy), sets are refused by name."""
+    to_list = getattr(value, "tolist", None)
+    if callable(to_list):
+        return to_list()
+    raise TypeError(f"'{type(value).__name__}' has no form in it")
+
+
+def _encode_json(payload: object) -> Encoded:
+    try:
+        return Encoded(orjson.dumps(payload, _plain, orjson.OPT_SERIALIZE_NUMPY))
+    except TypeError:
+        pass  # number keys need the slower way; everything else fails again with its reason
+    try:
+        return Encoded(orjson.dumps(payload, _plain, orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS))
+    except (TypeError, RecursionError) as error:
+        reason = str(error.__cause__ or error) or "it does not fit"
+        raise EncodeError("json", type(payload).__name__, reason) from error
+
+
+def _decode_json(data: memoryview, _extension: Mapping[str, object]) -> object:
+    try:
+        return orjson.loads(data)
+    except orjson.JSONDecodeError as first:
+        # The original NEP's 0.5.4.8 sends bare NaN, which only Python's own reader takes.
+        try:
+            return json.loads(bytes(data))
+        except (ValueError, RecursionError):
+            raise DecodeError("json", data.nbytes, str(first)) from first
+
+
+def _encode_string(payload: object) -> Encoded:
+    if not isinstance(payload, str):
+        raise EncodeError("string", type(payload).__name__, "publish a 'str', or use the type 'json'")
+    try:
+        return Encoded(payload.encode("utf-8"))
+    except UnicodeEncodeError as error:
+        raise EncodeError("string", "str", "it holds half of a surrogate pair") from error
+
+
+def _decode_string(data: memoryview, _extension: Mapping[str, object]) -> object:
+    try:
+        return str(data, "utf-8")
+    except UnicodeDecodeError as error:
+        raise DecodeError("string", data.nbytes, f"byte {error.start} is no UTF-8") from error
+
+
+def _encode_bytes(payload: object) -> Encoded:
+    if isinstance(payload, bytes):
+        return Encoded(payload)
+    if isinstance(payload, bytearray | memoryview):
+        return Encoded(bytes(payload))
+    raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")
+
+
+def _decode_bytes(data: memoryview, _extension: Mapping[str, object]) -> object:
+    return bytes(data)
+
+
+def _encode_msgpack(payload: object) -> Encoded:
+    try:
+        return Encoded(pack(payload, _plain))
+    except ValueError as error:
+        raise EncodeError("msgpack", type(payload).__name__, str(error)) from error
+
+
+def _decode_msgpack(data: memoryview, _extension: Mapping[str, object]) -> object:
+    try:
+        return unpack(data)
+    except ValueError as error:
+        raise DecodeError("msgpack", data.nbytes, str(error)) from error
+
+
+def _none() -> object:
+    return None
+
+
+JSON = Codec("json", 1, _encode_json, _decode_json, dict)
+STRING = Codec("string", 2, _encode_string, _decode_string, str)
+BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes)
+MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict)
+IMAGE = Codec("image", 5, images.encode, images.decode, _none)
+
+CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}
+_NUMBERED = {each.number: each for each in CODECS.values()}
+# What the original NEP calls by another name.
+_ALIASES = {"images": IMAGE, "dictionary": JSON, "dict": JSON}
+
+
+def codec(name: str) -> Codec:
+    """The codec of this name. Raises `DecodeError` for a name there is not."""
+    try:
+        return CODECS[name]
+    except KeyError:
+        raise DecodeError(name, 0, f"no such codec; {did_you_mean(name, tuple(CODECS))}") from None
+
+
+def codec_numbered(number: int) -> Codec | None:
+    """The codec of a header's number, None when this version of nep does not have it."""
+    return _NUMBERED.get(number)
+
+
+def codec_for(msg_type: str) -> Codec:
+    """The codec that carries a message type: the one of the same name, json for any other type."""
+    return CODECS.get(msg_type) or _ALIASES.get(msg_type, JSON)

@@ -1,0 +1,173 @@
+"""The errors of nep. Attributes first; the sentence is made from them.
+
+    NepError
+    ├── WaitTimeoutError        nothing came within a time limit
+    ├── ClosedError             the object was closed before
+    ├── BadTopicError           a topic name that the grammar refuses
+    ├── UnknownBackendError     no back end has this name
+    ├── BackendUnavailableError the back end's package is not installed
+    ├── PluginsMissingError     a plug-in package is empty (a frozen build that forgot it)
+    ├── MasterUnreachable       no master answers
+    ├── RequestRefusedError     the master answered with an error
+    ├── AddressInUseError       another program holds the address
+    ├── EncodeError             a payload cannot become bytes
+    ├── DecodeError             bytes cannot become a payload
+    │   └── WireError               parts that are no message of the native wire
+    └── RecordingError          a recording cannot be written or read
+
+Every sentence is lower case, without full stop, with values in quotes and the next step after a semicolon.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+__all__ = [
+    "AddressInUseError",
+    "BackendUnavailableError",
+    "BadTopicError",
+    "ClosedError",
+    "DecodeError",
+    "EncodeError",
+    "MasterUnreachable",
+    "NepError",
+    "PluginsMissingError",
+    "RecordingError",
+    "RequestRefusedError",
+    "UnknownBackendError",
+    "WaitTimeoutError",
+    "WireError",
+    "did_you_mean",
+]
+
+
+def did_you_mean(word: str, known: Sequence[str]) -> str:
+    """`did you mean 'zeromq'?` for the nearest known word, else `known are 'a', 'b'`."""
+    near = get_close_matches(word, known, n=1)
+    if near:
+        return f"did you mean '{near[0]}'?"
+    return "known are " + ", ".join(f"'{name}'" for name in known)
+
+
+class NepError(Exception):
+    """The root of all errors that nep raises on purpose."""
+
+
+class WaitTimeoutError(NepError):
+    """`what` did not happen within `timeout_s` seconds."""
+
+    def __init__(self, what: str, timeout_s: float) -> None:
+        self.what = what
+        self.timeout_s = timeout_s
+        super().__init__(f"{what} did not come within {timeout_s:g} s")
+
+
+class ClosedError(NepError):
+    """The object `what` (such as "subscriber 'example'") was closed before."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        super().__init__(f"{what} is closed; make a new one")
+
+
+class BadTopicError(NepError, ValueError):
+    """`topic` breaks the grammar of topic names for `reason`."""
+
+    def __init__(self, topic: str, reason: str) -> None:
+        self.topic = topic
+        self.reason = reason
+        super().__init__(f"'{topic}' cannot be a topic; {reason}")
+
+
+class UnknownBackendError(NepError):
+    """No back end is called `name`; `known` are the names there are."""
+
+    def __init__(self, name: str, known: Sequence[str]) -> None:
+        self.name = name
+        self.known = tuple(known)
+        super().__init__(f"no back end '{name}'; {did_you_mean(name.lower(), self.known)}")
+
+
+class BackendUnavailableError(NepError):
+    """The back end `name` needs something that is not installed; `needs` says how to get it."""
+
+    def __init__(self, name: str, needs: str) -> None:
+        self.name = name
+        self.needs = needs
+        super().__init__(f"the back end '{name}' is not installed; {needs}")
+
+
+class PluginsMissingError(NepError):
+    """No module of `package` binds `attribute`: the package is empty or was not shipped."""
+
+    def __init__(self, package: str, attribute: str) -> None:
+        self.package = package
+        self.attribute = attribute
+        super().__init__(
+            f"no module of '{package}' binds '{attribute}'; "
+            "name the package to the tool that froze this program"
+        )
+
+
+class MasterUnreachable(NepError):  # noqa: N818 - the name that the specification of the wire gives it
+    """No master answered at `address` within `waited_s` seconds."""
+
+    def __init__(self, address: str, waited_s: float) -> None:
+        self.address = address
+        self.waited_s = waited_s
+        super().__init__(
+            f"no master answers at '{address}' (waited {waited_s:g} s); start one with 'nep master'",
+        )
+
+
+class RequestRefusedError(NepError):
+    """The master refused a request; `reason` is its sentence."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(reason)
+
+
+class AddressInUseError(NepError):
+    """`address` is held by another program, or is not an address of this computer."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        super().__init__(f"'{address}' is in use by another program; close it or choose another port")
+
+
+class EncodeError(NepError, ValueError):
+    """A payload of Python type `kind` cannot become `codec` bytes, for `reason`."""
+
+    def __init__(self, codec: str, kind: str, reason: str) -> None:
+        self.codec = codec
+        self.kind = kind
+        self.reason = reason
+        super().__init__(f"cannot encode a '{kind}' as '{codec}'; {reason}")
+
+
+class DecodeError(NepError, ValueError):
+    """`size_bytes` bytes are no `codec` payload, for `reason`."""
+
+    def __init__(self, codec: str, size_bytes: int, reason: str) -> None:
+        self.codec = codec
+        self.size_bytes = size_bytes
+        self.reason = reason
+        super().__init__(f"cannot decode {size_bytes} bytes as '{codec}'; {reason}")
+
+
+class WireError(DecodeError):
+    """Parts or a request that break the native wire, for `reason`."""
+
+    def __init__(self, reason: str, size_bytes: int = 0) -> None:
+        super().__init__("nep wire", size_bytes, reason)
+
+
+class RecordingError(NepError):
+    """The recording at `path` cannot be used, for `reason`."""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        self.reason = reason
+        super().__init__(f"cannot use the recording '{path}'; {reason}")

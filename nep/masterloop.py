@@ -1,0 +1,236 @@
+"""MasterLoop: the master's thread: its ROUTER socket, requests in, pushes and replies out."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import zmq
+
+from nep.addresses import endpoint_of
+from nep.bodies import Asked, decode_request, encode_answer
+from nep.errors import AddressInUseError, ClosedError, WaitTimeoutError
+from nep.graph import Graph, GraphView, Outgoing, without
+from nep.requests import Join, Refused, Reply, Request, node_of
+from nep.starting import Owner
+from nep.waker import Waker
+
+__all__ = ["MasterLoop"]
+
+_logger = logging.getLogger("nep.master")
+_TICK_S = 0.25
+
+
+class _Submission:
+    """A request from inside the process, and the reply to it."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.done = threading.Event()
+        self.reply: Reply | None = None
+
+
+class MasterLoop:
+    """The thread with all that only it touches. `listeners` are told of every new revision.
+
+    Raises `AddressInUseError` when `address` cannot be bound.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        graph: Graph,
+        listeners: Sequence[Callable[[GraphView], None]],
+        owner: Owner | None,
+    ) -> None:
+        self._graph = graph
+        self._listeners = listeners
+        self._owner = owner
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._router = self._context.socket(zmq.ROUTER)
+        self._waker = Waker()
+        self._submitted: deque[_Submission] = deque()
+        self._pending: dict[int, _Submission] = {}
+        self._calls = 0
+        self._is_open = False
+        self._closing = False
+        self._told_revision = graph.revision
+        self.ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
+        self._router.setsockopt(zmq.LINGER, 200)
+        self._router.setsockopt(zmq.ROUTER_MANDATORY, 1)  # an error instead of silence when a peer is gone
+        self._router.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a node that reconnects takes its name over
+        self._router.setsockopt(zmq.SNDHWM, 10_000)
+        try:
+            self._router.bind(endpoint_of(address))
+        except zmq.ZMQError as error:
+            self._release()
+            raise AddressInUseError(address) from error
+        self.address = self._router.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
+
+    # ---- from other threads
+
+    def start(self) -> None:
+        """Run the thread; only submissions are answered before `open`."""
+        self._thread.start()
+
+    def open(self) -> None:
+        """Answer everybody from now on."""
+        self._is_open = True
+        self._waker.wake()
+
+    def close(self) -> None:
+        """End the thread and give the address back."""
+        self._closing = True
+        self._waker.wake()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join(5.0)
+
+    def submit(self, request: Request, timeout_s: float) -> Reply:
+        """Carry out a request of this process. See `Master.submit`."""
+        submission = _Submission(request)
+        self._submitted.append(submission)
+        self._waker.wake()
+        if not submission.done.wait(timeout_s):
+            raise WaitTimeoutError("an answer of the master", timeout_s)
+        if submission.reply is None:
+            raise ClosedError(f"the master at '{self.address}'")
+        return submission.reply
+
+    # ---- in the master's thread
+
+    def _run(self) -> None:
+        poller = zmq.Poller()
+        poller.register(self._waker.fd, zmq.POLLIN)
+        tick_at = time.monotonic()
+        listening = False
+        try:
+            while not self._closing:
+                if self._is_open and not listening:
+                    poller.register(self._router, zmq.POLLIN)
+                    listening = True
+                poller.poll(self._until(tick_at))
+                self._waker.clear()
+                self._serve_submissions()
+                if listening:
+                    self._serve_router()
+                now = time.monotonic()
+                if now >= tick_at or self._is_due(now):
+                    tick_at = now + _TICK_S
+                    self._tick(now)
+                self._tell_listeners()
+        finally:
+            self.ended.set()
+            self._release()
+            for submission in (*self._submitted, *self._pending.values()):
+                submission.done.set()
+
+    def _until(self, tick_at: float) -> int:
+        due = self._graph.learning_end
+        at = tick_at if due is None else min(tick_at, due)
+        return max(0, int((at - time.monotonic()) * 1000) + 1)
+
+    def _is_due(self, now: float) -> bool:
+        due = self._graph.learning_end
+        return due is not None and now >= due
+
+    def _tick(self, now: float) -> None:
+        self._send(self._graph.tick(now))
+        self._send(self._graph.silent(now))
+        if self._owner is not None and self._owner.is_gone() and not self._is_needed():
+            self._closing = True
+
+    def _is_needed(self) -> bool:
+        """Whether a node of a process other than the owner and this one is registered."""
+        own = {os.getpid(), None if self._owner is None else self._owner.pid}
+        return any(node.pid not in own for node in self._graph.nodes)
+
+    def _serve_submissions(self) -> None:
+        while self._submitted:
+            submission = self._submitted.popleft()
+            self._calls -= 1  # calls from inside count downwards, so that they never meet a node's
+            self._pending[self._calls] = submission
+            self._apply(Asked(self._calls, submission.request), "")
+
+    def _serve_router(self) -> None:
+        for _ in range(1000):  # then time for the rest of the loop
+            try:
+                sender, *body = self._router.recv_multipart(zmq.DONTWAIT)
+            except zmq.Again:
+                return
+            except zmq.ZMQError:
+                _logger.exception("the master could not read a request")
+                return
+            self._serve(sender, body)
+
+    def _serve(self, sender: bytes, body: list[bytes]) -> None:
+        asked = decode_request(body[-1] if len(body) == 1 else b"")
+        request = asked.request
+        if not isinstance(request, str):
+            named = node_of(request)
+            if named is not None and named.encode() != sender:
+                asked = Asked(asked.call, "a node speaks for itself only")
+            elif isinstance(request, Join) and request.managed:
+                asked = Asked(asked.call, "only what is attached to the master manages nodes")
+        name = sender.decode("utf-8", "surrogateescape")
+        self._apply(asked, name)
+
+    def _apply(self, asked: Asked, sender: str) -> None:
+        try:
+            if isinstance(asked.request, str):
+                refused = Refused(self._graph.epoch, self._graph.revision, asked.request)
+                self._send((Outgoing(sender, refused, asked.call),))
+            else:
+                self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
+        except Exception:  # one request must never end the master
+            _logger.exception("the master could not carry out a request")
+            reason = "the master could not carry this out; its log says why"
+            refused = Refused(self._graph.epoch, self._graph.revision, reason)
+            self._send((Outgoing(sender, refused, asked.call),))
+
+    def _send(self, outgoing: Sequence[Outgoing]) -> None:
+        """Send in order; nodes that turn out to be dead on the way are dropped, and nobody waits for them."""
+        dead: set[str] = set()
+        for each in outgoing:
+            if each.call is not None and each.call < 0:
+                self._reply_inside(each)
+            elif each.to not in dead and not self._deliver(each, frozenset(dead)):
+                dead.add(each.to)
+        if dead:
+            self._send(self._graph.drop(dead))
+
+    def _reply_inside(self, each: Outgoing) -> None:
+        submission = self._pending.pop(each.call or 0, None)
+        if submission is not None:
+            submission.reply = each.answer  # type: ignore[assignment]
+            submission.done.set()
+
+    def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
+        """Send one answer; False when its node has no connection any more."""
+        body = encode_answer(without(each.answer, dead), each.call or 0)
+        try:
+            self._router.send_multipart((each.to.encode("utf-8", "surrogateescape"), body), zmq.DONTWAIT)
+        except zmq.Again:
+            pass  # it does not read; its next renewal tells it what it missed
+        except zmq.ZMQError as error:
+            return error.errno != zmq.EHOSTUNREACH
+        return True
+
+    def _tell_listeners(self) -> None:
+        if self._listeners and self._graph.revision != self._told_revision:
+            self._told_revision = self._graph.revision
+            view = self._graph.view()
+            for changed in self._listeners:
+                try:
+                    changed(view)
+                except Exception:  # the master outlives what is attached to it
+                    _logger.exception("something attached to the master failed")
+
+    def _release(self) -> None:
+        self._router.close()
+        self._context.term()
+        self._waker.close()

@@ -1,0 +1,78 @@
+"""The parts of requests: nodes, publishers and subscribers as they present themselves; statistics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class NodeRecord:
+    """A node as it presents itself. `since_ns` is its own clock when it was made."""
+
+    id: str
+    name: str
+    host: str
+    pid: int | None
+    language: str = "Python"
+    generation: str = "native"
+    since_ns: int = 0
+
+
+@dataclass(frozen=True)
+class PublisherRecord:
+    """A publisher as its node presents it. `endpoints` is empty when nobody can connect to it directly."""
+
+    id: int
+    topic: str
+    msg_type: str
+    codec: str
+    endpoints: tuple[str, ...] = ()
+    latched: bool = False
+
+
+@dataclass(frozen=True)
+class SubscriberRecord:
+    """A subscriber as its node presents it."""
+
+    id: int
+    topic: str
+    msg_type: str
+
+
+@dataclass(frozen=True)
+class PublisherCount:
+    """A publisher's statistics: all messages and bytes so far, and the newest message."""
+
+    id: int
+    count: int
+    bytes: int
+    last_seq: int
+    last_stamp_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class SubscriberCount:
+    """A subscriber's statistics. `problem` is a sentence about messages that it could not read, or empty."""
+
+    id: int
+    received: int | None
+    lost: int | None
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class RemotePublisher:
+    """A publisher with the node that it belongs to: what a subscriber needs to connect."""
+
+    publisher: PublisherRecord
+    node_id: str
+    node_name: str
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A subscriber that a new publisher waits for."""
+
+    id: int
+    node_id: str
+    node_name: str

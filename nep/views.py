@@ -1,0 +1,96 @@
+"""What the master knows, as frozen values: nodes, topics, publishers, subscribers, alerts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+
+__all__ = ["Alert", "GraphView", "NodeInfo", "PublisherInfo", "SubscriberInfo", "TopicInfo"]
+
+
+@dataclass(frozen=True)
+class Alert:
+    """A present problem: `id` such as "type:/camera", a sentence for people, and what to do."""
+
+    id: str
+    sentence: str
+    hint: str = ""
+
+
+@dataclass(frozen=True)
+class NodeInfo:
+    """A program, or a part of one. `generation` is "native", "gateway", or the original NEP's "A", "B"."""
+
+    id: str
+    name: str
+    host: str
+    pid: int | None
+    language: str
+    generation: str
+    since_ns: int
+
+
+@dataclass(frozen=True)
+class PublisherInfo:
+    """A publisher. Its counters are those of its last renewal, one second old at most.
+
+    `endpoints` is empty for the original NEP's. `rate_hz` and `bandwidth_Bps` are None until known.
+    """
+
+    id: int
+    node_id: str
+    endpoints: tuple[str, ...]
+    latched: bool
+    count: int
+    bytes: int
+    last_seq: int
+    last_stamp_ns: int | None
+    rate_hz: float | None
+    bandwidth_Bps: float | None  # noqa: N815 - B/s
+
+
+@dataclass(frozen=True)
+class SubscriberInfo:
+    """A subscriber; `received` and `lost` are None where nobody can count them (the original NEP)."""
+
+    id: int
+    node_id: str
+    received: int | None
+    lost: int | None
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """A topic with everybody on it. Rates are sums over its publishers; loss over its subscribers."""
+
+    name: str
+    msg_type: str
+    codec: str
+    publishers: tuple[PublisherInfo, ...] = ()
+    subscribers: tuple[SubscriberInfo, ...] = ()
+    rate_hz: float | None = None
+    bandwidth_Bps: float | None = None  # noqa: N815 - B/s
+    last_stamp_ns: int | None = None
+    lost: int | None = None
+    loss_ratio: float | None = None
+
+
+@dataclass(frozen=True)
+class GraphView:
+    """The whole graph at one moment. `revision` grows when somebody comes or goes, not with statistics."""
+
+    epoch: int
+    revision: int
+    nodes: Mapping[str, NodeInfo] = field(default_factory=dict)
+    topics: Mapping[str, TopicInfo] = field(default_factory=dict)
+    alerts: tuple[Alert, ...] = ()
+
+    def to_plain(self) -> dict[str, object]:
+        """The view as maps and lists, for the wire and for `--json`."""
+        return {
+            "epoch": self.epoch,
+            "revision": self.revision,
+            "nodes": [asdict(node) for node in self.nodes.values()],
+            "topics": [asdict(topic) for topic in self.topics.values()],
+            "alerts": [asdict(alert) for alert in self.alerts],
+        }

@@ -1,0 +1,175 @@
+r"""The native wire: parts ↔ messages. Pure functions; the specification is `docs/wire.md`.
+
+A message is three parts, or four: topic and `\0`, a header of 32 bytes, the payload, and a msgpack map when
+the header's flag says so. Beside messages three notices travel, all under a subscriber's own hello topic
+`\xffhello/<subscriber id>/<topic>`: *echo* (topic and header: "I have seen you; my messages are counted from
+here"), *bye* (the same with the flag BYE: "nothing comes after this") and the latched message (all parts).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from nep.errors import BadTopicError, WireError
+from nep.packing import pack, unpack
+
+__all__ = [
+    "BYE",
+    "EXTENSION",
+    "LATCHED",
+    "VERSION",
+    "Header",
+    "check_topic",
+    "extension_part",
+    "hello_part",
+    "join",
+    "parse_hello",
+    "read_extension",
+    "read_header",
+    "topic_part",
+]
+
+VERSION = 1
+HEADER_BYTES = 32
+TOPIC_MAX_BYTES = 200
+
+LATCHED = 1
+"""Flag: the publisher keeps this message and sends it to whoever comes late."""
+EXTENSION = 2
+"""Flag: a fourth part follows, a msgpack map."""
+BYE = 4
+"""Flag of a notice: the publisher is closing and has sent everything."""
+
+HELLO = b"\xffhello/"
+"""How a hello filter starts. 0xff sorts behind all of UTF-8, so it is installed after the topic filter."""
+
+_HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, reserved, seq, stamp_ns, publisher
+_U64_MAX = 2**64 - 1
+
+
+class Header(NamedTuple):
+    """The second part. `stamp_ns` is the publisher's clock, `publisher` its id; `seq` counts from 1."""
+
+    codec: int
+    flags: int
+    seq: int
+    stamp_ns: int
+    publisher: int
+
+    def pack(self) -> bytes:
+        """The 32 bytes, little-endian."""
+        return _HEADER.pack(VERSION, self.codec, self.flags, 0, self.seq, self.stamp_ns, self.publisher)
+
+
+def check_topic(topic: str) -> str:
+    """`topic` itself when the grammar allows it: 1 to 200 bytes of UTF-8, no white space, control or `{`.
+
+    Raises `BadTopicError` with the reason.
+    """
+    if not isinstance(topic, str):
+        raise BadTopicError(str(topic), "a topic is a 'str'")
+    try:
+        size = len(topic.encode("utf-8"))
+    except UnicodeEncodeError:
+        raise BadTopicError(ascii(topic), "it is no Unicode text") from None
+    if not 1 <= size <= TOPIC_MAX_BYTES:
+        raise BadTopicError(topic, f"it has {size} bytes, 1 to {TOPIC_MAX_BYTES} are allowed")
+    for letter in topic:
+        if letter.isspace() or letter == "{" or not (letter.isprintable() or ord(letter) > 0x9F):
+            raise BadTopicError(topic, f"the character '{ascii(letter)[1:-1]}' is not allowed in it")
+    return topic
+
+
+def topic_part(topic: str) -> bytes:
+    """The first part of a topic's messages, and the filter of its subscribers: the name and a zero byte."""
+    return topic.encode("utf-8") + b"\0"
+
+
+def hello_part(subscriber: int, topic: str) -> bytes:
+    """The hello filter of a subscriber, and the first part of what is sent to it alone."""
+    return HELLO + f"{subscriber:016x}/{topic}".encode()
+
+
+def parse_hello(part: bytes) -> tuple[int, str] | None:
+    """(subscriber id, topic) of a hello filter; None for anything else."""
+    if not part.startswith(HELLO):
+        return None
+    digits, slash, topic = part[len(HELLO) :].partition(b"/")
+    try:
+        if len(digits) != 16 or not slash:
+            return None
+        return int(digits, 16), topic.decode("utf-8")
+    except ValueError:
+        return None
+
+
+def read_header(part: bytes) -> Header:
+    """The header in a second part. Raises `WireError`; an unknown version is named in it."""
+    if len(part) != HEADER_BYTES:
+        raise WireError(f"a header has {HEADER_BYTES} bytes, this one has {len(part)}", len(part))
+    version, codec, flags, _reserved, seq, stamp_ns, publisher = _HEADER.unpack(part)
+    if version != VERSION:
+        raise WireError(f"its version is {version}, this nep reads version {VERSION}; update nep", len(part))
+    return Header(codec, flags, seq, stamp_ns, publisher)
+
+
+def extension_part(extension: Mapping[str, object]) -> bytes:
+    """The fourth part. Raises `WireError` when a value has no form in msgpack."""
+    try:
+        return pack(dict(extension))
+    except ValueError as error:
+        raise WireError(f"an extension holds what msgpack cannot: {error}") from error
+
+
+def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
+    """The map in a fourth part. Raises `WireError`."""
+    try:
+        value = unpack(part)
+    except ValueError as error:
+        raise WireError(f"the extension is no msgpack: {error}", len(part)) from error
+    if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
+        raise WireError("the extension is no map with names", len(part))
+    return value
+
+
+def join(
+    topic: str,
+    header: Header,
+    payload: bytes | memoryview,
+    extension: Mapping[str, object] | None = None,
+) -> tuple[bytes | memoryview, ...]:
+    """All parts of a message; the EXTENSION flag is set here when there is one."""
+    if not extension:
+        return topic_part(topic), header.pack(), payload
+    flagged = header._replace(flags=header.flags | EXTENSION)
+    return topic_part(topic), flagged.pack(), payload, extension_part(extension)
+
+
+class Parts(NamedTuple):
+    """A message as read from its parts."""
+
+    topic: str
+    header: Header
+    payload: bytes | memoryview
+    extension: Mapping[str, object]
+
+
+def split(parts: Sequence[bytes | memoryview]) -> Parts:
+    """The message in `parts`. Raises `WireError` for anything that the specification does not allow."""
+    if len(parts) < 3:
+        raise WireError(f"a message has 3 or 4 parts, this one has {len(parts)}")
+    name = bytes(parts[0])
+    header = read_header(bytes(parts[1]))
+    wanted = 4 if header.flags & EXTENSION else 3
+    if len(parts) != wanted:
+        raise WireError(f"its flags ask for {wanted} parts, there are {len(parts)}")
+    try:
+        topic = name[:-1].decode("utf-8")
+        if name[-1:] != b"\0":
+            raise WireError("its topic does not end with a zero byte", len(name))
+        check_topic(topic)
+    except (UnicodeDecodeError, BadTopicError) as error:
+        raise WireError(f"its topic is none: {error}", len(name)) from error
+    return Parts(topic, header, parts[2], read_extension(parts[3]) if wanted == 4 else {})
