@@ -43,7 +43,8 @@ class Camera:
         canvas = Canvas(lens)
         self._shell(canvas, room)
         self._shadows(canvas, room)
-        for thing in sorted(_things(room), key=lambda one: -_away(one, lens)):
+        ahead = [thing for thing in _things(room) if _ahead(thing, lens)]
+        for thing in sorted(ahead, key=lambda one: -_away(one, lens)):
             if isinstance(thing, Box):
                 _furniture(canvas, thing)
             elif isinstance(thing, Person):
@@ -102,6 +103,15 @@ class Camera:
 
 def _things(room: Room) -> list[Box | Person | Ball]:
     return [*room.boxes, room.person, room.ball]
+
+
+def _ahead(thing: Box | Person | Ball, lens: Lens) -> bool:
+    """False when all of a thing is behind the camera."""
+    half = math.hypot(thing.width, thing.depth) / 2 if isinstance(thing, Box) else 0.5
+    forward = lens.rotation[2]
+    flat = math.hypot(float(forward[0]), float(forward[1]))
+    along = (thing.x - lens.place[0]) * forward[0] + (thing.y - lens.place[1]) * forward[1]
+    return bool(along > -half * flat - abs(float(forward[2])) * 2.0)
 
 
 def _away(thing: Box | Person | Ball, lens: Lens) -> float:

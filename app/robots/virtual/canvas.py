@@ -56,7 +56,7 @@ class Canvas:
     def put(
         self, texture: Texture, corner: Sequence[float], across: Sequence[float], along: Sequence[float]
     ) -> None:
-        """A texture on a parallelogram: `corner` is its upper left, `across` and `along` its sides, in metres."""
+        """A texture on a parallelogram: `corner` is its upper left one, the others its sides, in metres."""
         start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, across, along))
         outline = self.lens.outline(np.stack([start, start + right, start + right + down, start + down]))
         box = self._box(outline)

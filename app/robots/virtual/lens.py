@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -24,11 +25,12 @@ class Lens:
     height: int = 240
     hfov_deg: float = 56.3
 
-    @property
+    @cached_property
     def focal(self) -> float:
         """Pixels per unit of x/z."""
         return self.width / 2 / math.tan(math.radians(self.hfov_deg / 2))
 
+    @cached_property
     def rotation(self) -> Matrix:
         """Rows right, down, forward: room directions to camera directions."""
         yaw, up = math.radians(self.yaw_deg), math.radians(-self.pitch_deg)
@@ -38,7 +40,7 @@ class Lens:
 
     def to_camera(self, points: Matrix) -> Matrix:
         """Points (n, 3) of the room seen from the camera: right, down, forward in metres."""
-        seen: Matrix = (points - np.asarray(self.place)) @ self.rotation().T
+        seen: Matrix = (points - np.asarray(self.place)) @ self.rotation.T
         return seen
 
     def to_pixels(self, seen: Matrix) -> Matrix:
@@ -55,9 +57,8 @@ class Lens:
         self, corner: Matrix, across: Matrix, along: Matrix, size: tuple[int, int]
     ) -> Matrix:
         """The homography from a texture (width, height) on a parallelogram in the room to the picture."""
-        rotation = self.rotation()
         columns = [across / size[0], along / size[1], corner - np.asarray(self.place)]
-        seen = rotation @ np.stack(columns, axis=1)
+        seen = self.rotation @ np.stack(columns, axis=1)
         half = np.array([[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]])
         made: Matrix = half @ seen
         return made
@@ -65,6 +66,10 @@ class Lens:
 
 def _clipped(seen: Matrix) -> Matrix:
     """The part of a polygon in front of the camera."""
+    if seen[:, 2].min() >= NEAR:
+        return seen
+    if seen[:, 2].max() < NEAR:
+        return np.empty((0, 3))
     kept = []
     for here, there in zip(seen, np.roll(seen, -1, axis=0), strict=True):
         if here[2] >= NEAR:
@@ -72,4 +77,4 @@ def _clipped(seen: Matrix) -> Matrix:
         if (here[2] >= NEAR) != (there[2] >= NEAR):
             part = (NEAR - here[2]) / (there[2] - here[2])
             kept.append(here + part * (there - here))
-    return np.array(kept) if kept else np.empty((0, 3))
+    return np.array(kept)

@@ -62,9 +62,11 @@ class Eyes:
     def balls(self, picture: Picture) -> list[Detection]:
         """Round red things."""
         hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
-        red = cv2.inRange(hsv, (0, 135, 60), (7, 255, 255)) | cv2.inRange(
-            hsv, (171, 135, 60), (180, 255, 255)
+        low, high = (
+            cv2.inRange(hsv, (0, 135, 60), (7, 255, 255)),
+            cv2.inRange(hsv, (171, 135, 60), (180, 255, 255)),
         )
+        red = cv2.bitwise_or(low, high)
         red = cv2.morphologyEx(red, cv2.MORPH_CLOSE, np.ones((5, 5), dtype=np.uint8))
         count, _, stats, _ = cv2.connectedComponentsWithStats(red)
         found = []
@@ -77,11 +79,11 @@ class Eyes:
     def markers(self, picture: Picture) -> list[Detection]:
         """ArUco cards of the dictionary 4x4, 50."""
         corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
-        if ids is None:
-            return []
+        # OpenCV gives None for no markers, which its annotations do not know.
+        numbers: list[int] = np.asarray(ids).ravel().tolist() if len(corners) else []
         return [
             Detection(f"marker {number}", 1.0, _box_of(outline[0]))
-            for outline, number in zip(corners, np.asarray(ids).ravel().tolist(), strict=True)
+            for outline, number in zip(corners, numbers, strict=True)
         ]
 
     def faces(self, room: Room, lens: Lens) -> list[Detection]:
