@@ -105,8 +105,8 @@ class Desk:
             socket.close(0)
             self._alerts.tell(
                 f"port:{port}",
-                f"port {port} is taken by another program; {consequence}",
-                "close that program: another master, or on macOS the AirPlay Receiver",
+                f"Port {port} is taken by another program; {consequence}",
+                "Close that program: another master, or on macOS the AirPlay Receiver.",
             )
             return None
         self._alerts.cure(f"port:{port}")

@@ -103,16 +103,16 @@ class Shape:
                 return frame[len(own) :]
             if self.codec == "json" and frame[:1] in b'{["':
                 return frame
-            raise FrameError(f"a message on '{self.topic}' does not begin with the topic")
+            raise FrameError(f"A message on “{self.topic}” does not begin with the topic")
         if self.codec == "json":
             self._refuse_unserved(frame, own)
         return frame
 
     def _refuse_unserved(self, frame: bytes, own: bytes) -> None:
         if frame.startswith(own):
-            raise FrameError(f"a message on '{self.topic}' begins with the topic", version="0.5.4.6")
+            raise FrameError(f"A message on “{self.topic}” begins with the topic", version="0.5.4.6")
         if frame[:1] == b'"' and _is_json_in_json(frame):
-            raise FrameError(f"a message on '{self.topic}' is JSON inside JSON", version="0.5.4.7")
+            raise FrameError(f"A message on “{self.topic}” is JSON inside JSON", version="0.5.4.7")
 
 
 def shield_javascript(data: bytes, topic: str) -> bytes:
@@ -161,7 +161,7 @@ def _from_base64(data: bytes) -> bytes:
     try:
         return base64.b64decode(data, validate=True)
     except binascii.Error as error:
-        raise FrameError("a picture is not base64") from error
+        raise FrameError("A picture is not base64") from error
 
 
 def _is_json_in_json(frame: bytes) -> bool:

@@ -17,6 +17,7 @@ from nep.gateway.portmap import Line, PortMap, Registration
 from nep.gateway.processes import Processes
 from nep.gateway.relay import Alerts, NativeSide, Relay
 from nep.gateway.requests import Request, RequestError
+from nep.message import Message
 
 _LOOK_S = 1.0
 """How often programs that ended are looked for, and taken ports are tried again."""
@@ -28,6 +29,12 @@ class Outside(NativeSide, Alerts, Protocol):
 
     def start(self, inbox: Inbox) -> None:
         """Join the native network; what native programs publish is posted to `inbox`."""
+
+    def data_of(self, message: Message) -> bytes | memoryview | None:
+        """What originals can read of a native message: bytes of its codec, for pictures a JPEG or PNG."""
+
+    def look(self) -> None:
+        """A second has passed."""
 
     def show(self, programs: tuple[Program, ...]) -> None:
         """These are the original programs now."""
@@ -110,8 +117,10 @@ class Gateway:
         for socket in ready:
             if socket in self._counters:
                 self._desk.answer(socket, self._counters[socket])
-        for arrived in self._inbox.take():
-            self._relay.deliver(arrived.topic, arrived.codec, arrived.data)
+        for message in self._inbox.take():
+            data = self._outside.data_of(message)
+            if data is not None:
+                self._relay.deliver(message.topic, message.codec, data)
         if changed:
             self._census.look(changed)
             self._show()
@@ -139,6 +148,7 @@ class Gateway:
             self._show()
         if self._desk.open():
             self._poller = None
+        self._outside.look()
 
     def _show(self) -> None:
         self._relay.know_languages(self._census.languages())
@@ -153,8 +163,8 @@ class Gateway:
             if base is not None and not self._open(line, base):
                 self._outside.tell(
                     f"port:{base}",
-                    f"port {base} or {base + 1} of '{line.topic}' is taken by another program",
-                    "close that program, then restart the programs of the original NEP on this topic",
+                    f"Port {base} or {base + 1} of “{line.topic}” is taken by another program",
+                    "Close that program, then restart the programs of the original NEP on this topic.",
                 )
 
     def _decide(self, request: Request) -> int:
@@ -205,8 +215,8 @@ class Gateway:
         except OSError as error:
             self._outside.tell(
                 "gateway:file",
-                f"the list of the originals' ports cannot be kept ({error.strerror})",
-                "programs of the original NEP must be restarted when the master was",
+                f"The list of the ports of original programs cannot be kept: {error.strerror}",
+                "Restart the programs of the original NEP when the master was restarted.",
             )
         else:
             self._outside.cure("gateway:file")

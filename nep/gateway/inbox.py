@@ -6,19 +6,11 @@ import contextlib
 import socket
 import threading
 from collections import deque
-from dataclasses import dataclass
+
+from nep.message import Message
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 64 * 1024 * 1024
-
-
-@dataclass(frozen=True)
-class Arrived:
-    """A datum from a native publisher, as bytes of its codec."""
-
-    topic: str
-    codec: str
-    data: bytes | memoryview
 
 
 class Inbox:
@@ -26,7 +18,7 @@ class Inbox:
 
     def __init__(self, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:
         self._lock = threading.Lock()
-        self._waiting: deque[Arrived] = deque()
+        self._waiting: deque[Message] = deque()
         self._size_bytes = 0
         self._max_messages = max_messages
         self._max_bytes = max_bytes
@@ -44,15 +36,15 @@ class Inbox:
         """How many were refused because the queue was full."""
         return self._dropped
 
-    def post(self, arrived: Arrived) -> None:
-        """Queue one datum and wake the reader."""
-        size = len(arrived.data)
+    def post(self, message: Message) -> None:
+        """Queue one message and wake the reader."""
+        size = message.size_bytes
         with self._lock:
             if len(self._waiting) >= self._max_messages or self._size_bytes + size > self._max_bytes:
                 self._dropped += 1
                 return
             was_empty = not self._waiting
-            self._waiting.append(arrived)
+            self._waiting.append(message)
             self._size_bytes += size
         if was_empty:
             self.wake()
@@ -62,7 +54,7 @@ class Inbox:
         with contextlib.suppress(OSError):  # a full bell rings already, a closed one has no listener
             self._bell.send(b"\x00")
 
-    def take(self) -> list[Arrived]:
+    def take(self) -> list[Message]:
         """Everything that was posted, oldest first."""
         with contextlib.suppress(BlockingIOError):
             self._ear.recv(4096)

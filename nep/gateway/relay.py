@@ -161,6 +161,6 @@ class Relay:
     def _tell_version(self, id: str, pair: Pair, version: str) -> None:
         self._alerts.tell(
             id,
-            f"a program on '{pair.line.topic}' uses nep {version}, which no other version understands",
-            "install nep 0.5.4.8 or 0.5.4.5 for that program",
+            f"A program on “{pair.line.topic}” uses nep {version}, which no other version understands",
+            "Install nep 0.5.4.8 or 0.5.4.5 for that program.",
         )

@@ -1,0 +1,152 @@
+"""The original programs in the master's graph: as nodes of generation A or B, with rates per topic."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import blake2b
+
+from nep.errors import BadTopicError
+from nep.gateway.census import Link, Program
+from nep.gateway.relay import Key
+from nep.requests import (
+    Join,
+    Leave,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    Renew,
+    Reply,
+    Request,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.wire import check_topic
+
+_LANGUAGES = {
+    "python": "Python",
+    "javascript": "JavaScript",
+    "csharp": "C#",
+    "java": "Java",
+    "matlab": "MATLAB",
+}
+
+
+@dataclass
+class _Count:
+    """What original programs have published on one topic."""
+
+    messages: int = 0
+    bytes: int = 0
+    last_ns: int | None = None
+
+
+class Listing:
+    """Keeps the graph's picture of the originals. `submit` carries a request out in the master.
+
+    Nobody can tell which of several originals on a topic a message came from: the first of them carries the
+    topic's statistics.
+    """
+
+    def __init__(self, submit: Callable[[Request], Reply | None], epoch: int) -> None:
+        self._submit = submit
+        self._epoch = epoch
+        self._shown: dict[str, Join] = {}
+        self._since: dict[str, int] = {}
+        self._counts: dict[Key, _Count] = {}
+        self._carriers: dict[int, Key] = {}
+
+    def count(self, key: Key, size_bytes: int) -> None:
+        """An original has published on this topic."""
+        counted = self._counts.setdefault(key, _Count())
+        counted.messages += 1
+        counted.bytes += size_bytes
+        counted.last_ns = time.time_ns()
+
+    def show(self, programs: tuple[Program, ...]) -> None:
+        """These originals are there now; what has changed is told to the master."""
+        wanted = {program.node_id: self._record(program) for program in programs}
+        for node_id in [known for known in self._shown if known not in wanted]:
+            del self._shown[node_id]
+            self._since.pop(node_id, None)
+            self._submit(Leave(node_id))
+        for node_id, join in wanted.items():
+            if self._shown.get(node_id) != join:
+                self._shown[node_id] = join
+                self._submit(join)
+        self._choose_carriers(programs)
+
+    def renew(self) -> None:
+        """Tell the master what was counted."""
+        for node_id, join in self._shown.items():
+            publishers = tuple(self._counted(record) for record in join.publishers)
+            subscribers = tuple(SubscriberCount(record.id, None, None) for record in join.subscribers)
+            self._submit(Renew(node_id, self._epoch, 0, publishers, subscribers))
+
+    def close(self) -> None:
+        """Take them all out."""
+        self.show(())
+
+    def _record(self, program: Program) -> Join:
+        since_ns = self._since.setdefault(program.node_id, time.time_ns())
+        language = program.language or ""
+        node = NodeRecord(
+            program.node_id,
+            program.name,
+            socket.gethostname(),
+            program.pid,
+            _LANGUAGES.get(language, language),
+            program.generation,
+            since_ns,
+        )
+        links = [link for link in program.links if _is_topic(link.topic)]
+        return Join(
+            node,
+            self._epoch,
+            tuple(
+                PublisherRecord(_id(program, link), link.topic, _type(link), link.codec)
+                for link in links
+                if link.role == "publisher"
+            ),
+            tuple(
+                SubscriberRecord(_id(program, link), link.topic, _type(link))
+                for link in links
+                if link.role == "subscriber"
+            ),
+            managed=True,
+        )
+
+    def _choose_carriers(self, programs: tuple[Program, ...]) -> None:
+        chosen: dict[Key, int] = {}
+        for program in programs:
+            for link in program.links:
+                if link.role == "publisher":
+                    chosen.setdefault((link.topic, link.codec), _id(program, link))
+        self._carriers = {carrier: key for key, carrier in chosen.items()}
+        self._counts = {key: counted for key, counted in self._counts.items() if key in chosen}
+
+    def _counted(self, record: PublisherRecord) -> PublisherCount:
+        key = self._carriers.get(record.id)
+        counted = self._counts.get(key, _Count()) if key is not None else _Count()
+        return PublisherCount(record.id, counted.messages, counted.bytes, counted.messages, counted.last_ns)
+
+
+def _type(link: Link) -> str:
+    """The originals' names of types differ where the datum does not: the codec's name is what all share."""
+    return link.codec
+
+
+def _id(program: Program, link: Link) -> int:
+    """A number for a publisher or subscriber that has none of its own; the same after a restart."""
+    text = f"{program.node_id}\0{link.role}\0{link.topic}\0{link.codec}"
+    return int.from_bytes(blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest(), "big")
+
+
+def _is_topic(name: str) -> bool:
+    try:
+        check_topic(name)
+    except BadTopicError:
+        return False
+    return True

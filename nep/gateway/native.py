@@ -1,0 +1,97 @@
+"""The gateway's outside: a native node of its own, the graph, and the alerts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from nep import images
+from nep.errors import BadTopicError, DecodeError, EncodeError, NepError
+from nep.gateway.census import Program
+from nep.gateway.inbox import Inbox
+from nep.gateway.listing import Listing
+from nep.gateway.relay import Key
+from nep.graph import Alert
+from nep.message import Message
+from nep.nodes import Node
+from nep.pubsub import Publisher, Subscriber
+
+_READABLE = frozenset({"jpeg", "png", None})
+"""Encodings of pictures that the originals read; without one, the bytes are a file that says it itself."""
+
+
+class Native:
+    """The native network as the gateway uses it (see `Outside`).
+
+    `make_node` joins the network; it is called when the first topic is carried over, so that a master without
+    original programs has no node of a gateway.
+    """
+
+    def __init__(
+        self,
+        make_node: Callable[[], Node],
+        listing: Listing,
+        report: Callable[[tuple[Alert, ...]], None],
+    ) -> None:
+        self._make_node = make_node
+        self._listing = listing
+        self._report = report
+        self._node: Node | None = None
+        self._inbox: Inbox | None = None
+        self._publishers: dict[Key, Publisher] = {}
+        self._subscribers: dict[Key, Subscriber] = {}
+        self._own: frozenset[int] = frozenset()
+        self._alerts: dict[str, Alert] = {}
+        self._dropped = 0
+
+    # ---- the network
+
+    def start(self, inbox: Inbox) -> None:
+        """See `Outside`."""
+        self._inbox = inbox
+
+    def publish(self, topic: str, codec: str, data: bytes) -> None:
+        """See `NativeSide`."""
+        self._listing.count((topic, codec), len(data))
+        publisher = self._publishers.get((topic, codec))
+        if publisher is None:
+            publisher = self._try(topic, lambda node: node.new_pub(topic, codec))
+            if publisher is None:
+                return
+            self._publishers[topic, codec] = publisher
+            self._own |= {publisher.id}
+        publisher.publish_bytes(data, images.picture_info(data) if codec == "image" else None)
+
+    def stop_publishing(self, topic: str, codec: str) -> None:
+        """See `NativeSide`."""
+        publisher = self._publishers.pop((topic, codec), None)
+        if publisher is not None:
+            publisher.close()
+
+    def subscribe(self, topic: str, codec: str) -> None:
+        """See `NativeSide`."""
+        subscriber = self._try(topic, lambda node: node.new_sub(topic, codec, sink=self._arrived))
+        if subscriber is not None:
+            self._subscribers[topic, codec] = subscriber
+
+    def unsubscribe(self, topic: str, codec: str) -> None:
+        """See `NativeSide`."""
+        subscriber = self._subscribers.pop((topic, codec), None)
+        if subscriber is not None:
+            subscriber.close()
+
+    def data_of(self, message: Message) -> bytes | memoryview | None:
+        """See `Outside`."""
+        if message.codec != "image" or message.extension.get("encoding") in _READABLE:
+            return message.data
+        try:
+            return images.encode(message.payload).data
+        except (DecodeError, EncodeError) as error:
+            self.tell(f"message:{message.topic}", f"Original programs get no pictures of “{message.topic}”: {error}")
+            return None
+
+    def _arrived(self, messages: Sequence[Message]) -> None:
+        """Called in the node's thread: what did not come from here goes to the gateway's thread."""
+        if self._inbox is not None:
+            for message in messages:
+                if message.publisher not in self._own:
+                    self._inbox.post(message)
