@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 from typing import Protocol
 
-from PySide6.QtCore import QRectF, Signal
+from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
@@ -62,10 +63,10 @@ class Banner(QWidget):
         self._status = "error"
         self.setMinimumHeight(LEAST_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.title = label("", "card")
-        self.detail = label("", "lead", role="textSecondary")
-        for words in (self.title, self.detail):
-            words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._words = ("", "")
+        self.words = label("", "lead", wrap=True)
+        self.words.setTextFormat(Qt.TextFormat.RichText)
+        theme.changed.connect(self._write)
         self.more = Button(theme, "", kind="ghost", size="small")
         self.button = Button(theme, "", size="form")
         self.second = Button(theme, "", size="form")
@@ -73,8 +74,7 @@ class Banner(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(16 + ICON + 12, 8, 12, 8)
         row.setSpacing(8)
-        row.addWidget(self.title)
-        row.addWidget(self.detail, 1)
+        row.addWidget(self.words, 1)
         for widget in (self.more, self.second, self.button, self.close_button):
             row.addWidget(widget)
         self.button.clicked.connect(self.pressed)
@@ -93,10 +93,8 @@ class Banner(QWidget):
     ) -> None:
         """Say what is wrong; ``others`` counts the alerts that wait behind this one."""
         self._status = status
-        self.title.setText(title)
-        self.title.setMinimumWidth(min(560, self.title.sizeHint().width()))
-        self.detail.setText(detail)
-        self.detail.setToolTip(detail)
+        self._words = (title, detail)
+        self._write()
         self.setAccessibleName(f"{title} {detail}".strip())
         for widget, text in ((self.button, button), (self.second, second)):
             widget.set_word(text or "")
@@ -104,6 +102,13 @@ class Banner(QWidget):
         self.more.set_word(f"and {others} more" if others else "")
         paint.show_when(self.more, others > 0)
         self.update()
+
+    def _write(self) -> None:
+        title, detail = (escape(words) for words in self._words)
+        quiet = self._theme.hex("textSecondary")
+        self.words.setText(
+            f'<span style="font-weight:600">{title}</span> <span style="color:{quiet}">{detail}</span>'
+        )
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme

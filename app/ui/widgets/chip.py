@@ -86,12 +86,14 @@ class Chip(QWidget):
         edge = theme.colour("controlBorder") if theme.high_contrast else None
         tint = status.tint or "sunken"
         paint.box(painter, rect, rect.height() / 2, theme.colour(tint), edge)
-        ink = theme.colour("textSecondary" if self._status == "off" else status.colour)
+        plain = {"off": "textSecondary", "running": "text"}
+        ink = theme.colour(plain.get(self._status, status.colour))
         left = PADDING + (1 if self._large else 0)
         name = self._icon_name()
         if name:
             side = theme.size("icon", "small") + (1 if self._large else 0)
-            paint_icon(painter, QRectF(left, (rect.height() - side) / 2, side, side), name, ink)
+            square = QRectF(left, (rect.height() - side) / 2, side, side)
+            paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
             left += side + GAP
         paint.words(painter, rect.adjusted(left, 0, 0, 0), self._text, self._font(), ink)
         painter.end()

@@ -1,0 +1,129 @@
+"""The bar at the top of every layout: logo, menus, layout switch, the robots' chip, and on the start page Stop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
+
+from app.ui.layouts import Layout
+from app.ui.theme import Theme
+from app.ui.widgets import Chip, Segments, StopButton, paint
+
+LOGO = 22
+AMBER_ENDS = 0.12
+
+
+class Logo(QWidget):
+    """An N between two amber joints, on the accent."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setFixedSize(LOGO, LOGO)
+        self.setAccessibleName("NEP Studio")
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        paint_logo(painter, QRectF(self.rect()), self._theme)
+        painter.end()
+
+
+def paint_logo(painter: QPainter, rect: QRectF, theme: Theme) -> None:
+    """The logo in a square."""
+    side = rect.width()
+
+    def at(x: float, y: float) -> QPointF:
+        return QPointF(rect.left() + x * side, rect.top() + y * side)
+
+    paint.box(painter, rect, side * 0.27, theme.colour("accent"))
+    painter.setPen(
+        QPen(
+            theme.colour("onAccent"),
+            side * 0.11,
+            Qt.PenStyle.SolidLine,
+            Qt.PenCapStyle.RoundCap,
+            Qt.PenJoinStyle.RoundJoin,
+        )
+    )
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawPolyline(QPolygonF([at(0.3, 0.71), at(0.3, 0.29), at(0.7, 0.71), at(0.7, 0.29)]))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(theme.colour("running"))
+    for joint in (at(0.3, 0.71), at(0.7, 0.29)):
+        painter.drawEllipse(joint, side * AMBER_ENDS, side * AMBER_ENDS)
+
+
+class AppBar(QWidget):
+    """Menus at the left, the layouts in the middle, the robots at the right."""
+
+    layout_chosen = Signal(str)
+    stop_pressed = Signal()
+
+    def __init__(self, theme: Theme, layouts: Sequence[Layout]) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setMinimumHeight(theme.size("appBar"))
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Menus and layouts")
+        self.menus = QMenuBar()
+        self.menus.setNativeMenuBar(False)
+        self.menus.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
+        self.switch = Segments(
+            theme, [(layout.name, layout.title, layout.icon) for layout in layouts], name="Layout"
+        )
+        self.switch.changed.connect(self.layout_chosen)
+        self.chip = Chip(theme, "", "off", large=True)
+        self.stop = StopButton(theme, "appBar")
+        self.stop.clicked.connect(self.stop_pressed)
+        self._build()
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def _build(self) -> None:
+        left, right = QWidget(), QWidget()
+        menus = QHBoxLayout(left)
+        menus.setContentsMargins(0, 0, 0, 0)
+        menus.setSpacing(10)
+        menus.addWidget(Logo(self._theme))
+        menus.addWidget(self.menus)
+        menus.addStretch(1)
+        robots = QHBoxLayout(right)
+        robots.setContentsMargins(0, 0, 0, 0)
+        robots.setSpacing(6)
+        robots.addStretch(1)
+        robots.addWidget(self.chip)
+        robots.addWidget(self.stop)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(11, 0, 12, 1)
+        grid.setHorizontalSpacing(12)
+        grid.addWidget(left, 0, 0)
+        grid.addWidget(self.switch, 0, 1)
+        grid.addWidget(right, 0, 2)
+        grid.setColumnStretch(0, 1)
+        grid.setColumnStretch(2, 1)
+
+    def _restyle(self) -> None:
+        font = self._theme.font("body")
+        font.setWeight(font.Weight.Medium)
+        self.menus.setFont(font)
+
+    def show_layout(self, name: str | None) -> None:
+        """Mark the layout that shows; None is the start page, which has no switch but a Stop."""
+        if name is not None:
+            self.switch.set_value(name)
+        self.switch.setVisible(name is not None)
+        self.stop.setVisible(name is None)
+
+    def show_robots(self, text: str, status: str) -> None:
+        """The chip: which robots there are and how they are."""
+        self.chip.set(text, status)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        rect = self.rect()
+        painter.fillRect(rect, self._theme.colour("window"))
+        painter.fillRect(0, rect.height() - 1, rect.width(), 1, self._theme.colour("border"))
+        painter.end()

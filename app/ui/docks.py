@@ -1,0 +1,295 @@
+"""A dock with our title and our frame around a panel.
+
+The title holds what UI.md §4 asks for: name (or tabs, when docks share a place), what is shown, chips, the
+panel's own buttons, and "more" with floating and closing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QContextMenuEvent, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QDockWidget,
+    QHBoxLayout,
+    QMenu,
+    QSizePolicy,
+    QStackedLayout,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.ui.panels.base import Density, Panel, PanelWidget
+from app.ui.theme import Theme
+from app.ui.widgets import EmptyAction, EmptyState, IconButton, label, paint, set_role
+
+
+class TitleTab(QAbstractButton):
+    """The name of a panel that shares its place with others; a press brings it to the front."""
+
+    def __init__(self, theme: Theme, text: str, chosen: bool) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.setCheckable(True)
+        self.setChecked(chosen)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setProperty("focusRadius", theme.radius("small"))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("title")
+        return QSize(round(paint.width_of(font, self.text())) + 21, max(26, round(paint.height_of(font)) + 6))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        if self.isChecked() or self.underMouse():
+            paint.box(painter, rect, theme.radius("small"), theme.colour("hover"))
+        ink = theme.colour("text" if self.isChecked() else "textSecondary")
+        paint.words(painter, rect, self.text(), theme.font("title"), ink, paint.CENTRE)
+        painter.end()
+
+
+class DockTitle(QWidget):
+    """The title of a dock; it paints the upper half of the panel's frame."""
+
+    menu_wanted = Signal(object)
+
+    def __init__(self, theme: Theme, panel: PanelWidget, density: Density) -> None:
+        super().__init__()
+        self._theme, self._panel, self._density = theme, panel, density
+        self._whole = panel.replaces_title()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.name = label("", "titleLarge" if density == "comfortable" else "title", role="textSecondary")
+        self._subtitle = label("", "code", role="textTertiary")
+        self._tabs: list[TitleTab] = []
+        self.more = IconButton(theme, "ellipsis", f"More about {panel.title()}")
+        self.more.clicked.connect(lambda: self.menu_wanted.emit(self.more))
+        self._row = QHBoxLayout(self)
+        self._fill()
+        panel.title_changed.connect(self.show_title)
+        self.show_title()
+
+    def _fill(self) -> None:
+        comfortable = self._density == "comfortable"
+        self._row.setContentsMargins(13 if comfortable else 11, 1, 8 if comfortable else 6, 1)
+        self._row.setSpacing(8)
+        if self._whole is not None:
+            self._row.setContentsMargins(6, 1, 6, 1)
+            self._row.addWidget(self._whole, 1)
+            self.more.hide()
+            return
+        self._row.addWidget(self.name)
+        self._row.addWidget(self._subtitle)
+        widgets = self._panel.header_widgets()
+        for widget in widgets:
+            if widget.property("place") == "start":
+                self._row.addWidget(widget)
+        self._row.addStretch(1)
+        for widget in widgets:
+            if widget.property("place") != "start":
+                self._row.addWidget(widget)
+        self._row.addWidget(self.more)
+
+    def sizeHint(self) -> QSize:
+        least = self._theme.size("panelTitle", self._density)
+        return QSize(120, max(least, self._row.sizeHint().height()))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(80, self.sizeHint().height())
+
+    def show_title(self) -> None:
+        """Take the panel's name and what it shows."""
+        self.name.setText(self._panel.title())
+        self._subtitle.setText(self._panel.subtitle())
+        paint.show_when(self._subtitle, bool(self._panel.subtitle()) and self._whole is None)
+        for tab in self._tabs:
+            if tab.isChecked():
+                tab.setText(self._panel.title())
+
+    def set_active(self, active: bool) -> None:
+        """The panel has the focus: its name is darker."""
+        set_role(self.name, "text" if active else "textSecondary")
+
+    def set_tabs(self, names: Sequence[tuple[str, bool, Callable[[], object]]]) -> None:
+        """The panels of one place: (name, whether it is this one, how to bring it to the front)."""
+        for old in self._tabs:
+            self._row.removeWidget(old)
+            old.deleteLater()
+        self._tabs = []
+        paint.show_when(self.name, not names and self._whole is None)
+        for index, (text, chosen, bring) in enumerate(names):
+            tab = TitleTab(self._theme, text, chosen)
+            tab.clicked.connect(lambda _on=False, bring=bring: bring())
+            self._row.insertWidget(index, tab)
+            self._tabs.append(tab)
+        self._row.setContentsMargins(5 if names else self._left(), 1, self._row.contentsMargins().right(), 1)
+
+    def _left(self) -> int:
+        if self._whole is not None:
+            return 6
+        return 13 if self._density == "comfortable" else 11
+
+    @property
+    def tabs(self) -> tuple[str, ...]:
+        """The names of the tabs shown; empty when the panel has its place for itself."""
+        return tuple(tab.text() for tab in self._tabs)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        self.menu_wanted.emit(None)
+        event.accept()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        radius = theme.radius("panel")
+        painter.setClipRect(rect)
+        tall = rect.adjusted(0, 0, 0, 2 * radius)
+        paint.box(painter, tall, radius, theme.colour("panel"), theme.colour("border"))
+        painter.fillRect(QRectF(0, rect.bottom() - 1, rect.width(), 1), theme.colour("border"))
+        painter.end()
+
+
+class _Corner(QWidget):
+    """Rounds one lower corner of a panel over whatever the panel paints."""
+
+    def __init__(self, theme: Theme, parent: QWidget, right: bool) -> None:
+        super().__init__(parent)
+        self._theme, self._right = theme, right
+        side = theme.radius("panel")
+        self.setFixedSize(side, side)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        side = float(self.width())
+        centre = QPointF(0.0 if self._right else side, 0.0)
+        outside = QPainterPath()
+        outside.addRect(QRectF(self.rect()))
+        disc = QPainterPath()
+        disc.addEllipse(centre, side, side)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillPath(outside.subtracted(disc), self._theme.colour("window"))
+        painter.setPen(QPen(self._theme.colour("border"), 1))
+        painter.drawEllipse(centre, side - 0.5, side - 0.5)
+        painter.end()
+
+
+class DockBody(QWidget):
+    """The lower half of the frame, around the panel or what is shown in its place."""
+
+    def __init__(self, theme: Theme, panel: PanelWidget) -> None:
+        super().__init__()
+        self._theme = theme
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 0, 1, 1)
+        self._stack = QStackedLayout()
+        column.addLayout(self._stack)
+        self._stack.addWidget(panel)
+        self._failure: EmptyState | None = None
+        self._corners = (_Corner(theme, self, False), _Corner(theme, self, True))
+
+    def resizeEvent(self, _event: object) -> None:
+        left, right = self._corners
+        left.move(0, self.height() - left.height())
+        right.move(self.width() - right.width(), self.height() - right.height())
+        left.raise_()
+        right.raise_()
+
+    def fail(self, sentence: str, again: Callable[[], object]) -> None:
+        """Show in place of the panel that it failed, with a way to try again."""
+
+        def retry() -> None:
+            self._stack.setCurrentIndex(0)
+            again()
+
+        if self._failure is None:
+            self._failure = EmptyState(self._theme, "circle-x", "This panel stopped", sentence)
+            self._stack.addWidget(self._failure)
+        self._failure.say("This panel stopped", sentence)
+        self._failure.set_actions([EmptyAction("Try again", retry, "rotate-ccw")])
+        self._stack.setCurrentWidget(self._failure)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        radius = theme.radius("panel")
+        tall = rect.adjusted(0, -2 * radius, 0, 0)
+        paint.box(painter, tall, radius, theme.colour("panel"), theme.colour("border"))
+        painter.end()
+
+
+class Dock(QDockWidget):
+    """One panel in a workbench: moves, floats, closes, shares its place; `failed` panels are skipped."""
+
+    def __init__(self, theme: Theme, description: Panel, panel: PanelWidget, density: Density) -> None:
+        super().__init__(description.title)
+        self.description, self.panel = description, panel
+        self.failed = False
+        self.front = False
+        self._theme = theme
+        self.setObjectName(f"panel.{description.name}")
+        self.setAccessibleName(description.title)
+        self.title = DockTitle(theme, panel, density)
+        self.body = DockBody(theme, panel)
+        self.setTitleBarWidget(self.title)
+        self.setWidget(self.body)
+        self.title.menu_wanted.connect(self._show_menu)
+        self.visibilityChanged.connect(self._visibility)
+        panel.set_density(density)
+        panel.setFont(panel.text_font())
+        theme.changed.connect(self._restyle)
+
+    def _restyle(self) -> None:
+        self.panel.setFont(self.panel.text_font())
+        self.title.updateGeometry()
+
+    def _visibility(self, visible: bool) -> None:
+        self.front = visible
+
+    def shown(self) -> bool:
+        """Whether a person can see the panel now."""
+        return self.front and self.isVisible()
+
+    def refresh(self) -> str | None:
+        """Let the panel show what is new; the sentence of its failure when it just failed."""
+        if self.failed or not self.shown():
+            return None
+        try:
+            self.panel.refresh()
+        except Exception as error:  # noqa: BLE001  whatever a panel raises, the window lives on
+            self.failed = True
+            sentence = f"{type(error).__name__}: {error}"
+            self.body.fail(sentence, self._try_again)
+            return sentence
+        return None
+
+    def _try_again(self) -> None:
+        self.failed = False
+
+    def menu(self) -> QMenu:
+        """The panel's own actions, then floating and closing."""
+        menu = QMenu(self)
+        own: list[QAction] = list(self.panel.more_actions())
+        menu.addActions(own)
+        if own:
+            menu.addSeparator()
+        icon = self._theme.icon("picture-in-picture-2")
+        floating = menu.addAction(icon, "Dock it" if self.isFloating() else "Float")
+        floating.triggered.connect(lambda: self.setFloating(not self.isFloating()))
+        menu.addAction(self._theme.icon("x"), "Close").triggered.connect(self.close)
+        return menu
+
+    def _show_menu(self, anchor: QWidget | None) -> None:
+        menu = self.menu()
+        menu.aboutToHide.connect(lambda: QTimer.singleShot(0, menu.deleteLater))
+        place = anchor if anchor is not None else self.title
+        corner = place.rect().bottomLeft() if anchor is not None else place.rect().center()
+        menu.popup(place.mapToGlobal(corner))

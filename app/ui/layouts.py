@@ -1,0 +1,58 @@
+"""The two arrangements of panels: Behaviour for people, Developer for programmers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.ui.panels.base import Density
+
+
+@dataclass(frozen=True)
+class Column:
+    """Panels above each other: (names that share a place, height). ``width`` 0 takes the rest."""
+
+    width: int
+    rows: tuple[tuple[tuple[str, ...], int], ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A layout as it is at first: columns from the left; in narrow windows ``narrow`` become tabs."""
+
+    name: str
+    title: str
+    icon: str
+    density: Density
+    columns: tuple[Column, ...]
+    narrow: tuple[str, str]
+
+
+BEHAVIOUR = Layout(
+    "behaviour",
+    "Behaviour",
+    "blocks",
+    "comfortable",
+    (
+        Column(1032, ((("behaviour",), 626), (("problems",), 124))),
+        Column(384, ((("robot",), 327), (("image",), 275), (("sensors",), 140))),
+    ),
+    ("robot", "image"),
+)
+DEVELOPER = Layout(
+    "developer",
+    "Developer",
+    "activity",
+    "compact",
+    (
+        Column(640, ((("topics",), 780),)),
+        Column(330, ((("inspector",), 780),)),
+        Column(446, ((("image",), 380), (("console", "alerts"), 394))),
+    ),
+    ("topics", "inspector"),
+)
+LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
+
+
+def layout_named(name: str) -> Layout:
+    """The layout of that name; the first when there is none."""
+    return next((layout for layout in LAYOUTS if layout.name == name), LAYOUTS[0])

@@ -1,0 +1,148 @@
+"""The status bar: facts with their numbers; what is not known is not there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+
+from app.core.session import Session
+from app.ui.theme import Theme
+from app.ui.widgets import Line, StatusItem, paint
+
+Fact = tuple[str, str, str | None]  # icon, words, status
+NOTHING: Fact = ("", "", None)
+TICK_MS = 33
+
+
+def counted(number: int, one: str, many: str) -> str:
+    """Say "1 node" or "7 nodes"."""
+    return f"{number} {one if number == 1 else many}"
+
+
+class Facts:
+    """Reads the session and says it in a few words."""
+
+    def __init__(self, session: Session, clock: Callable[[float], time.struct_time] = time.localtime) -> None:
+        self._session = session
+        self._clock = clock
+        self.window_ms = 0.0
+
+    def health(self) -> Fact:
+        """Say that Pepper is well, or how many alerts there are."""
+        alerts = [alert for alert in self._session.alerts.active if alert.severity != "info"]
+        if alerts:
+            worst = "error" if any(alert.severity == "error" for alert in alerts) else "warn"
+            icon = "circle-x" if worst == "error" else "triangle-alert"
+            return icon, counted(len(alerts), "alert", "alerts"), worst
+        links = [link for link in self._session.fleet.links if link.state not in {"away", "silent"}]
+        if not links:
+            return "circle-dashed", "No robot", "off"
+        if len(links) == 1:
+            return "circle-check", f"{links[0].name} is well", "ok"
+        return "circle-check", f"{len(links)} robots are well", "ok"
+
+    def saved(self) -> Fact:
+        """When the behaviour was saved, or that it is not saved yet."""
+        document = self._session.document
+        if document.dirty:
+            return "save", "Not saved, kept safe" if document.path is None else "Changes kept safe", None
+        if document.saved_at is None:
+            return NOTHING
+        then = self._clock(document.saved_at)
+        return "save", f"Saved {then.tm_hour}:{then.tm_min:02d}", None
+
+    def topics(self) -> Fact:
+        """How many topics are live."""
+        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        return "", f"{counted(live, 'topic', 'topics')} live", None
+
+    def reach(self) -> Fact:
+        """Who can reach this master."""
+        return "", "This computer only", None
+
+    def master(self) -> Fact:
+        """Whether a master is there, and where."""
+        master = self._session.master
+        if master.kind == "connected":
+            return "circle-check", f"Master {master.address}", "ok"
+        if master.kind == "searching":
+            return "circle-dashed", f"Looking for the master {master.address}", "off"
+        return "circle-dashed", "No master", "off"
+
+    def traffic(self) -> Fact:
+        """Nodes, topics and messages per second."""
+        graph = self._session.graph
+        if graph is None:
+            return NOTHING
+        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        words = f"{counted(len(graph.nodes), 'node', 'nodes')}, {counted(live, 'topic', 'topics')}"
+        if self._session.messages_per_s is not None:
+            words += f", {round(self._session.messages_per_s)} messages/s"
+        return "", words, None
+
+    def lost(self) -> Fact:
+        """How many messages were lost lately; nothing when none were."""
+        lost = self._session.lost_30s
+        return ("triangle-alert", f"{lost} lost in 30 s", "warn") if lost else NOTHING
+
+    def window(self) -> Fact:
+        """How long the last refresh of the window took."""
+        return "", f"Window {round(self.window_ms)} ms of {TICK_MS} ms", None
+
+
+class StatusBar(QWidget):
+    """26 px: facts at the left and at the right, divided by lines."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setMinimumHeight(theme.size("statusBar"))
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Status")
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(16, 0, 16, 0)
+        self._row.setSpacing(0)
+        self._left: list[tuple[StatusItem, Line]] = []
+        self._right: list[tuple[StatusItem, Line]] = []
+        self._row.addStretch(1)
+
+    def _grow(self, items: list[tuple[StatusItem, Line]], count: int, *, right: bool) -> None:
+        while len(items) < count:
+            item, line = StatusItem(self._theme), Line(self._theme, upright=True)
+            holder = QWidget()
+            row = QHBoxLayout(holder)
+            row.setContentsMargins(0, 0, 0, 0)
+            row.setSpacing(10)
+            for widget in (line, item) if right else (item, line):
+                row.addWidget(widget)
+            place = self._row.count() if right else len(items)
+            self._row.insertWidget(place, holder)
+            items.append((item, line))
+
+    def show_facts(self, left: Sequence[Fact], right: Sequence[Fact]) -> None:
+        """Show these facts; those without words are left out."""
+        for facts, items, at_right in ((left, self._left, False), (right, self._right, True)):
+            shown = [fact for fact in facts if fact[1]]
+            self._grow(items, len(shown), right=at_right)
+            for index, (item, line) in enumerate(items):
+                fact = shown[index] if index < len(shown) else NOTHING
+                item.set(*fact)
+                holder = item.parentWidget()
+                if holder is not None:
+                    holder.setVisible(bool(fact[1]))
+                    holder.setContentsMargins(10 if (at_right or index) else 0, 0, 0, 0)
+                paint.show_when(line, bool(fact[1]) and (at_right or index < len(shown) - 1))
+
+    def words(self) -> list[str]:
+        """All facts shown now, from left to right."""
+        return [item.text for item, _ in (*self._left, *self._right) if item.text]
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.fillRect(self.rect(), self._theme.colour("window"))
+        painter.end()

@@ -1,0 +1,280 @@
+"""The workbench: the docks of one layout, where a person moves them, and how they come back."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Callable, Mapping, Sequence
+
+from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QDockWidget, QMainWindow
+
+from app.ui.docks import Dock
+from app.ui.layouts import Layout
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.theme import Theme
+
+AREA = Qt.DockWidgetArea.LeftDockWidgetArea
+ACROSS = Qt.Orientation.Horizontal
+DOWN = Qt.Orientation.Vertical
+NARROW_PX = 1280
+STATE_VERSION = 1
+
+
+class Workbench(QMainWindow):
+    """The docks of one layout. Panels are made when they are first opened."""
+
+    panel_failed = Signal(str, str)
+
+    def __init__(
+        self,
+        theme: Theme,
+        layout: Layout,
+        panels: Mapping[str, Panel],
+        context: PanelContext,
+    ) -> None:
+        super().__init__()
+        self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
+        self.docks: dict[str, Dock] = {}
+        self._floating: list[Dock] = []
+        self._narrow = False
+        self._arranged = False
+        self.setWindowFlags(Qt.WindowType.Widget)
+        self.setProperty("density", layout.density)
+        self.setAccessibleName(f"{layout.title} layout")
+        gap = theme.size("gap", layout.density)
+        self.setContentsMargins(gap, gap, gap, gap)
+        self.setDockOptions(QMainWindow.DockOption.AllowNestedDocks | QMainWindow.DockOption.AllowTabbedDocks)
+        self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, self.tabPosition(AREA))
+        self._tabs_timer = QTimer(self)
+        self._tabs_timer.setSingleShot(True)
+        self._tabs_timer.timeout.connect(self._show_tabs)
+
+    @property
+    def arrangement(self) -> Layout:
+        """The layout that it shows."""
+        return self._layout
+
+    # -- opening ----------------------------------------------------------------------------------
+
+    def arrange(self) -> None:
+        """Put the panels where the layout has them at first; what a person moved is put back."""
+        for old in list(self.docks.values()):
+            old.setFloating(False)
+            self.removeDockWidget(old)
+        heads: list[Dock] = []
+        for column in self._layout.columns:
+            before: Dock | None = None
+            for names, _height in column.rows:
+                placed = self._put(names, before, heads)
+                if placed is not None and before is None:
+                    heads.append(placed)
+                before = placed or before
+        self._arranged = True
+        self._narrow = False
+        self._size()
+        QTimer.singleShot(0, self, self._size)
+        self._adapt()
+
+    def _put(self, names: Sequence[str], above: Dock | None, heads: Sequence[Dock]) -> Dock | None:
+        """One place of a column: below ``above``, or right of the column before."""
+        first: Dock | None = None
+        for name in names:
+            dock = self._dock(name)
+            if dock is None:
+                continue
+            if first is not None:
+                self.tabifyDockWidget(first, dock)
+            elif above is not None:
+                self.splitDockWidget(above, dock, DOWN)
+            elif heads:
+                self.splitDockWidget(heads[-1], dock, ACROSS)
+            else:
+                self.addDockWidget(AREA, dock)
+            dock.show()
+            first = first or dock
+        if first is not None:
+            first.raise_()
+        return first
+
+    def _size(self) -> None:
+        widths: list[tuple[QDockWidget, int]] = []
+        for column in self._layout.columns:
+            rows = [(self.docks[names[0]], high) for names, high in column.rows if names[0] in self.docks]
+            if not rows:
+                continue
+            widths.append((rows[0][0], column.width))
+            self.resizeDocks([dock for dock, _ in rows], [high for _, high in rows], DOWN)
+        self.resizeDocks([dock for dock, _ in widths], [wide for _, wide in widths], ACROSS)
+
+    def _dock(self, name: str) -> Dock | None:
+        """The dock of a panel, made when it is the first time; None when there is no such panel."""
+        if name in self.docks:
+            return self.docks[name]
+        description = self._panels.get(name)
+        if description is None:
+            return None
+        panel: PanelWidget = description.make(self._context)
+        dock = Dock(self._theme, description, panel, self._layout.density)
+        dock.dockLocationChanged.connect(self._tabs_soon)
+        dock.topLevelChanged.connect(self._tabs_soon)
+        dock.visibilityChanged.connect(self._tabs_soon)
+        self.docks[name] = dock
+        return dock
+
+    def open(self, name: str) -> Dock | None:
+        """Show a panel, in front and where it was; None when there is no such panel."""
+        dock = self._dock(name)
+        if dock is None:
+            return None
+        if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
+            self._join(dock)
+        dock.show()
+        dock.raise_()
+        self._tabs_soon()
+        return dock
+
+    def _join(self, dock: Dock) -> None:
+        """Give a panel that has no place yet one beside the last panel of the last column."""
+        others = [other for other in self.docks.values() if other is not dock and not other.isFloating()]
+        placed = [o for o in others if self.dockWidgetArea(o) != Qt.DockWidgetArea.NoDockWidgetArea]
+        if placed:
+            self.tabifyDockWidget(placed[-1], dock)
+        else:
+            self.addDockWidget(AREA, dock)
+
+    def open_names(self) -> tuple[str, ...]:
+        """The panels that are open, also those behind a tab."""
+        return tuple(name for name, dock in self.docks.items() if not dock.isHidden())
+
+    # -- tabs in the titles -----------------------------------------------------------------------
+
+    def _tabs_soon(self, *_what: object) -> None:
+        self._tabs_timer.start(0)
+
+    def _show_tabs(self) -> None:
+        order = list(self.docks.values())
+        for dock in order:
+            together = [
+                other
+                for other in order
+                if other is dock or (other in self.tabifiedDockWidgets(dock) and not other.isHidden())
+            ]
+            if dock.isFloating() or len(together) < 2:
+                dock.title.set_tabs(())
+            else:
+                dock.title.set_tabs(
+                    [(other.panel.title(), other is dock, _raiser(other)) for other in together]
+                )
+
+    # -- narrow windows ---------------------------------------------------------------------------
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._adapt()
+
+    def _adapt(self) -> None:
+        narrow = self.width() < NARROW_PX
+        if not self._arranged or narrow == self._narrow:
+            return
+        first, second = (self.docks.get(name) for name in self._layout.narrow)
+        if first is None or second is None or first.isFloating() or second.isFloating():
+            return
+        self._narrow = narrow
+        if narrow:
+            self.tabifyDockWidget(first, second)
+            first.raise_()
+        elif second in self.tabifiedDockWidgets(first):
+            self.splitDockWidget(first, second, self._split_of(first.description.name))
+            QTimer.singleShot(0, self, self._size)
+        self._tabs_soon()
+
+    def _split_of(self, name: str) -> Qt.Orientation:
+        second = self._layout.narrow[1]
+        same = any(
+            {name, second} <= {n for names, _ in column.rows for n in names}
+            for column in self._layout.columns
+        )
+        return DOWN if same else ACROSS
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self._floating = [dock for dock in self.docks.values() if dock.isFloating() and dock.isVisible()]
+        for dock in self._floating:
+            dock.hide()
+        super().hideEvent(event)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        for dock in self._floating:
+            dock.show()
+        self._floating = []
+
+    # -- the tick ---------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Let every panel that can be seen show what is new."""
+        for name, dock in self.docks.items():
+            sentence = dock.refresh()
+            if sentence is not None:
+                self.panel_failed.emit(name, sentence)
+
+    def focus_panel(self, dock: Dock) -> None:
+        """Bring a panel to the front and give it the keyboard."""
+        dock.show()
+        dock.raise_()
+        if dock.isFloating():
+            dock.activateWindow()
+        target = dock.panel.nextInFocusChain()
+        inside = target if target is not None and dock.panel.isAncestorOf(target) else None
+        (inside or dock.panel).setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    # -- kept between starts ----------------------------------------------------------------------
+
+    def save(self) -> dict[str, object]:
+        """Where everything is, for `restore`."""
+        return {
+            "open": [
+                name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
+            ],
+            "docks": base64.b64encode(self.saveState(STATE_VERSION).data()).decode("ascii"),
+            "panels": {name: dock.panel.save_state() for name, dock in self.docks.items()},
+            "narrow": self._narrow,
+        }
+
+    def restore(self, saved: Mapping[str, object]) -> bool:
+        """Put everything where `save` found it; False (and the first arrangement) if it does not fit."""
+        self.arrange()
+        names, docks, panels = saved.get("open"), saved.get("docks"), saved.get("panels")
+        if not isinstance(names, list) or not isinstance(docks, str):
+            return False
+        for name in names:
+            if isinstance(name, str) and name not in self.docks:
+                self.open(name)
+        try:
+            state = base64.b64decode(docks, validate=True)
+        except (binascii.Error, ValueError):
+            return False
+        if not self.restoreState(QByteArray(state), STATE_VERSION):
+            self.arrange()
+            return False
+        self._narrow = saved.get("narrow") is True
+        for name, dock in self.docks.items():
+            state_of = panels.get(name) if isinstance(panels, Mapping) else None
+            if isinstance(state_of, Mapping):
+                dock.panel.restore_state(state_of)
+        self._tabs_soon()
+        return True
+
+    def shut(self) -> None:
+        """The window closes: every panel ends its watches."""
+        for dock in self.docks.values():
+            dock.panel.shut()
+
+
+def _raiser(dock: Dock) -> Callable[[], object]:
+    def bring() -> None:
+        dock.raise_()
+        dock.panel.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    return bring
