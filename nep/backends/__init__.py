@@ -1,0 +1,1 @@
+"""Back ends: what carries bytes between nodes. Each module binds one `BACKEND`."""

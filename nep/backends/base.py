@@ -1,0 +1,150 @@
+"""The contract of back ends. `nep.backends.memory` is the template; one contract test runs over all of them.
+
+A `Backend` opens one `Carrier` for a node; the carrier makes `Outlet`s (for publishers) and `Inlet`s (for
+subscribers). All of them may be used from any thread. Sequence numbers and `count` begin with 1 at the first
+message published, whether somebody listens or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from nep.codecs import Codec
+from nep.configuration import Configuration
+from nep.encoded import Encoded
+from nep.inbox import MAX_BYTES, MAX_MESSAGES, Keep
+from nep.message import Message
+from nep.records import NodeRecord
+from nep.views import GraphView
+
+__all__ = [
+    "HANDSHAKE_S",
+    "Backend",
+    "Carrier",
+    "Inlet",
+    "Outlet",
+    "PublisherSpec",
+    "Sink",
+    "SubscriberSpec",
+]
+
+HANDSHAKE_S = 0.5
+"""How long a new publisher or subscriber waits for the other side, at most."""
+
+Sink = Callable[[Sequence[Message]], None]
+"""Takes messages in batches, in the carrier's thread; it returns soon and does not raise."""
+
+
+@dataclass(frozen=True)
+class PublisherSpec:
+    """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit."""
+
+    id: int
+    topic: str
+    msg_type: str
+    codec: Codec
+    is_latched: bool
+    configuration: Configuration
+    wait_s: float | None
+
+
+@dataclass(frozen=True)
+class SubscriberSpec:
+    """What a subscriber shall be. With a `sink` nothing is kept for `Inlet.poll`."""
+
+    id: int
+    topic: str
+    msg_type: str
+    configuration: Configuration
+    wait_s: float | None
+    keep: Keep = "all"
+    max_messages: int = MAX_MESSAGES
+    max_bytes: int = MAX_BYTES
+    sink: Sink | None = None
+
+
+class Outlet(Protocol):
+    """What a publisher sends through."""
+
+    @property
+    def subscribers(self) -> int:
+        """How many subscribers are connected now."""
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes whose subscribers are registered and have not connected."""
+
+    @property
+    def count(self) -> int:
+        """Messages published so far."""
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish. Never blocks: what a subscriber cannot take is lost to it, and it counts that."""
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, and deliver what is on its way within `timeout_s`; what was not is logged."""
+
+
+class Inlet(Protocol):
+    """What a subscriber receives through."""
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+
+    @property
+    def lost(self) -> int | None:
+        """Messages that did not arrive or were dropped here for lack of room; None when nobody can know."""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it was closed, or its carrier was."""
+
+    def poll(self) -> Message | None:
+        """The next message if one is there. Does not wait."""
+
+    def report(self, problem: str) -> None:
+        """The reader could not read a message, and why; an empty sentence means that it can again."""
+
+    def close(self) -> None:
+        """Unregister and forget what was not read."""
+
+
+class Carrier(Protocol):
+    """One node's way to the others."""
+
+    def publisher(self, spec: PublisherSpec) -> Outlet:
+        """A new publisher: the first message reaches every subscriber that was there before.
+
+        Raises `MasterUnreachable`, `AddressInUseError`, `RequestRefusedError`.
+        """
+
+    def subscriber(self, spec: SubscriberSpec) -> Inlet:
+        """A new subscriber: what is published after this arrives. Raises as `publisher` does."""
+
+    def wait(self, inlets: Sequence[Inlet], timeout_s: float) -> None:
+        """Wait until one of `inlets` may have a message or `wake` is called, at most `timeout_s` seconds."""
+
+    def wake(self) -> None:
+        """End all waits that are under way."""
+
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
+        """Who is there. Raises `MasterUnreachable`."""
+
+    def close(self, timeout_s: float) -> None:
+        """Close all outlets and inlets, unregister, end the thread."""
+
+
+@dataclass(frozen=True)
+class Backend:
+    """A plug-in that carries bytes. `open` raises `BackendUnavailableError` when `needs` is not installed."""
+
+    name: str
+    open: Callable[[NodeRecord], Carrier]
+    needs: str = ""
+    aliases: tuple[str, ...] = ()

@@ -1,0 +1,300 @@
+"""The back end `memory`: nodes of one process, without sockets. The template for other back ends.
+
+Nodes that name the same master meet; nothing listens there. Publishing puts the message straight into the
+subscribers' inboxes, in the publisher's thread.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+
+from nep.backends.base import Backend, Inlet, PublisherSpec, SubscriberSpec
+from nep.configuration import Configuration, Hybrid
+from nep.encoded import Encoded
+from nep.errors import NepError, RequestRefusedError
+from nep.graph import Graph, GraphView
+from nep.inbox import Inbox
+from nep.message import Message
+from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.requests import (
+    AddPublisher,
+    AddSubscriber,
+    Leave,
+    Refused,
+    RemovePublisher,
+    RemoveSubscriber,
+    Renew,
+    Request,
+)
+
+__all__ = ["BACKEND"]
+
+_BATCH_S = 0.005
+"""Sinks are called 200 times a second at most."""
+
+
+class _Hub:
+    """Where the nodes of one master's name meet. Its lock guards everything of the back end but inboxes."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
+        self.carriers: dict[str, MemoryCarrier] = {}
+        self.outlets: dict[str, list[MemoryOutlet]] = {}
+        self.inlets: dict[str, tuple[MemoryInlet, ...]] = {}
+
+    def ask(self, request: Request) -> None:
+        """Tell the graph. Raises `RequestRefusedError`."""
+        with self.lock:
+            for each in self.graph.apply(request, 0, time.monotonic(), ""):
+                if isinstance(each.answer, Refused):
+                    raise RequestRefusedError(each.answer.reason)
+
+    def view(self) -> GraphView:
+        """The graph with everybody's statistics of this moment."""
+        with self.lock:
+            for carrier in self.carriers.values():
+                self.ask(carrier.renewal(self))
+            return self.graph.view()
+
+
+_hubs: dict[str, _Hub] = {}
+_hubs_lock = threading.Lock()
+
+
+def _hub(configuration: Configuration) -> _Hub:
+    if not isinstance(configuration, Hybrid):
+        raise NepError("the back end 'memory' has no direct connections; use 'zeromq' for them")
+    with _hubs_lock:
+        return _hubs.setdefault(configuration.master, _Hub())
+
+
+class MemoryOutlet:
+    """A publisher: hands every message to the inlets of its topic."""
+
+    def __init__(self, carrier: MemoryCarrier, hub: _Hub, spec: PublisherSpec) -> None:
+        self._carrier = carrier
+        self.hub = hub
+        self.spec = spec
+        self.count = 0
+        self.bytes = 0
+        self.last_stamp_ns: int | None = None
+        self.latched: Message | None = None
+        self.missing: tuple[str, ...] = ()
+        self.is_closed = False
+
+    @property
+    def subscribers(self) -> int:
+        """How many inlets there are on the topic."""
+        return len(self.hub.inlets.get(self.spec.topic, ()))
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self.hub.lock:
+            self.count += 1
+            self.last_stamp_ns = time.time_ns()
+
+    def send(self, encoded: Encoded) -> None:
+        """Put it into the inboxes; `data` that can still be changed is copied."""
+        data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
+        with self.hub.lock:
+            self.skip()
+            self.bytes += len(data)
+            message = Message(
+                self.spec.topic,
+                data,
+                self.spec.codec.name,
+                self.spec.msg_type,
+                stamp_ns=self.last_stamp_ns,
+                seq=self.count,
+                publisher=self.spec.id,
+                extension=encoded.extension or {},
+            )
+            message.is_latched = self.spec.is_latched
+            if self.spec.is_latched:
+                self.latched = message
+            for inlet in self.hub.inlets.get(self.spec.topic, ()):
+                inlet.put(message)
+
+    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - nothing is ever on its way here
+        """Unregister. Everything was delivered when it was sent."""
+        with self.hub.lock:
+            if not self.is_closed:
+                self.is_closed = True
+                self.hub.outlets[self.spec.topic].remove(self)
+                self.hub.ask(RemovePublisher(self._carrier.node.id, self.spec.id, self.count))
+
+
+class MemoryInlet:
+    """A subscriber: its inbox, or its sink."""
+
+    def __init__(self, carrier: MemoryCarrier, hub: _Hub, spec: SubscriberSpec) -> None:
+        self._carrier = carrier
+        self.hub = hub
+        self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
+        self.spec = spec
+        self.received = 0
+        self.lost = 0
+        self.problem = ""
+        self.is_closed = False
+
+    def put(self, message: Message) -> None:
+        """Called by publishers."""
+        with self._carrier.changed:
+            dropped = self._inbox.put(message)
+            self.received += 1 - dropped
+            self.lost += dropped
+            self._carrier.changed.notify_all()
+
+    def poll(self) -> Message | None:
+        """The next message if one is there."""
+        with self._carrier.changed:
+            return self._inbox.take()
+
+    def take_all(self) -> list[Message]:
+        """All messages that are there."""
+        with self._carrier.changed:
+            return self._inbox.take_all()
+
+    @property
+    def waiting(self) -> int:
+        """How many messages are there."""
+        return len(self._inbox)
+
+    def report(self, problem: str) -> None:
+        """Shown as an alert in the graph."""
+        self.problem = problem
+
+    def close(self) -> None:
+        """Unregister and forget what was not read."""
+        with self.hub.lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+            others = tuple(each for each in self.hub.inlets[self.spec.topic] if each is not self)
+            self.hub.inlets[self.spec.topic] = others
+            self.hub.ask(RemoveSubscriber(self._carrier.node.id, self.spec.id))
+        self._carrier.wake()
+
+
+class MemoryCarrier:
+    """One node's way to the others of its process."""
+
+    def __init__(self, node: NodeRecord) -> None:
+        self.node = node
+        self.changed = threading.Condition()
+        self._wakes = 0
+        self._hubs: set[_Hub] = set()
+        self._outlets: list[MemoryOutlet] = []
+        self._inlets: list[MemoryInlet] = []
+        self._sinks: list[MemoryInlet] = []
+        self._thread: threading.Thread | None = None
+        self._closing = threading.Event()
+
+    def publisher(self, spec: PublisherSpec) -> MemoryOutlet:
+        """Register a publisher."""
+        hub = self._join(spec.configuration)
+        with hub.lock:
+            record = PublisherRecord(
+                spec.id, spec.topic, spec.msg_type, spec.codec.name, ("memory",), spec.is_latched
+            )
+            hub.ask(AddPublisher(self.node, record))
+            outlet = MemoryOutlet(self, hub, spec)
+            hub.outlets.setdefault(spec.topic, []).append(outlet)
+            self._outlets.append(outlet)
+        return outlet
+
+    def subscriber(self, spec: SubscriberSpec) -> MemoryInlet:
+        """Register a subscriber, and hand it what is latched."""
+        hub = self._join(spec.configuration)
+        with hub.lock:
+            hub.ask(AddSubscriber(self.node, SubscriberRecord(spec.id, spec.topic, spec.msg_type)))
+            inlet = MemoryInlet(self, hub, spec)
+            for outlet in hub.outlets.get(spec.topic, ()):
+                if outlet.latched is not None:
+                    inlet.put(outlet.latched)
+            hub.inlets[spec.topic] = (*hub.inlets.get(spec.topic, ()), inlet)
+            self._inlets.append(inlet)
+        if spec.sink is not None:
+            self._pour(inlet)
+        return inlet
+
+    def wait(self, inlets: Sequence[Inlet], timeout_s: float) -> None:
+        """Wait for a message in one of `inlets`, or for `wake`."""
+        mine = [each for each in inlets if isinstance(each, MemoryInlet)]
+        with self.changed:
+            before = self._wakes
+            self.changed.wait_for(
+                lambda: self._wakes != before or any(each.waiting for each in mine), timeout_s
+            )
+
+    def wake(self) -> None:
+        """End all waits."""
+        with self.changed:
+            self._wakes += 1
+            self.changed.notify_all()
+
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - at once
+        """Who is there."""
+        return _hub(configuration).view()
+
+    def renewal(self, hub: _Hub) -> Renew:
+        """This node's statistics on one hub."""
+        return Renew(
+            self.node.id,
+            hub.graph.epoch,
+            hub.graph.revision,
+            tuple(
+                PublisherCount(each.spec.id, each.count, each.bytes, each.count, each.last_stamp_ns)
+                for each in self._outlets
+                if each.hub is hub and not each.is_closed
+            ),
+            tuple(
+                SubscriberCount(each.spec.id, each.received, each.lost, each.problem)
+                for each in self._inlets
+                if each.hub is hub and not each.is_closed
+            ),
+        )
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister all and end the thread."""
+        self._closing.set()
+        for inlet in self._inlets:
+            inlet.close()
+        self._sinks = []
+        for outlet in self._outlets:
+            outlet.close(timeout_s)
+        for hub in self._hubs:
+            with hub.lock:
+                hub.carriers.pop(self.node.id, None)
+                hub.ask(Leave(self.node.id))
+        self.wake()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(timeout_s)
+
+    def _join(self, configuration: Configuration) -> _Hub:
+        hub = _hub(configuration)
+        with hub.lock:
+            hub.carriers[self.node.id] = self
+            self._hubs.add(hub)
+        return hub
+
+    def _pour(self, inlet: MemoryInlet) -> None:
+        self._sinks = [*self._sinks, inlet]
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name=f"nep-sinks-{self.node.name}", daemon=True)
+            self._thread.start()
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            self.wait(self._sinks, 0.1)
+            for inlet in self._sinks:
+                messages = inlet.take_all()
+                if messages and inlet.spec.sink is not None:
+                    inlet.spec.sink(messages)
+            self._closing.wait(_BATCH_S)
+
+
+BACKEND = Backend("memory", MemoryCarrier)

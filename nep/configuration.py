@@ -1,0 +1,57 @@
+"""How a publisher or subscriber is connected: with a master (hybrid) or straight to an address (direct)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from nep.errors import NepError, did_you_mean
+
+__all__ = ["Configuration", "Direct", "Hybrid", "Mode", "checked_mode", "checked_port"]
+
+Mode = Literal["one2many", "many2one", "many2many"]
+
+_MODES: dict[str, Mode] = {"one2many": "one2many", "many2one": "many2one", "many2many": "many2many"}
+
+
+@dataclass(frozen=True)
+class Hybrid:
+    """Connected through the master at `master`. Any number on both sides, whatever the mode says."""
+
+    master: str
+    mode: Mode = "many2many"
+
+
+@dataclass(frozen=True)
+class Direct:
+    """Connected without a master, at `ip:port`.
+
+    one2many: the publisher binds the port. many2one: the subscriber does. many2many: both connect, publishers
+    to `port`, subscribers to `port + 1`, and a proxy of the original NEP has to run there. `wire`: "original"
+    frames of `generation` "A" (`topic {…}`) or "B" (`{…}`), or the "native" wire.
+    """
+
+    ip: str
+    port: int
+    mode: Mode
+    generation: Literal["A", "B"] = "A"
+    wire: Literal["original", "native"] = "original"
+
+
+Configuration = Hybrid | Direct
+
+
+def checked_mode(mode: str) -> Mode:
+    """`mode` as a `Mode`. Raises `NepError` with the names there are."""
+    try:
+        return _MODES[mode]
+    except KeyError:
+        raise NepError(f"no mode '{mode}'; {did_you_mean(mode, tuple(_MODES))}") from None
+
+
+def checked_port(port: str | int) -> int:
+    """`port` as a number from 1 to 65535. Raises `NepError`."""
+    text = str(port)
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 65535:
+        raise NepError(f"'{port}' is no port; use a number from 1 to 65535")
+    return int(text)

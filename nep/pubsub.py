@@ -1,0 +1,219 @@
+"""Publisher and Subscriber: payloads in, payloads out. Made by `Node.new_pub` and `Node.new_sub`."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from nep.backends.base import Carrier, Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.codecs import codec_for
+from nep.encoded import Encoded
+from nep.errors import ClosedError, DecodeError
+from nep.message import Message
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["SLICE_S", "Publisher", "Subscriber"]
+
+SLICE_S = 0.1
+"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+
+_logger = logging.getLogger("nep")
+
+
+class Publisher:
+    """Publishes on one topic. Use it from any thread; a context manager."""
+
+    def __init__(self, outlet: Outlet, spec: PublisherSpec) -> None:
+        self._outlet = outlet
+        self._spec = spec
+        self._encode = spec.codec.encode
+        self._is_closed = False
+
+    @property
+    def topic(self) -> str:
+        """The topic's name."""
+        return self._spec.topic
+
+    @property
+    def msg_type(self) -> str:
+        """The type under which it is registered."""
+        return self._spec.msg_type
+
+    @property
+    def id(self) -> int:
+        """Its id, as in `Message.publisher` and in the graph."""
+        return self._spec.id
+
+    @property
+    def subscribers(self) -> int:
+        """How many subscribers are connected now. Costs nothing."""
+        return self._outlet.subscribers
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes that subscribe and have not connected: hung, or just being connected."""
+        return self._outlet.missing
+
+    @property
+    def count(self) -> int:
+        """Messages published so far, also those that nobody was there to hear."""
+        return self._outlet.count
+
+    def publish(self, payload: object) -> None:
+        """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.
+
+        With no subscriber nothing is encoded, unless it is latched. Raises `EncodeError`, `ClosedError`.
+        """
+        if self._is_closed:
+            raise ClosedError(f"publisher '{self.topic}'")
+        if not self._outlet.subscribers and not self._spec.is_latched:
+            self._outlet.skip()
+        elif isinstance(payload, Encoded):
+            self._outlet.send(payload)
+        else:
+            self._outlet.send(self._encode(payload))
+
+    def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
+        """Send bytes that are encoded already. Raises `ClosedError`."""
+        self.publish(Encoded(data, extension))
+
+    def close(self, timeout_s: float = 2.0) -> None:
+        """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._outlet.close(timeout_s)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Publisher({self.topic!r}, {self.msg_type!r})"
+
+
+class Subscriber:
+    """Receives from one topic, in order. Iterating yields `Message`s until it is closed; a context manager."""
+
+    def __init__(self, carrier: Carrier, inlet: Inlet, spec: SubscriberSpec) -> None:
+        self._carrier = carrier
+        self._inlet = inlet
+        self._spec = spec
+        self._empty = codec_for(spec.msg_type).empty
+        self._problem = ""
+
+    @property
+    def topic(self) -> str:
+        """The topic's name."""
+        return self._spec.topic
+
+    @property
+    def msg_type(self) -> str:
+        """The type under which it is registered; messages tell their own."""
+        return self._spec.msg_type
+
+    @property
+    def id(self) -> int:
+        """Its id in the graph."""
+        return self._spec.id
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self._inlet.received
+
+    @property
+    def lost(self) -> int | None:
+        """Messages that did not arrive or were dropped here unread; None where nobody can know."""
+        return self._inlet.lost
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it, or its node, was closed."""
+        return self._inlet.is_closed
+
+    def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
+        """(True, payload) of the next message, or (False, an empty payload) when there is none.
+
+        Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
+        decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
+        """
+        limit = None if block_mode and timeout_s is None else (timeout_s or 0.0)
+        deadline = None if limit is None else time.monotonic() + limit
+        while True:
+            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            message = self.receive(left)
+            if message is None:
+                return False, self._empty()
+            try:
+                return True, self.decoded(message)
+            except DecodeError:
+                continue
+
+    def receive(self, timeout_s: float | None = None) -> Message | None:
+        """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
+
+        Raises `ClosedError`.
+        """
+        message = self._poll()
+        if message is not None or timeout_s == 0.0:
+            return message
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+            if left <= 0.0:
+                return None
+            self._carrier.wait((self._inlet,), left)
+            message = self._poll()
+            if message is not None:
+                return message
+
+    def _poll(self) -> Message | None:
+        if self._inlet.is_closed:
+            raise ClosedError(f"subscriber '{self.topic}'")
+        return self._inlet.poll()
+
+    def decoded(self, message: Message) -> object:
+        """The payload of a message that this subscriber got; a problem is logged once and shown in the graph.
+
+        Raises `DecodeError`.
+        """
+        try:
+            payload = message.payload
+        except DecodeError as error:
+            if not self._problem:
+                _logger.warning("a message on '%s' cannot be read: %s", self.topic, error)
+            self._problem = str(error)
+            self._inlet.report(self._problem)
+            raise
+        if self._problem:
+            self._problem = ""
+            self._inlet.report("")
+        return payload
+
+    def close(self) -> None:
+        """Unregister; what was not read is forgotten. May be called twice."""
+        self._inlet.close()
+
+    def __iter__(self) -> Iterator[Message]:
+        while True:
+            try:
+                message = self.receive()
+            except ClosedError:
+                return
+            if message is not None:
+                yield message
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Subscriber({self.topic!r}, {self.msg_type!r})"
