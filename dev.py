@@ -382,7 +382,9 @@ def main(arguments: Sequence[str] | None = None, computer: Computer | None = Non
     parser.add_argument("command", choices=["demo", *SCRIPTS, "setup"])
     command: str = parser.parse_args(given[:1]).command
     # A terminal that closes, or a CI that gives up, must not leave a virtual screen behind.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda number, _frame: sys.exit(128 + number))
     try:
         return run(computer or Computer(), command, given[1:])
     except Trouble as trouble:

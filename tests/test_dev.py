@@ -245,11 +245,13 @@ def test_a_script_that_this_revision_lacks_is_told_in_a_sentence(capsys: pytest.
 
 
 def test_trouble_ends_with_code_2_and_its_sentence(capsys: pytest.CaptureFixture[str]) -> None:
-    previous = signal.getsignal(signal.SIGTERM)
+    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    previous = [(number, signal.getsignal(number)) for number in numbers]
     try:
         code = dev.main(["demo"], FakeSystem().computer(version=(3, 9)))
     finally:
-        signal.signal(signal.SIGTERM, previous)
+        for number, handler in previous:
+            signal.signal(number, handler)
     assert code == 2
     assert capsys.readouterr().err.startswith("dev.py: Python 3.10 to 3.13 is needed")
 
