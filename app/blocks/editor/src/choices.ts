@@ -1,0 +1,111 @@
+// Drop-downs whose options come from outside (robots, topics) and which never drop a value they do not know.
+import * as Blockly from 'blockly/core';
+
+export type Option = [string, string];
+
+/** The newest options of each source: "topics", "robots:pepper". */
+const sources = new Map<string, Option[]>();
+
+export function isOption(value: unknown): value is Option {
+  return Array.isArray(value) && typeof value[0] === 'string' && typeof value[1] === 'string';
+}
+
+/** Remembers a source's options. True if they are new. */
+export function setSource(source: string, options: Option[]): boolean {
+  if (JSON.stringify(sources.get(source)) === JSON.stringify(options)) return false;
+  sources.set(source, options);
+  return true;
+}
+
+export interface ChoiceConfig extends Blockly.FieldConfig {
+  options?: unknown[];
+  source?: string;
+  value?: string;
+  topic?: string;
+  text?: string;
+  /** The field of a message (of the topic in that field), not a topic. */
+  of?: string;
+}
+
+const OTHER = '\u0000other';
+
+export class FieldChoice extends Blockly.FieldDropdown {
+  private readonly given: Option[];
+  private readonly source: string;
+  /** The value the block has although no option offers it. */
+  private kept: string | null = null;
+
+  /** `typed`: what a person may type instead of choosing ("topic", "field"), or "". */
+  constructor(config: ChoiceConfig, private readonly typed = '') {
+    super(Blockly.Field.SKIP_SETUP);
+    this.given = (config.options ?? []).filter(isOption);
+    this.source = config.source ?? (typed === 'topic' ? 'topics' : '');
+    const value = config.value ?? config.topic ?? config.text;
+    if (value !== undefined) this.kept = value;
+    this.setOptions(() => this.choices());
+    if (value !== undefined) this.setValue(value);
+    this.configure_(config);
+  }
+
+  /** Present options, always with the present value among them and never empty. */
+  private choices(): Option[] {
+    const options: Option[] = [...((this.source && sources.get(this.source)) || this.given)];
+    const kept = this.kept;
+    if (kept !== null && !options.some((each) => each[1] === kept)) options.push([kept, kept]);
+    if (this.typed) options.push([`other ${this.typed}…`, OTHER]);
+    return options.length ? options : [['–', '']];
+  }
+
+  /** Reads the source again; the value stays, its label may change. */
+  refresh(): void {
+    const before = this.getText();
+    this.getOptions(false);
+    if (this.value_ !== null) this.doValueUpdate_(this.value_);
+    if (this.getText() !== before && this.getSourceBlock()) this.forceRerender();
+  }
+
+  override setOptions(options: Blockly.MenuGenerator): void {
+    this.menuGenerator_ = options;
+    const first = this.getOptions(false)[0];
+    if (Array.isArray(first)) this.setValue(first[1] === OTHER ? '' : first[1]);
+  }
+
+  protected override doClassValidation_(value?: unknown): string | null {
+    return typeof value === 'string' && value !== OTHER ? value : null;
+  }
+
+  protected override doValueUpdate_(value: string): void {
+    this.kept = value;
+    this.getOptions(false);
+    super.doValueUpdate_(value);
+  }
+
+  protected override onItemSelected_(menu: Blockly.Menu, item: Blockly.MenuItem): void {
+    if (item.getValue() !== OTHER) {
+      super.onItemSelected_(menu, item);
+      return;
+    }
+    Blockly.dialog.prompt(`Name of the ${this.typed}`, this.value_ ?? '', (words) => {
+      const name = words?.trim();
+      if (name) this.setValue(name);
+    });
+  }
+
+  static override fromJson(config: Blockly.FieldConfig): FieldChoice {
+    return new FieldChoice(config as ChoiceConfig);
+  }
+}
+
+/** The name of a topic (or of a message's field): one that is known now, or any other that is typed. */
+export class FieldTopic extends FieldChoice {
+  constructor(config: ChoiceConfig) {
+    super(config, config.of === undefined ? 'topic' : 'field');
+  }
+
+  static override fromJson(config: Blockly.FieldConfig): FieldTopic {
+    return new FieldTopic(config as ChoiceConfig);
+  }
+}
+
+Blockly.fieldRegistry.register('field_choice', FieldChoice);
+Blockly.fieldRegistry.register('field_topic', FieldTopic);

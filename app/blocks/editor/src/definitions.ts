@@ -1,0 +1,105 @@
+// Block definitions from the window: registering them, and knowing what changed.
+import * as Blockly from 'blockly/core';
+import {type Option, isOption, setSource} from './choices';
+
+export interface BlockArg {
+  type: string;
+  name?: string;
+  source?: string;
+  options?: unknown;
+  [other: string]: unknown;
+}
+
+export interface BlockDefinition {
+  type: string;
+  mutator?: string;
+  extensions?: string[];
+  output?: unknown;
+  previousStatement?: unknown;
+  nextStatement?: unknown;
+  [other: string]: unknown;
+}
+
+const known = new Map<string, {definition: BlockDefinition; key: string}>();
+
+export function definitionOf(type: string): BlockDefinition | null {
+  return known.get(type)?.definition ?? null;
+}
+
+/** All args of all message rows. */
+export function argsOf(definition: BlockDefinition): BlockArg[] {
+  const rows = Object.keys(definition).filter((name) => /^args\d+$/.test(name));
+  return rows.flatMap((name) => definition[name] as BlockArg[]);
+}
+
+export function inputKinds(definition: BlockDefinition): Map<string, 'value' | 'statement'> {
+  const result = new Map<string, 'value' | 'statement'>();
+  for (const arg of argsOf(definition)) {
+    if (arg.type === 'input_value') result.set(arg.name ?? '', 'value');
+    if (arg.type === 'input_statement') result.set(arg.name ?? '', 'statement');
+  }
+  return result;
+}
+
+export function fieldNames(definition: BlockDefinition): Set<string> {
+  const fields = argsOf(definition).filter((arg) => arg.type.startsWith('field_'));
+  return new Set(fields.map((arg) => arg.name ?? ''));
+}
+
+/** Registers all definitions; says which types are new or differ, and whether a source's options changed. */
+export function define(definitions: BlockDefinition[]): {changed: Set<string>; sources: boolean} {
+  const changed = new Set<string>();
+  let sources = false;
+  for (const definition of definitions) {
+    for (const arg of argsOf(definition)) {
+      const source = sourceOf(arg);
+      if (source && Array.isArray(arg.options)) {
+        sources = setSource(source, arg.options.filter(isOption)) || sources;
+      }
+    }
+    const key = keyOf(definition);
+    if (known.get(definition.type)?.key === key) continue;
+    known.set(definition.type, {definition, key});
+    changed.add(definition.type);
+    register(withQuotes(definition));
+  }
+  return {changed, sources};
+}
+
+/** Options by themselves: `{"topics": [["/faces", "/faces"], …]}`; true if any is new. */
+export function defineSources(all: Record<string, Option[]>): boolean {
+  return Object.entries(all).map(([name, options]) => setSource(name, options)).some(Boolean);
+}
+
+function sourceOf(arg: BlockArg): string {
+  return arg.source ?? (arg.type === 'field_topic' && arg['of'] === undefined ? 'topics' : '');
+}
+
+/** The definition as text, without the options which fields read again by themselves. */
+function keyOf(definition: BlockDefinition): string {
+  return JSON.stringify(definition, function (this: unknown, name: string, value: unknown) {
+    const owner = this as BlockArg;
+    return name === 'options' && typeof owner.type === 'string' && sourceOf(owner) ? undefined : value;
+  });
+}
+
+function register(definition: BlockDefinition): void {
+  const usable = {...definition};
+  delete usable.mutator;
+  usable.extensions = (definition.extensions ?? []).filter((each) => Blockly.Extensions.isRegistered(each));
+  Blockly.Blocks[definition.type] = {
+    init(this: Blockly.Block) {
+      this.jsonInit(usable);
+    },
+  };
+}
+
+/** A value block that is nothing but a text field gets “ ” around it. */
+function withQuotes(definition: BlockDefinition): BlockDefinition {
+  const args = definition['args0'] as BlockArg[] | undefined;
+  const only = args?.length === 1 ? args[0] : undefined;
+  const words = String(definition['message0']).replace(/[“”\s]/g, '');
+  if (!('output' in definition) || words !== '%1' || only?.type !== 'field_input') return definition;
+  const quote = (icon: string): BlockArg => ({type: 'field_icon', icon, size: 12});
+  return {...definition, message0: '%1 %2 %3', args0: [quote('quote-open'), only, quote('quote-close')]};
+}

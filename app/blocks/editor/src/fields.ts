@@ -1,0 +1,161 @@
+// The fields that Blockly does not have: icon, live value, colour chip.
+import * as Blockly from 'blockly/core';
+import {drawIcon, iconName} from './icons';
+
+const SVG = 'http://www.w3.org/2000/svg';
+const BLANK = 'data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=';
+
+interface IconConfig extends Blockly.FieldConfig {
+  name?: string;
+  icon?: string;
+  size?: number;
+  alt?: string;
+}
+
+/** A Lucide icon, white on the block; the category's icon when the name is not one of ours. */
+export class FieldIcon extends Blockly.FieldImage {
+  constructor(private readonly icon: string, private readonly side: number, alt: string) {
+    super(BLANK, side, side, alt);
+  }
+
+  override initView(): void {
+    if (!this.fieldGroup_) return;
+    this.fieldGroup_.classList.add('nepIcon');
+    this.fieldGroup_.setAttribute('aria-hidden', 'true');
+    const block = this.getSourceBlock();
+    drawIcon(this.fieldGroup_, iconName(this.icon, block?.getStyleName() ?? ''), this.side);
+  }
+
+  protected override doValueUpdate_(value: string): void {
+    this.value_ = value;
+  }
+
+  static override fromJson(config: Blockly.FieldConfig): FieldIcon {
+    const {icon, name, size, alt} = config as IconConfig;
+    return new FieldIcon(icon ?? name ?? '', size ?? 20, alt ?? '');
+  }
+}
+
+/** Words which the window sets while a sensor sends ("84 %"): never saved, never undone. */
+export class FieldLive extends Blockly.FieldLabel {
+  override SERIALIZABLE = false;
+
+  /** Shows the text; costs nothing when it is the same. Fires no event. */
+  show(text: string): void {
+    if (text === this.value_) return;
+    this.value_ = text;
+    this.forceRerender();
+  }
+
+  override initView(): void {
+    super.initView();
+    this.fieldGroup_?.classList.add('nepLive');
+  }
+
+  static override fromJson(_config: Blockly.FieldConfig): FieldLive {
+    return new FieldLive('');
+  }
+}
+
+interface ColourConfig extends Blockly.FieldConfig {
+  value?: string;
+  colour?: string;
+  text?: string;
+}
+
+const PALETTE: readonly [string, string][] = [
+  ['white', '#ffffff'], ['red', '#ff3b30'], ['orange', '#ff9500'], ['yellow', '#ffd60a'],
+  ['green', '#34c759'], ['cyan', '#3db8ff'], ['blue', '#0a5cff'], ['purple', '#af52de'],
+  ['pink', '#ff5fa2'], ['off', '#000000'],
+];
+const CHIP = {width: 39, height: 23};
+
+/** A colour "#rrggbb" as a chip; clicking it opens a small palette with a field for any other. */
+export class FieldColourChip extends Blockly.Field {
+  override SERIALIZABLE = true;
+  override EDITABLE = true;
+  private chip: SVGRectElement | null = null;
+
+  constructor(value: string) {
+    super(Blockly.Field.SKIP_SETUP);
+    this.setValue(value);
+    if (!this.value_) this.value_ = '#ffffff';
+  }
+
+  protected override initView(): void {
+    this.size_ = new Blockly.utils.Size(CHIP.width, CHIP.height);
+    this.fieldGroup_?.classList.add('nepColour');
+    this.chip = document.createElementNS(SVG, 'rect');
+    this.chip.setAttribute('class', 'nepChip');
+    for (const [name, value] of Object.entries({x: 1, y: 1, width: CHIP.width - 2, height: CHIP.height - 2, rx: 10.5})) {
+      this.chip.setAttribute(name, String(value));
+    }
+    this.fieldGroup_?.append(this.chip);
+    this.clickTarget_ = this.fieldGroup_;
+  }
+
+  protected override updateSize_(): void {
+    this.size_ = new Blockly.utils.Size(CHIP.width, CHIP.height);
+  }
+
+  protected override render_(): void {
+    this.updateSize_();
+    this.chip?.setAttribute('style', `fill:${this.value_ ?? ''}`);
+  }
+
+  protected override doClassValidation_(value?: unknown): string | null {
+    return typeof value === 'string' && /^#[0-9a-f]{6}$/i.test(value) ? value.toLowerCase() : null;
+  }
+
+  protected override getText_(): string {
+    return PALETTE.find(([, value]) => value === this.value_)?.[0] ?? this.value_ ?? '';
+  }
+
+  protected override showEditor_(): void {
+    const content = Blockly.DropDownDiv.getContentDiv();
+    Blockly.DropDownDiv.clearContent();
+    const box = document.createElement('div');
+    box.className = 'nepPalette';
+    box.setAttribute('role', 'group');
+    for (const [name, value] of PALETTE) {
+      const swatch = document.createElement('button');
+      swatch.type = 'button';
+      swatch.title = name;
+      swatch.setAttribute('aria-label', name);
+      swatch.setAttribute('aria-pressed', String(value === this.value_));
+      swatch.style.background = value;
+      swatch.onclick = () => this.choose(value);
+      box.append(swatch);
+    }
+    const other = document.createElement('input');
+    other.value = this.value_ ?? '';
+    other.spellcheck = false;
+    other.maxLength = 7;
+    other.setAttribute('aria-label', 'other colour, # and six digits');
+    other.oninput = () => other.classList.toggle('wrong', this.doClassValidation_(other.value) === null);
+    other.onkeydown = (event) => {
+      event.stopPropagation();
+      if (event.key === 'Enter' && this.doClassValidation_(other.value) !== null) this.choose(other.value);
+      if (event.key === 'Escape') Blockly.DropDownDiv.hideIfOwner(this);
+    };
+    box.append(other);
+    content.append(box);
+    Blockly.DropDownDiv.setColour('var(--nep-raised)', 'var(--nep-borderStrong)');
+    Blockly.DropDownDiv.showPositionedByField(this);
+    (box.querySelector('[aria-pressed=true]') as HTMLElement | null ?? other).focus();
+  }
+
+  private choose(value: string): void {
+    this.setValue(value);
+    Blockly.DropDownDiv.hideIfOwner(this);
+  }
+
+  static override fromJson(config: Blockly.FieldConfig): FieldColourChip {
+    const {value, colour, text} = config as ColourConfig;
+    return new FieldColourChip(value ?? colour ?? text ?? '#ffffff');
+  }
+}
+
+Blockly.fieldRegistry.register('field_icon', FieldIcon);
+Blockly.fieldRegistry.register('field_live', FieldLive);
+Blockly.fieldRegistry.register('field_colour_chip', FieldColourChip);

@@ -1,0 +1,49 @@
+// Lucide icons (ISC) as inlined path data, coloured by CSS.
+import lucide from 'virtual:icons';
+import {categoryIcon} from './tokens';
+
+const SVG = 'http://www.w3.org/2000/svg';
+
+/** Filled glyphs of our own, on the same 24 x 24 grid. */
+const FILLED: Readonly<Record<string, string>> = {
+  'quote-open':
+    '<path d="M10.6 5.2C6 6.6 3 10 3 14.3 3 17 4.600 18.800 6.900 18.800c2.100 0 3.600-1.500 3.600-3.500' +
+    ' 0-1.900-1.300-3.200-3.100-3.300.2-1.900 1.700-3.400 4-4.200zM21 5.200c-4.600 1.400-7.600 4.800-7.600 9.100' +
+    ' 0 2.700 1.600 4.500 3.900 4.500 2.100 0 3.600-1.500 3.600-3.500 0-1.900-1.300-3.200-3.100-3.300.2-1.900' +
+    ' 1.700-3.400 4-4.200z"/>',
+  'quote-close':
+    '<path d="M13.400 18.800c4.600-1.400 7.600-4.800 7.600-9.100 0-2.700-1.600-4.500-3.900-4.500-2.100 0-3.600 1.500-3.600 3.500' +
+    ' 0 1.900 1.300 3.200 3.100 3.300-.2 1.900-1.700 3.400-4 4.200zM3 18.800c4.600-1.400 7.600-4.800 7.600-9.100' +
+    ' 0-2.700-1.600-4.500-3.900-4.500-2.100 0-3.600 1.500-3.600 3.500 0 1.900 1.300 3.200 3.100 3.300-.2 1.900-1.700' +
+    ' 3.400-4 4.200z"/>',
+};
+
+/** The name itself if there is such an icon, else the icon of the category (block style). */
+export function iconName(name: string, style: string): string {
+  if (name in lucide || name in FILLED) return name;
+  const fallback = categoryIcon(style);
+  return fallback in lucide ? fallback : 'circle-dot';
+}
+
+/** Fills `group` with the icon, scaled to `size` units; colours come from CSS. */
+export function drawIcon(group: Element, name: string, size: number): void {
+  const filled = FILLED[name];
+  const inner = document.createElementNS(SVG, 'g');
+  inner.setAttribute('transform', `scale(${size / 24})`);
+  inner.setAttribute('class', filled ? 'nepGlyph' : 'nepLines');
+  inner.innerHTML = filled ?? lucide[name] ?? '';
+  group.replaceChildren(inner);
+}
+
+/** A free-standing <svg> of the icon for HTML (toolbox, buttons). */
+export function iconElement(name: string, size: number, stroke = 2): SVGSVGElement {
+  const svg = document.createElementNS(SVG, 'svg');
+  svg.setAttribute('viewBox', '0 0 24 24');
+  svg.setAttribute('width', String(size));
+  svg.setAttribute('height', String(size));
+  svg.setAttribute('class', 'nepLines');
+  svg.setAttribute('stroke-width', String(stroke));
+  svg.setAttribute('aria-hidden', 'true');
+  svg.innerHTML = lucide[name] ?? '';
+  return svg;
+}

@@ -1,0 +1,166 @@
+// Blocks which nobody here knows (a robot that was never seen, a newer Studio) are kept: shown grey, moved
+// like others, and written back exactly as they were read.
+import * as Blockly from 'blockly/core';
+import {type BlockDefinition, definitionOf, fieldNames, inputKinds} from './definitions';
+
+export const KEPT = 'nep_kept';
+
+export interface Connected {
+  block?: BlockState;
+  shadow?: BlockState;
+}
+
+export interface BlockState {
+  type: string;
+  id?: string;
+  x?: number;
+  y?: number;
+  fields?: Record<string, unknown>;
+  inputs?: Record<string, Connected>;
+  next?: Connected;
+  extraState?: unknown;
+  [other: string]: unknown;
+}
+
+type Shape = 'value' | 'statement' | 'hat';
+type InputKind = 'value' | 'statement';
+
+interface KeptState {
+  original: Record<string, unknown>;
+  shape: Shape;
+  inputs: [string, InputKind][];
+  label: string;
+  /** The children too are inside `original`: they could not be made. */
+  whole?: boolean;
+}
+
+function mapInputs(inputs: Record<string, Connected>, change: (each: Connected, name: string) => Connected) {
+  return Object.fromEntries(Object.entries(inputs).map(([name, each]) => [name, change(each, name)]));
+}
+
+/** `state` with every block that cannot be made here replaced by a kept one. */
+export function keep(state: BlockState, shape: Shape | null = null): BlockState {
+  const definition = definitionOf(state.type);
+  const known = definition !== null && fits(state, definition, shape);
+  const own = known ? inputKinds(definition) : new Map<string, InputKind>();
+  const kindOf = (name: string, each: Connected): InputKind => own.get(name) ?? guessInput(name, each);
+  const result: BlockState = {...state};
+  if (state.inputs) {
+    result.inputs = mapInputs(state.inputs, (each, name) => keepConnected(each, kindOf(name, each)));
+  }
+  if (state.next) result.next = keepConnected(state.next, 'statement');
+  if (known) return result;
+  const {id, x, y, inputs, next, ...original} = state;
+  void inputs;
+  void next;
+  const kept: KeptState = {
+    original,
+    shape: shape ?? guessTop(state),
+    inputs: Object.entries(state.inputs ?? {}).map(([name, each]) => [name, kindOf(name, each)]),
+    label: labelOf(state),
+  };
+  return {...position(id, x, y), type: KEPT, extraState: kept,
+    ...(result.inputs && {inputs: result.inputs}), ...(result.next && {next: result.next})};
+}
+
+/** One kept block that holds a whole stack: the last resort when even `keep` cannot be made. */
+export function keepWhole(state: BlockState): BlockState {
+  const {id, x, y, ...original} = state;
+  const kept: KeptState = {original, shape: 'statement', inputs: [], label: labelOf(state), whole: true};
+  return {...position(id, x, y), type: KEPT, extraState: kept};
+}
+
+/** The opposite of `keep` and `keepWhole`. */
+export function unkeep(state: BlockState): BlockState {
+  const result: BlockState = {...state};
+  if (state.inputs) result.inputs = mapInputs(state.inputs, unkeepConnected);
+  if (state.next) result.next = unkeepConnected(state.next);
+  if (state.type !== KEPT) return result;
+  const kept = state.extraState as KeptState;
+  const {type, extraState, ...rest} = result;
+  void type;
+  void extraState;
+  return {...kept.original, ...rest} as BlockState;
+}
+
+function position(id?: string, x?: number, y?: number): Record<string, unknown> {
+  return {...(id !== undefined && {id}), ...(x !== undefined && {x}), ...(y !== undefined && {y})};
+}
+
+function keepConnected(each: Connected, kind: InputKind): Connected {
+  return {...each, ...(each.block && {block: keep(each.block, kind)}),
+    ...(each.shadow && {shadow: keep(each.shadow, kind)})};
+}
+
+function unkeepConnected(each: Connected): Connected {
+  return {...each, ...(each.block && {block: unkeep(each.block)}), ...(each.shadow && {shadow: unkeep(each.shadow)})};
+}
+
+/** Whether the definition has a place for everything that the state holds. */
+function fits(state: BlockState, definition: BlockDefinition, shape: Shape | null): boolean {
+  const connection = shape === 'value' ? 'output' : shape === 'statement' ? 'previousStatement' : null;
+  if (connection && !(connection in definition)) return false;
+  if (state.next && !('nextStatement' in definition)) return false;
+  if (definition.mutator) return true;
+  const inputs = inputKinds(definition);
+  const fields = fieldNames(definition);
+  return Object.keys(state.inputs ?? {}).every((name) => inputs.has(name)) &&
+    Object.keys(state.fields ?? {}).every((name) => fields.has(name));
+}
+
+function guessInput(name: string, each: Connected): InputKind {
+  const child = each.block ?? each.shadow;
+  if (child?.type === KEPT) return (child.extraState as KeptState).shape === 'value' ? 'value' : 'statement';
+  const definition = child ? definitionOf(child.type) : null;
+  if (definition) return 'output' in definition ? 'value' : 'statement';
+  return child?.next || /^(do|else|then|body|stack|substack)/i.test(name) ? 'statement' : 'value';
+}
+
+function guessTop(state: BlockState): Shape {
+  if (/(^|_)when_/.test(state.type) || state.type.startsWith('events_')) return 'hat';
+  return /_get_/.test(state.type) && !state.next ? 'value' : 'statement';
+}
+
+function labelOf(state: BlockState): string {
+  const words = state.type.replace(/^robot_[^_]+_(do|get|when)_/, '').replace(/[_\s]+/g, ' ').trim();
+  const values = Object.values(state.fields ?? {}).filter((each) => ['string', 'number'].includes(typeof each));
+  return [words, ...values].join(' ').slice(0, 80);
+}
+
+interface KeptBlock extends Blockly.Block {
+  kept?: KeptState;
+}
+
+/** Whether this block stands for one that is not known here. */
+export function isKept(block: Blockly.Block): boolean {
+  return block.type === KEPT;
+}
+
+Blockly.Blocks[KEPT] = {
+  init(this: KeptBlock) {
+    this.setStyle('kept');
+    this.setInputsInline(true);
+  },
+  saveExtraState(this: KeptBlock) {
+    return this.kept ?? null;
+  },
+  loadExtraState(this: KeptBlock, state: KeptState) {
+    this.kept = state;
+    const title = this.appendDummyInput();
+    const icon = Blockly.fieldRegistry.fromJson({type: 'field_icon', name: 'circle-dashed'});
+    if (icon) title.appendField(icon);
+    title.appendField(state.label);
+    for (const [name, kind] of state.inputs) {
+      if (kind === 'value') this.appendValueInput(name);
+      else this.appendStatementInput(name);
+    }
+    if (state.shape === 'value') {
+      this.setOutput(true);
+    } else {
+      if (state.shape === 'hat') this.setStyle('kept_hat');
+      else this.setPreviousStatement(true);
+      this.setNextStatement(true);
+    }
+    this.setTooltip(`This file uses “${state.label}”, which is not known here. It is kept and skipped.`);
+  },
+};

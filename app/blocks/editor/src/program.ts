@@ -1,0 +1,163 @@
+// The workspace as JSON: loading, saving, telling the window about real edits.
+import * as Blockly from 'blockly/core';
+import {type BlockState, KEPT, keep, keepWhole, unkeep} from './kept';
+
+type Json = Record<string, unknown>;
+
+export interface Listener {
+  changed(json: string): void;
+  history(canUndo: boolean, canRedo: boolean): void;
+  selected(id: string): void;
+}
+
+const QUIET_MS = 150;
+
+/** Accepts every connection while a file is loaded: a program is shown as it was saved, types or not. */
+class Checker extends Blockly.ConnectionChecker {
+  static lenient = false;
+
+  override doTypeChecks(a: Blockly.Connection, b: Blockly.Connection): boolean {
+    return Checker.lenient || super.doTypeChecks(a, b);
+  }
+}
+Blockly.registry.register(Blockly.registry.Type.CONNECTION_CHECKER, 'nep', Checker);
+export const CHECKER = 'nep';
+
+export class Program {
+  /** Parts of the file that Blockly does not know; written back as they were. */
+  private rest: Json = {};
+  private told = '';
+  private timer = 0;
+  private historyTold = 'false false';
+  private loading = false;
+
+  constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly listener: Listener) {
+    workspace.addChangeListener((event) => this.onEvent(event));
+    // A hidden page draws no frames, and Blockly tells of edits only after a frame.
+    document.addEventListener('visibilitychange', () => document.hidden && this.flush());
+  }
+
+  /** A new file: forgets the old one and its undo. */
+  load(state: Json): void {
+    this.replace(state);
+    this.workspace.clearUndo();
+    window.clearTimeout(this.timer);
+    this.timer = 0;
+    this.told = JSON.stringify(this.save());
+    this.tellHistory();
+    this.goHome();
+  }
+
+  /** The same program made again (definitions changed): undo, view and selection stay. */
+  rebuild(): void {
+    const {scrollX, scrollY} = this.workspace;
+    const selected = Blockly.common.getSelected();
+    const id = selected instanceof Blockly.BlockSvg ? selected.id : '';
+    this.replace(this.save());
+    this.workspace.scroll(scrollX, scrollY);
+    const block = id ? this.workspace.getBlockById(id) : null;
+    if (block) Blockly.common.setSelected(block);
+  }
+
+  /** Undo or redo, after the edits of this frame have reached Blockly's own list of edits. */
+  undo(again: boolean): void {
+    window.requestAnimationFrame(() => window.setTimeout(() => {
+      this.workspace.undo(again);
+      this.tellHistory();
+    }));
+  }
+
+  save(): Json {
+    const state = Blockly.serialization.workspaces.save(this.workspace) as Json;
+    const blocks = state['blocks'] as {blocks: BlockState[]} | undefined;
+    if (blocks) state['blocks'] = {...blocks, blocks: blocks.blocks.map(unkeep)};
+    return {...this.rest, ...state};
+  }
+
+  /** The newest JSON; tells about it at once when the window does not have it yet. */
+  flush(): string {
+    window.clearTimeout(this.timer);
+    this.timer = 0;
+    const json = JSON.stringify(this.save());
+    if (json !== this.told) {
+      this.told = json;
+      this.listener.changed(json);
+    }
+    return json;
+  }
+
+  /** Puts the program's top left corner near the workspace's. */
+  goHome(): void {
+    const blocks = this.workspace.getTopBlocks(false);
+    if (!blocks.length) {
+      this.workspace.scroll(0, 0);
+      return;
+    }
+    Blockly.renderManagement.triggerQueuedRenders();
+    const box = this.workspace.getBlocksBoundingBox();
+    const scale = this.workspace.scale;
+    this.workspace.scroll(29 - box.left * scale, 23 - box.top * scale);
+  }
+
+  private replace(state: Json): void {
+    const {blocks, ...others} = state;
+    const tops = ((blocks as {blocks?: BlockState[]} | undefined)?.blocks ?? []);
+    this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
+      !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
+    this.loading = true;
+    Checker.lenient = true;
+    Blockly.Events.disable();
+    try {
+      Blockly.serialization.workspaces.load(others, this.workspace);
+      for (const top of tops) this.append(top);
+    } finally {
+      Blockly.Events.enable();
+      Checker.lenient = false;
+      this.loading = false;
+    }
+  }
+
+  private append(state: BlockState): void {
+    const before = new Set(this.workspace.getTopBlocks(false));
+    try {
+      Blockly.serialization.blocks.append(keep(state) as Blockly.serialization.blocks.State, this.workspace);
+    } catch (error) {
+      console.warn(`kept whole: ${String(error)}`);
+      for (const block of this.workspace.getTopBlocks(false)) if (!before.has(block)) block.dispose(false);
+      Blockly.serialization.blocks.append(keepWhole(state) as Blockly.serialization.blocks.State, this.workspace);
+    }
+  }
+
+  private onEvent(event: Blockly.Events.Abstract): void {
+    if (event.type === Blockly.Events.SELECTED) {
+      this.listener.selected((event as Blockly.Events.Selected).newElementId ?? '');
+    }
+    if (event.isUiEvent || this.loading || event.type === Blockly.Events.FINISHED_LOADING) return;
+    this.tellHistory();
+    window.clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => {
+      // While a block is in the hand the program is not finished: wait until it is put down.
+      if (this.workspace.isDragging()) this.onEvent(event);
+      else this.flush();
+    }, QUIET_MS);
+  }
+
+  private tellHistory(): void {
+    const canUndo = this.workspace.getUndoStack().length > 0;
+    const canRedo = this.workspace.getRedoStack().length > 0;
+    if (`${canUndo} ${canRedo}` === this.historyTold) return;
+    this.historyTold = `${canUndo} ${canRedo}`;
+    this.listener.history(canUndo, canRedo);
+  }
+}
+
+/** Whether the workspace holds a block of one of the types, or a kept block whose own type is among them. */
+export function holdsAny(workspace: Blockly.Workspace, types: ReadonlySet<string>): boolean {
+  return workspace.getAllBlocks(false).some((block) => types.has(block.type) ||
+    (block.type === KEPT && keptMatches(block, types)));
+}
+
+function keptMatches(block: Blockly.Block, types: ReadonlySet<string>): boolean {
+  const state = block.saveExtraState?.() as {original?: {type?: string}; whole?: boolean} | undefined;
+  return state?.whole === true || types.has(state?.original?.type ?? '');
+}

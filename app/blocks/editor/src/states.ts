@@ -1,0 +1,184 @@
+// What the blocks show while a program runs: glow, outlines, sentences, absent robots, live values.
+import * as Blockly from 'blockly/core';
+import {definitionOf} from './definitions';
+import {FieldLive} from './fields';
+import {drawIcon} from './icons';
+import {isKept} from './kept';
+import {type BlockState, pathOf} from './renderer';
+
+const SVG = 'http://www.w3.org/2000/svg';
+const BUBBLE_WIDTH = 300;
+const GAP = 14;
+
+export class States {
+  private running = new Set<string>();
+  private stopped = new Set<string>();
+  private errors = new Map<string, string>();
+  private absent = new Set<string>();
+  private live: Record<string, string> = {};
+  private readonly outlined = new Set<string>();
+  private readonly bubbles = new Map<string, SVGGElement>();
+  private placing = 0;
+
+  constructor(private readonly workspace: Blockly.WorkspaceSvg) {
+    workspace.addChangeListener((event) => this.onEvent(event));
+  }
+
+  highlight(ids: string[]): void {
+    this.running = new Set(ids);
+    this.outline();
+  }
+
+  markStopped(ids: string[]): void {
+    this.stopped = new Set(ids);
+    this.outline();
+  }
+
+  setErrors(errors: Record<string, string>): void {
+    this.errors = new Map(Object.entries(errors));
+    this.outline();
+    this.placeSoon();
+  }
+
+  setAbsent(ids: string[]): void {
+    this.absent = new Set(ids);
+    this.dress();
+  }
+
+  /** Keys: a block's id, or `<robot>/<property>` for every block that reads this sensor. */
+  setLive(values: Record<string, string>): void {
+    this.live = values;
+    this.showLive();
+  }
+
+  /** Puts everything on again after the blocks were made anew. */
+  restore(): void {
+    this.outlined.clear();
+    this.outline();
+    this.dress();
+    this.showLive();
+    this.placeSoon();
+  }
+
+  private onEvent(event: Blockly.Events.Abstract): void {
+    if (event.type === Blockly.Events.BLOCK_CREATE) this.restore();
+    else if (event.type === Blockly.Events.BLOCK_CHANGE || event.type === Blockly.Events.BLOCK_FIELD_INTERMEDIATE_CHANGE) {
+      this.showLive();
+    }
+    if (this.bubbles.size) this.placeSoon();
+  }
+
+  /** Only blocks whose state differs are touched: this runs 30 times a second. */
+  private outline(): void {
+    const wanted = new Set([...this.running, ...this.stopped, ...this.errors.keys()]);
+    for (const id of this.outlined) if (!wanted.has(id)) this.setState(id, null);
+    for (const id of wanted) this.setState(id, this.stateOf(id));
+  }
+
+  private stateOf(id: string): BlockState {
+    if (this.running.has(id)) return 'running';
+    return this.errors.has(id) ? 'error' : 'stopped';
+  }
+
+  private setState(id: string, state: BlockState | null): void {
+    const block = this.workspace.getBlockById(id);
+    if (block) pathOf(block)?.setState(state);
+    if (state && block) this.outlined.add(id);
+    else this.outlined.delete(id);
+  }
+
+  private dress(): void {
+    for (const block of this.workspace.getAllBlocks(false)) {
+      const parent = block.isShadow() ? block.getParent() : null;
+      const grey = isKept(block) || this.absent.has(block.id) || (parent !== null && this.absent.has(parent.id));
+      const root = block.getSvgRoot();
+      if (root.classList.contains('nepAbsent') === grey) continue;
+      root.classList.toggle('nepAbsent', grey);
+      if (!isKept(block)) block.setTooltip(grey ? absentSentence(block) : String(definitionOf(block.type)?.['tooltip'] ?? ''));
+    }
+  }
+
+  private showLive(): void {
+    for (const block of this.workspace.getAllBlocks(false)) {
+      for (const input of block.inputList) {
+        for (const field of input.fieldRow) {
+          if (field instanceof FieldLive) field.show(this.live[block.id] ?? this.live[sensorKey(block)] ?? '');
+        }
+      }
+    }
+  }
+
+  private placeSoon(): void {
+    if (this.placing) return;
+    this.placing = window.requestAnimationFrame(() => {
+      this.placing = 0;
+      this.place();
+    });
+  }
+
+  private place(): void {
+    for (const [id, bubble] of this.bubbles) {
+      if (this.errors.get(id) !== bubble.dataset['sentence'] || !this.workspace.getBlockById(id)) {
+        bubble.remove();
+        this.bubbles.delete(id);
+      }
+    }
+    for (const [id, sentence] of this.errors) {
+      const block = this.workspace.getBlockById(id);
+      if (!block) continue;
+      const bubble = this.bubbles.get(id) ?? this.makeBubble(sentence);
+      this.bubbles.set(id, bubble);
+      const at = block.getRelativeToSurfaceXY();
+      bubble.setAttribute('transform', `translate(${at.x + block.width + GAP}, ${at.y + 4})`);
+    }
+  }
+
+  /** An icon and a sentence beside the block, in block units so that it scales with the workspace. */
+  private makeBubble(sentence: string): SVGGElement {
+    const group = document.createElementNS(SVG, 'g');
+    group.setAttribute('class', 'nepBubble');
+    group.setAttribute('role', 'alert');
+    group.dataset['sentence'] = sentence;
+    const frame = document.createElementNS(SVG, 'path');
+    const icon = document.createElementNS(SVG, 'g');
+    drawIcon(icon, 'circle-x', 20);
+    icon.setAttribute('transform', 'translate(12, 10)');
+    const room = document.createElementNS(SVG, 'foreignObject');
+    const words = document.createElement('div');
+    words.className = 'nepBubbleText';
+    words.textContent = sentence;
+    room.append(words);
+    group.append(frame, icon, room);
+    this.workspace.getBubbleCanvas().append(group);
+    const put = (name: string, value: number) => room.setAttribute(name, String(value));
+    put('x', 40);
+    put('y', 10);
+    put('width', BUBBLE_WIDTH - 52);
+    put('height', 400);
+    const scale = this.workspace.getAbsoluteScale();
+    const box = words.getBoundingClientRect();
+    const width = Math.ceil(box.width / scale) + 56;
+    const height = Math.max(20, Math.ceil(box.height / scale)) + 20;
+    put('height', height - 18);
+    put('width', width - 50);
+    frame.setAttribute('d', bubblePath(width, height));
+    return group;
+  }
+}
+
+/** A rounded box with a small tip at its left. */
+function bubblePath(width: number, height: number): string {
+  const w = width - 16;
+  const h = height - 16;
+  return `M8 0h${w}a8 8 0 0 1 8 8v${h}a8 8 0 0 1-8 8h-${w}a8 8 0 0 1-8-8v${-(h - 16)}l-8-8 8-8a8 8 0 0 1 8-8z`;
+}
+
+function sensorKey(block: Blockly.Block): string {
+  const property = block.type.split('_get_')[1] ?? '';
+  return `${String(block.getFieldValue('ROBOT') ?? '')}/${property}`;
+}
+
+function absentSentence(block: Blockly.Block): string {
+  const robot = block.getField('ROBOT')?.getText();
+  return `${robot ?? 'The robot'} is not connected. The block is kept and skipped.`;
+}

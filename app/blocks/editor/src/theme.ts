@@ -1,0 +1,55 @@
+// From tokens to a Blockly theme and CSS variables (UI.md §8).
+import * as Blockly from 'blockly/core';
+import {SAME_STYLE, categories, colour, roles} from './tokens';
+
+const FONT = 'Inter, "Noto Sans", "Noto Sans CJK JP", sans-serif';
+let made = 0;
+
+export function makeTheme(): Blockly.Theme {
+  const blockStyles: Record<string, Partial<Blockly.Theme.BlockStyle>> = {};
+  const categoryStyles: Record<string, Blockly.Theme.CategoryStyle> = {};
+  for (const [name, each] of categories()) {
+    blockStyles[name] = {
+      colourPrimary: each.primary, colourSecondary: each.secondary, colourTertiary: each.tertiary,
+      hat: name === 'events' ? 'cap' : '',
+    };
+    categoryStyles[name] = {colour: each.primary};
+  }
+  for (const [other, ours] of Object.entries(SAME_STYLE)) {
+    const style = blockStyles[ours];
+    if (style) blockStyles[other] = {...style, hat: other === 'hat_blocks' ? 'cap' : ''};
+  }
+  const grey = {colourPrimary: colour('sunken'), colourSecondary: colour('sunken'),
+    colourTertiary: colour('borderStrong')};
+  blockStyles['kept'] = {...grey, hat: ''};
+  blockStyles['kept_hat'] = {...grey, hat: 'cap'};
+  made += 1;
+  return Blockly.Theme.defineTheme(`nep${made}`, {
+    name: `nep${made}`,
+    blockStyles,
+    categoryStyles,
+    componentStyles: {
+      workspaceBackgroundColour: colour('workspace'),
+      toolboxBackgroundColour: colour('panel'),
+      toolboxForegroundColour: colour('text'),
+      flyoutBackgroundColour: colour('panel'),
+      flyoutForegroundColour: colour('text'),
+      flyoutOpacity: 1,
+      scrollbarColour: colour('borderStrong'),
+      scrollbarOpacity: 0.5,
+      insertionMarkerColour: colour('accent'),
+      insertionMarkerOpacity: 0.35,
+      selectedGlowColour: colour('focus'),
+      cursorColour: colour('focus'),
+    },
+    fontStyle: {family: FONT, weight: '600', size: 11.5},
+    startHats: false,
+  });
+}
+
+/** Puts every colour role on the page as `--nep-<role>`. */
+export function putVariables(dark: boolean): void {
+  const style = document.documentElement.style;
+  for (const [role, value] of roles()) style.setProperty(`--nep-${role}`, value);
+  style.setProperty('color-scheme', dark ? 'dark' : 'light');
+}

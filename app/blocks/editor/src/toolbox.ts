@@ -1,0 +1,132 @@
+// The toolbox of the design: tiles with icons, headings, robots (UI.md §8).
+import * as Blockly from 'blockly/core';
+import {iconElement, iconName} from './icons';
+
+type Def = Record<string, unknown>;
+
+function text(value: unknown): string {
+  return typeof value === 'string' ? value : '';
+}
+
+class Category extends Blockly.ToolboxCategory {
+  protected override createIconDom_(): Element {
+    const def = this.toolboxItemDef_ as unknown as Def;
+    const tile = document.createElement('span');
+    tile.className = 'nepTile';
+    tile.style.background = this.colour_;
+    tile.append(iconElement(iconName(text(def['icon']), text(def['categorystyle'])), 16));
+    return tile;
+  }
+
+  protected override addColourBorder_(colour: string): void {
+    const tile = this.iconDom_;
+    if (tile instanceof HTMLElement) tile.style.background = colour;
+  }
+
+  override setSelected(isSelected: boolean): void {
+    super.setSelected(isSelected);
+    if (this.rowDiv_) this.rowDiv_.style.backgroundColor = '';
+  }
+}
+
+function noteOf(def: Def): string {
+  if (def['connected'] === false) return 'not connected';
+  return def['virtual'] === true ? 'virtual' : '';
+}
+
+/** "Blocks", or a robot's name with a filled dot (connected) or an empty ring (not). */
+class Heading extends Blockly.ToolboxItem {
+  private div: HTMLDivElement | null = null;
+
+  override init(): void {
+    const def = (this.toolboxItemDef_ ?? {}) as unknown as Def;
+    const div = document.createElement('div');
+    div.className = 'nepHeading';
+    div.id = this.getId();
+    div.setAttribute('role', 'presentation');
+    const name = document.createElement('b');
+    name.textContent = text(def['name']) || text(def['text']);
+    if (typeof def['connected'] === 'boolean') {
+      const dot = document.createElement('i');
+      dot.className = def['connected'] ? 'on' : 'off';
+      div.append(dot);
+      div.classList.add('robot');
+    }
+    const note = document.createElement('span');
+    note.textContent = text(def['note']) || noteOf(def);
+    div.append(name, note);
+    this.div = div;
+  }
+
+  override getDiv(): Element | null {
+    return this.div;
+  }
+
+  override canBeFocused(): boolean {
+    return false;
+  }
+
+  override dispose(): void {
+    this.div?.remove();
+  }
+}
+
+interface Items {
+  contents: Def[];
+}
+
+/** Gives every item an id that stays the same from one definition to the next. */
+function withIds(def: Items): Items {
+  let section = '';
+  const contents = def.contents.map((item) => {
+    const name = text(item['name']) || text(item['text']);
+    if (item['kind'] !== 'category') {
+      section = name || section;
+      return item;
+    }
+    return {...item, toolboxitemid: text(item['toolboxitemid']) || `category ${section} / ${name}`};
+  });
+  return {...def, contents};
+}
+
+export class Toolbox extends Blockly.Toolbox {
+  private shown = '';
+  /** What each category was made of; Blockly writes into the contents it is given. */
+  private made = new Map<string, string>();
+
+  /** Shows new contents; an open category stays open, and nothing happens when nothing changed. */
+  update(def: unknown, blocksChanged: boolean): void {
+    const items = withIds(def as Items);
+    const key = JSON.stringify(items);
+    const sameItems = key === this.shown;
+    if (sameItems && !blocksChanged) return;
+    this.shown = key;
+    const flyout = this.getFlyout();
+    const open = this.selectedItem_;
+    const before = this.made;
+    this.made = new Map(items.contents.map((item) => [text(item['toolboxitemid']), JSON.stringify(item['contents'])]));
+    const scroll = flyout?.getWorkspace().scrollY ?? 0;
+    if (!sameItems) {
+      this.selectedItem_ = null;
+      this.render(items as unknown as Blockly.utils.toolbox.ToolboxInfo);
+    }
+    if (!open) return;
+    const again = this.getToolboxItemById(open.getId());
+    if (!again?.isSelectable()) {
+      this.selectedItem_ = null;
+      flyout?.hide();
+      return;
+    }
+    const item = again as Blockly.ISelectableToolboxItem;
+    if (!sameItems) this.selectItem_(null, item);
+    if (!blocksChanged && before.get(item.getId()) === this.made.get(item.getId())) return;
+    flyout?.show(item.getContents());
+    const workspace = flyout?.getWorkspace();
+    workspace?.scrollbar?.setY(-scroll);
+  }
+}
+
+Blockly.registry.register(Blockly.registry.Type.TOOLBOX_ITEM, 'category', Category, true);
+for (const kind of ['blocksHeading', 'robotHeading']) {
+  Blockly.registry.register(Blockly.registry.Type.TOOLBOX_ITEM, kind, Heading, true);
+}

@@ -1,0 +1,62 @@
+"""What the window and the page of the block editor say to each other, over one QWebChannel.
+
+One pipe in each direction, so that what was said first arrives first.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal, Slot
+
+Json = dict[str, object]
+
+
+class BlocklyBridge(QObject):
+    """The object ``bridge`` of the page. Slots are called by the page, signals tell the view."""
+
+    told = Signal(str, str)  # to the page: a command and its JSON
+    came_up = Signal()
+    edited = Signal(int, str)  # generation of the loaded file, workspace as JSON
+    undo_changed = Signal(bool, bool)
+    block_chosen = Signal(str)
+    answered = Signal(int, str)  # token of a flush, workspace as JSON
+    went_wrong = Signal(str)
+
+    def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._begin = begin
+
+    def tell(self, command: str, payload: object) -> None:
+        """Send one command; the page answers nothing by itself."""
+        self.told.emit(command, json.dumps(payload))
+
+    @Slot(result=str)
+    def beginning(self) -> str:
+        """What the page needs before its first picture: theme, language, motion."""
+        return json.dumps(self._begin())
+
+    @Slot()
+    def ready(self) -> None:
+        self.came_up.emit()
+
+    @Slot(int, str)
+    def changed(self, generation: int, workspace: str) -> None:
+        self.edited.emit(generation, workspace)
+
+    @Slot(bool, bool)
+    def history(self, can_undo: bool, can_redo: bool) -> None:
+        self.undo_changed.emit(can_undo, can_redo)
+
+    @Slot(str)
+    def selected(self, block: str) -> None:
+        self.block_chosen.emit(block)
+
+    @Slot(int, str)
+    def flushed(self, token: int, workspace: str) -> None:
+        self.answered.emit(token, workspace)
+
+    @Slot(str)
+    def failed(self, sentence: str) -> None:
+        self.went_wrong.emit(sentence)

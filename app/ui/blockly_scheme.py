@@ -1,0 +1,119 @@
+"""What the page of the block editor may read: ``app://blocks/…`` from the resources, and nothing else.
+
+`register_scheme` has to run before the QApplication is made; everything else may be imported later.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QBuffer, QByteArray, QFile, QIODevice, QObject
+from PySide6.QtWebChannel import QWebChannel  # noqa: F401 (brings :/qtwebchannel/qwebchannel.js)
+from PySide6.QtWebEngineCore import (
+    QWebEngineUrlRequestInfo,
+    QWebEngineUrlRequestInterceptor,
+    QWebEngineUrlRequestJob,
+    QWebEngineUrlScheme,
+    QWebEngineUrlSchemeHandler,
+)
+
+from app import resources
+
+SCHEME = b"app"
+HOST = "blocks"
+PAGE = f"{SCHEME.decode()}://{HOST}/index.html"
+ALLOWED = frozenset({"app", "data", "blob"})
+
+_TYPES = {
+    ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json",
+    ".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".cur": "image/x-icon",
+    ".otf": "font/otf", ".ttf": "font/ttf", ".txt": "text/plain",
+}  # fmt: skip
+_WEIGHTS = {"Regular": 400, "Medium": 500, "SemiBold": 600, "Bold": 700}
+
+
+def register_scheme() -> None:
+    """Make ``app:`` a secure scheme of our own. Call before QApplication; calling it again does nothing."""
+    if QWebEngineUrlScheme.schemeByName(QByteArray(SCHEME)).name() == SCHEME:
+        return
+    scheme = QWebEngineUrlScheme(QByteArray(SCHEME))
+    scheme.setSyntax(QWebEngineUrlScheme.Syntax.Host)
+    scheme.setFlags(
+        QWebEngineUrlScheme.Flag.SecureScheme
+        | QWebEngineUrlScheme.Flag.CorsEnabled
+        | QWebEngineUrlScheme.Flag.FetchApiAllowed
+    )
+    QWebEngineUrlScheme.registerScheme(scheme)
+
+
+def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
+    """The media type and bytes for a path such as ``/editor.js``; None if there is no such file.
+
+    The path cannot leave the folder of the editor, except to the bundled fonts under ``/fonts/``.
+    """
+    root = resources.folder() if folder is None else folder
+    if path == "/fonts.css":
+        return "text/css", _font_faces(root / "fonts").encode()
+    if path == "/qwebchannel.js":
+        return "text/javascript", _qwebchannel()
+    base, name = (root / "fonts", path[7:]) if path.startswith("/fonts/") else (root / "blockly", path[1:])
+    file = (base / name).resolve()
+    kind = _TYPES.get(file.suffix)
+    if kind is None or not file.is_relative_to(base.resolve()) or not file.is_file():
+        return None
+    return kind, file.read_bytes()
+
+
+def _font_faces(folder: Path) -> str:
+    """One ``@font-face`` for each bundled weight of Inter; empty when no font is there."""
+    faces = []
+    for file in sorted(folder.glob("Inter*.[ot]tf")):
+        weight = _WEIGHTS.get(file.stem.partition("-")[2])
+        span = str(weight) if weight else "100 900"
+        faces.append(
+            f'@font-face{{font-family:Inter;font-weight:{span};src:url("fonts/{file.name}");font-display:block}}'
+        )
+    return "\n".join(faces)
+
+
+def _qwebchannel() -> bytes:
+    file = QFile(":/qtwebchannel/qwebchannel.js")
+    file.open(QIODevice.OpenModeFlag.ReadOnly)
+    try:
+        return bytes(file.readAll().data())
+    finally:
+        file.close()
+
+
+class SchemeHandler(QWebEngineUrlSchemeHandler):
+    """Answers ``app://blocks/…``; any other host, method or path is refused."""
+
+    def requestStarted(self, job: QWebEngineUrlRequestJob) -> None:
+        url = job.requestUrl()
+        if url.host() != HOST or job.requestMethod() != b"GET":
+            job.fail(QWebEngineUrlRequestJob.Error.RequestDenied)
+            return
+        found = content(url.path())
+        if found is None:
+            job.fail(QWebEngineUrlRequestJob.Error.UrlNotFound)
+            return
+        kind, data = found
+        buffer = QBuffer(job)
+        buffer.setData(QByteArray(data))
+        buffer.open(QIODevice.OpenModeFlag.ReadOnly)
+        job.reply(QByteArray(kind.encode()), buffer)
+
+
+class Fence(QWebEngineUrlRequestInterceptor):
+    """Blocks every request that is not for our own files. What was blocked is kept for tests."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.blocked: list[str] = []
+
+    def interceptRequest(self, info: QWebEngineUrlRequestInfo) -> None:
+        if info.requestUrl().scheme() in ALLOWED:
+            return
+        info.block(True)
+        if len(self.blocked) < 100:
+            self.blocked.append(info.requestUrl().toString())

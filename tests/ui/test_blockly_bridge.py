@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import json
+
+from app.ui.blockly_bridge import BlocklyBridge
+
+
+def test_tells_the_page_in_json(qtbot):
+    bridge = BlocklyBridge(dict)
+    with qtbot.waitSignal(bridge.told) as told:
+        bridge.tell("errors", {"a": "“no”"})
+    name, payload = told.args
+    assert name == "errors"
+    assert json.loads(payload) == {"a": "“no”"}
+
+
+def test_gives_the_page_its_beginning():
+    bridge = BlocklyBridge(lambda: {"language": "de"})
+    assert json.loads(bridge.beginning()) == {"language": "de"}
+
+
+def test_passes_on_what_the_page_says(qtbot):
+    bridge = BlocklyBridge(dict)
+    for slot, signal, args in [
+        (bridge.changed, bridge.edited, [3, "{}"]),
+        (bridge.history, bridge.undo_changed, [True, False]),
+        (bridge.selected, bridge.block_chosen, ["b1"]),
+        (bridge.flushed, bridge.answered, [7, "{}"]),
+        (bridge.failed, bridge.went_wrong, ["no command x"]),
+        (bridge.ready, bridge.came_up, []),
+    ]:
+        with qtbot.waitSignal(signal) as got:
+            slot(*args)
+        assert got.args == args

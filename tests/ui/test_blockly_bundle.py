@@ -1,0 +1,74 @@
+"""The committed bundle is what its sources build."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from app import resources
+
+ROOT = Path(__file__).resolve().parents[2]
+EDITOR = ROOT / "app" / "blocks" / "editor"
+
+node = shutil.which("node")
+built = pytest.mark.skipif(
+    node is None or not (EDITOR / "node_modules" / "esbuild").is_dir(),
+    reason="needs node and `npm ci` in app/blocks/editor",
+)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        file.relative_to(folder).as_posix(): file.read_bytes() for file in folder.rglob("*") if file.is_file()
+    }
+
+
+@built
+def test_building_again_gives_the_committed_bundle(tmp_path):
+    subprocess.run([node, "build.mjs", str(tmp_path / "out")], cwd=EDITOR, check=True, timeout=50)
+    assert files(tmp_path / "out") == files(resources.path("blockly"))
+
+
+@built
+def test_the_sources_are_strictly_typed():
+    tsc = EDITOR / "node_modules" / "typescript" / "bin" / "tsc"
+    done = subprocess.run(
+        [node, str(tsc), "--noEmit"], cwd=EDITOR, capture_output=True, text=True, timeout=55
+    )
+    assert done.stdout == ""
+    assert done.returncode == 0
+
+
+def test_the_lock_file_names_no_registry():
+    lock = json.loads((EDITOR / "package-lock.json").read_text())
+    assert lock["packages"]
+    assert all("resolved" not in package for package in lock["packages"].values())
+
+
+def test_nothing_is_loaded_from_elsewhere():
+    bundle = resources.path("blockly", "editor.js").read_text()
+    addresses = set(re.findall(r"https?://[a-z0-9.-]+", bundle))
+    # Names of XML formats, a comment, help texts, and Blockly's default media folder, which the page
+    # replaces; none is ever fetched (the page's own rules forbid it too, and the fence blocks it).
+    assert addresses <= {
+        "http://www.w3.org",
+        "https://bugzilla.mozilla.org",
+        "https://developers.google.com",
+        "https://static.blockly.com",
+    }
+    assert "url(http" not in resources.path("blockly", "style.css").read_text()
+
+
+def test_every_token_icon_and_licence_is_there():
+    bundle = resources.path("blockly", "editor.js").read_text()
+    tokens = json.loads(resources.path("theme", "tokens.json").read_text())
+    for category in tokens["block"].values():
+        assert re.search(rf"""['"]?\b{category["icon"]}['"]?:['"`]<""", bundle)
+    legal = resources.path("blockly", "LEGAL.txt").read_text()
+    assert "Apache License" in legal
+    assert "ISC License" in legal

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QByteArray
+from PySide6.QtWebEngineCore import QWebEngineUrlScheme
+
+from app import resources
+from app.ui import blockly_scheme
+from app.ui.blockly_scheme import content, register_scheme
+
+register_scheme()
+
+
+def test_the_scheme_is_secure_and_registered_once():
+    register_scheme()
+    scheme = QWebEngineUrlScheme.schemeByName(QByteArray(b"app"))
+    assert scheme.name() == b"app"
+    assert scheme.flags() & QWebEngineUrlScheme.Flag.SecureScheme
+    assert not scheme.flags() & QWebEngineUrlScheme.Flag.LocalAccessAllowed
+
+
+def test_serves_the_bundle():
+    kind, data = content("/index.html")
+    assert kind == "text/html"
+    assert b"Content-Security-Policy" in data
+    assert content("/editor.js")[0] == "text/javascript"
+    assert content("/msg/en.json")[0] == "application/json"
+    assert b"QWebChannel" in content("/qwebchannel.js")[1]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../theme/tokens.json",
+        "/fonts/../theme/tokens.json",
+        "/nothing.js",
+        "/",
+        "",
+        "/media",
+        "//etc/passwd",
+    ],
+)
+def test_nothing_else_can_be_read(path):
+    assert content(path) is None
+
+
+def test_fonts_come_from_the_shipped_ones():
+    kind, css = content("/fonts.css")
+    assert kind == "text/css"
+    file = resources.path("fonts", "Inter-SemiBold.otf")
+    assert f'font-weight:600;src:url("fonts/{file.name}")'.encode() in css
+    assert content(f"/fonts/{file.name}") == ("font/otf", file.read_bytes())
+
+
+def test_no_font_is_no_failure(tmp_path):
+    assert content("/fonts.css", tmp_path) == ("text/css", b"")
+
+
+def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
+    (tmp_path / "blockly").mkdir()
+    (tmp_path / "secret.txt").write_text("secret")
+    (tmp_path / "blockly" / "link.txt").symlink_to(tmp_path / "secret.txt")
+    assert content("/link.txt", tmp_path) is None
+
+
+def test_the_page_names_no_other_place():
+    page = content("/index.html")[1].decode()
+    assert "http:" not in page
+    assert "https:" not in page
+    assert blockly_scheme.PAGE == "app://blocks/index.html"

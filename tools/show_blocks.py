@@ -1,0 +1,111 @@
+"""Picture the block editor alone, with the sample of the tests: light and running, dark and stopped, errors.
+
+Run it under a screen: ``xvfb-run -a .venv/bin/python tools/show_blocks.py FOLDER [--open CATEGORY]``
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt, QTimer
+from PySide6.QtWidgets import QApplication
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from app.ui import blockly_scheme  # noqa: E402
+from app.ui.blockly_view import BlocklyView  # noqa: E402
+
+SAMPLE = ROOT / "tests" / "data" / "blockly"
+SETTLE_MS = 700
+SENTENCE = "“turn left” needs a number. Put one into the gap."
+
+CLICK = """
+for (const label of document.querySelectorAll('.blocklyToolboxCategoryLabel'))
+  if (label.textContent === NAME)
+    label.closest('.blocklyToolboxCategory').dispatchEvent(new PointerEvent('pointerdown', {bubbles: true}));
+"""
+
+
+def options() -> argparse.Namespace:
+    """What was asked for on the command line."""
+    made = argparse.ArgumentParser(description=__doc__)
+    made.add_argument("folder", type=Path)
+    made.add_argument("--definitions", type=Path, default=SAMPLE / "definitions.json")
+    made.add_argument("--workspace", type=Path, default=SAMPLE / "picture.json")
+    made.add_argument("--open", metavar="CATEGORY", help="click this category first")
+    made.add_argument("--size", default="1031x586")
+    return made.parse_args()
+
+
+class Photographer(QObject):
+    """Shows the sample light and running, then dark and stopped, each with its picture, and ends."""
+
+    def __init__(self, view: BlocklyView, folder: Path, category: str | None) -> None:
+        super().__init__(view)
+        self._view = view
+        self._folder = folder
+        self._category = category
+        self._tokens = json.loads((ROOT / "resources" / "theme" / "tokens.json").read_text("utf-8"))
+        view.ready.connect(self._light)
+
+    def _light(self) -> None:
+        self._view.set_theme(self._tokens, dark=False)
+        self._view.highlight(["say_touch"])
+        self._decorate()
+        QTimer.singleShot(SETTLE_MS, self, self._dark)
+
+    def _dark(self) -> None:
+        self._save("light")
+        self._view.set_theme(self._tokens, dark=True)
+        self._view.highlight([])
+        self._view.mark_stopped(["say_touch"])
+        QTimer.singleShot(SETTLE_MS, self, self._errors)
+
+    def _errors(self) -> None:
+        self._save("dark")
+        self._view.set_theme(self._tokens, dark=False)
+        self._view.mark_stopped([])
+        self._view.set_errors({"b2": SENTENCE, "wave": "NAO is not connected."})
+        QTimer.singleShot(SETTLE_MS, self, self._end)
+
+    def _end(self) -> None:
+        self._save("errors")
+        QApplication.exit(0)
+
+    def _decorate(self) -> None:
+        self._view.set_absent(["wave"])
+        self._view.set_live_values({"Pepper/battery": "84 %"})
+        if self._category and self._view.web is not None:
+            self._view.web.page.runJavaScript(CLICK.replace("NAME", json.dumps(self._category)))
+
+    def _save(self, name: str) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._view.grab().save(str(self._folder / f"{name}.png"))
+
+
+def main() -> int:
+    """Take the pictures; 0 when they are in the folder."""
+    asked = options()
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        os.environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
+    blockly_scheme.register_scheme()
+    QApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+    application = QApplication(sys.argv[:1])
+    view = BlocklyView()
+    view.resize(*(int(each) for each in asked.size.split("x")))
+    view.set_definitions(json.loads(asked.definitions.read_text("utf-8")))
+    view.load(json.loads(asked.workspace.read_text("utf-8")))
+    photographer = Photographer(view, asked.folder, asked.open)
+    view.show()
+    code = application.exec()
+    del photographer
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
