@@ -31,12 +31,12 @@ COMMANDS = frozenset(
     {
         "fail", "join", "length", "newest", "on_message", "on_start", "on_true", "part", "publish",
         "random_number", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_program",
-        "wait", "wait_until",
+        "wait", "wait_until", "write",
     }
 )  # fmt: skip
 """What a program may call (`app.blocks.commands`); no variable gets one of these names."""
 
-_RESERVED = COMMANDS | {"step", "value", "message", "_"}
+_RESERVED = COMMANDS | {"step", "value", "number", "message", "_"}
 
 
 class _Skip(Exception):  # noqa: N818 (no error: the block is left out, and its problem is noted)
@@ -52,8 +52,8 @@ def compile_behaviour(
 ) -> Program:
     """The program of Blockly's JSON.
 
-    `robots` are connected; blocks of others are skipped, and `absent` (as last known) only helps to name them.
-    Never raises for what a file holds: it becomes problems.
+    `robots` are connected; blocks of others are skipped, and `absent` (as last known) only helps to name
+    them. Never raises for what a file holds: it becomes problems.
     """
     catalogue = Catalogue(robots, absent)
     parsed = parse_workspace(workspace)
@@ -75,24 +75,22 @@ class _Compiler:
             kind: {} for kind in ("robots", "sensors", "events", "publishes", "listens")
         }
         self._in_message = False
+        self._numbers: set[str] = set()  # the blocks that must give a number
 
     def program(self) -> Program:
         functions = [
-            function
-            for script in self._workspace.scripts
-            if (function := self._script(script)) is not None
+            function for script in self._workspace.scripts if (function := self._script(script)) is not None
         ]
         self._notes.check_starts(len(functions))
         body: list[ast.stmt] = [
             *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
             *functions,
         ]
-        runnable_marks = dict(self._marks)
         source, lines = readable([*_imports(body), *body, *_run(self._name)], self._marks)
         return Program(
             name=self._name,
             source=source,
-            runnable=instrumented(body, runnable_marks),
+            runnable=instrumented(body, self._marks, self._numbers),
             lines=lines,
             robots=tuple(str(name) for name in self._used["robots"]),
             sensors=tuple(pair for pair in self._used["sensors"] if isinstance(pair, tuple)),
@@ -178,9 +176,7 @@ class _Compiler:
             if isinstance(argument, StatementInput)
         }
         text = _template(block, placed)
-        return self._marked(
-            statements(text, expressions, bodies, self._keywords(block, expressions)), placed
-        )
+        return self._marked(statements(text, expressions, bodies, self._keywords(block, expressions)), placed)
 
     def _marked(self, made: list[ast.stmt], placed: Placed) -> list[ast.stmt]:
         self._marks[made[0]] = placed.id
@@ -222,6 +218,8 @@ class _Compiler:
             made = expression(_template(block, placed), expressions, self._keywords(block, expressions))
         if block.fails or missing is not None:
             self._marks[made] = placed.id
+            if block.check == "Number" and missing is None:
+                self._numbers.add(placed.id)
         return made
 
     def _field(self, placed: Placed, block: Block, field: Field) -> ast.expr:

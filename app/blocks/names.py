@@ -18,7 +18,10 @@ class Names:
         self._taken = {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
 
     def new(self, words: str, otherwise: str) -> str:
-        """A name that reads like `words`, such as ``when_started_2``; `otherwise` when nothing is left of them."""
+        """A name that reads like `words`, such as ``when_started_2``.
+
+        `otherwise` when nothing is left of them.
+        """
         # Python compares names in this form: two that look different must not become one.
         plain = _GAPS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]
         if not plain.isidentifier():

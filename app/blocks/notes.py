@@ -82,7 +82,11 @@ class Notes:
         if holder is not None:
             outer = self.label(holder, self._catalogue.blocks.get(holder.type))
             skipped = f"{outer} with {name} will be skipped"
-        if isinstance(robot, str) and robot not in self._catalogue.connected and placed.type.startswith("robot_"):
+        if (
+            isinstance(robot, str)
+            and robot not in self._catalogue.connected
+            and placed.type.startswith("robot_")
+        ):
             self._note(
                 "warning", placed, block, name, f"{robot} is not connected, so {skipped}.",
                 mend=f"Connect {robot}", mend_action=f"connect:{robot}", style="robot",
@@ -115,7 +119,10 @@ class Notes:
         return known is not None
 
     def missing(self, placed: Placed, block: Block) -> str | None:
-        """The sentence about a gap with nothing in it, noted; None when every gap is filled or has a default."""
+        """The sentence about a gap with nothing in it, noted.
+
+        None when every gap is filled or has a default.
+        """
         for argument in block.arguments:
             if not isinstance(argument, ValueInput):
                 continue
@@ -132,7 +139,8 @@ class Notes:
         """What is worth saying about a block that will run."""
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
             self._note(
-                "info", placed, block, "wait until", f"wait until may wait for ever if {self._never(placed)}.",
+                "info", placed, block, "wait until",
+                f"wait until may wait for ever if {self._never(placed)}.",
                 mend="Add a time limit", mend_action=f"limit:{placed.id}",
             )  # fmt: skip
         robot = self._catalogue.connected.get(str(placed.fields.get("ROBOT")))

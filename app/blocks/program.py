@@ -13,8 +13,8 @@ Severity = Literal["error", "warning", "info"]
 class Problem:
     """Something that a person should know before Run.
 
-    ``sentence`` holds ``subject``, which is shown bold. ``category`` is the style of the block's colour, ``icon``
-    its icon. ``mend`` are a button's words, ``mend_action`` what it does (`app.blocks.mend`, or
+    ``sentence`` holds ``subject``, which is shown bold. ``category`` is the style of the block's colour,
+    ``icon`` its icon. ``mend`` are a button's words, ``mend_action`` what it does (`app.blocks.mend`, or
     ``connect:<robot>``). An error means: the program would stop with this sentence at that block.
     """
 
@@ -32,10 +32,10 @@ class Problem:
 class Program:
     """A behaviour as a program.
 
-    ``source`` is for people, and runs as a file; ``lines`` gives the block of a line of it. ``runnable`` is the
-    same tree with a ``step`` before each block. ``robots`` are those that its blocks name and that are there;
-    ``sensors`` and ``events`` are (robot, name). ``readings`` are the blocks in words ("wait 2 s"), ``labels``
-    the words that name them ("wait").
+    ``source`` is for people, and runs as a file; ``lines`` gives the block of a line of it. ``runnable`` is
+    the same tree with a ``step`` before each block. ``robots`` are those that its blocks name and that are
+    there; ``sensors`` and ``events`` are (robot, name). ``readings`` are the blocks in words ("wait 2 s"),
+    ``labels`` the words that name them ("wait").
     """
 
     name: str

@@ -16,7 +16,10 @@ _LONGEST = 80
 def reading(
     placed: Placed, blocks: Mapping[str, Block], variables: Mapping[str, str], *, robot: bool = True
 ) -> str:
-    """The block with what stands in it; `robot` False leaves the robot's name out. One line, never too long."""
+    """The block with what stands in it.
+
+    `robot` False leaves the robot's name out. One line, never too long.
+    """
     block = blocks.get(placed.type)
     if block is None:
         return label_of_type(placed.type)
@@ -60,12 +63,12 @@ def label(placed: Placed, block: Block) -> str:
     return " ".join(found.replace("“", " ").replace("”", " ").split()) or label_of_type(block.type)
 
 
-def label_of_type(type: str) -> str:
+def label_of_type(block_type: str) -> str:
     """The words for a block that nobody describes: ``robot_nao_do_wave`` is "wave"."""
     for verb in ("_do_", "_get_", "_when_"):
-        if type.startswith("robot_") and verb in type:
-            return type.partition(verb)[2].replace("_", " ")
-    return type.partition("_")[2].replace("_", " ") or type
+        if block_type.startswith("robot_") and verb in block_type:
+            return block_type.partition(verb)[2].replace("_", " ")
+    return block_type.partition("_")[2].replace("_", " ") or block_type
 
 
 def _field(argument: Field, placed: Placed) -> str:

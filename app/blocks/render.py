@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 
 from app.blocks.template import literal
 
@@ -13,10 +14,12 @@ Marks = Mapping[ast.AST, str]
 
 def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str]]:
     """The text for people, and the block of each of its lines that begins one."""
-    module = ast.fix_missing_locations(ast.Module(list(body), []))
-    text = ast.unparse(module) + "\n"
+    text = ""
+    for before, statement in zip((None, *body[:-1]), body, strict=True):
+        ast.fix_missing_locations(statement)
+        text += _gap(before, statement) + ast.unparse(statement).strip("\n") + "\n"
     lines: dict[int, str] = {}
-    for ours, theirs in _together(module.body, ast.parse(text).body):
+    for ours, theirs in _together(body, ast.parse(text).body):
         if ours in marks:
             first = getattr(theirs, "decorator_list", None) or [theirs]
             for line in range(first[0].lineno, theirs.lineno + 1):
@@ -24,18 +27,26 @@ def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str
     return text, lines
 
 
-def instrumented(body: Sequence[ast.stmt], marks: Marks) -> str:
-    """The text that runs; it changes the tree, so `readable` comes first."""
-    stepper = _Stepper(marks)
+def instrumented(body: Sequence[ast.stmt], marks: Marks, numbers: AbstractSet[str]) -> str:
+    """The text that runs; it changes the tree, so `readable` comes first.
+
+    `numbers` are the blocks that must give a number.
+    """
+    stepper = _Stepper(marks, numbers)
     steps: list[ast.stmt] = []
     for statement in body:
         steps += stepper.statement(statement)
     return ast.unparse(ast.fix_missing_locations(ast.Module(steps, []))) + "\n"
 
 
-def _together(
-    ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]
-) -> Iterator[tuple[ast.stmt, ast.stmt]]:
+def _gap(before: ast.stmt | None, statement: ast.stmt) -> str:
+    """Blank lines between two statements of a file."""
+    if before is None or (isinstance(before, ast.Assign) and isinstance(statement, ast.Assign)):
+        return ""
+    return "\n\n" if isinstance(before, ast.FunctionDef) or isinstance(statement, ast.FunctionDef) else "\n"
+
+
+def _together(ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, ast.stmt]]:
     """The statements of a tree beside those of its text parsed again: both have the same form."""
     for one, other in zip(ours, theirs, strict=True):
         yield one, other
@@ -48,16 +59,18 @@ def _together(
 class _Stepper(ast.NodeTransformer):
     """Puts ``step(id)`` before each block and at the end of each round of a loop, and a block around values.
 
-    The step at a loop's end shows the loop while its condition is looked at, and lets Stop into a loop that is
-    empty.
+    The step at a loop's end shows the loop while its condition is looked at, and lets Stop into a loop that
+    is empty.
     """
 
-    def __init__(self, marks: Marks) -> None:
+    def __init__(self, marks: Marks, numbers: AbstractSet[str]) -> None:
         self._marks = marks
+        self._numbers = numbers
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:
         id = self._marks.get(node)
-        made = self.visit(node)
+        made = node
+        self.generic_visit(made)
         for name in ("body", "orelse"):
             inner = getattr(made, name, None)
             if isinstance(inner, list):
@@ -86,7 +99,8 @@ class _Stepper(ast.NodeTransformer):
             return made
         empty = ast.arguments([], [], None, [], [], None, [])
         later = ast.Lambda(empty, made)
-        return ast.Call(ast.Name("value", ast.Load()), [literal(id), later], [])
+        name = "number" if id in self._numbers else "value"
+        return ast.Call(ast.Name(name, ast.Load()), [literal(id), later], [])
 
 
 def _step(id: str) -> ast.stmt:

@@ -43,7 +43,10 @@ class TextParts:
 
 
 def type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
-    """The block type: ``robot_pepper_do_say``; a plain one, ``robot_pepper_changes``, is no part of a robot's."""
+    """The block type: ``robot_pepper_do_say``.
+
+    A plain one, ``robot_pepper_changes``, is no part of a robot's.
+    """
     middle = "" if plain else f"{verb}_"
     return f"robot_{_word(model)}_{middle}{_word(name)}"
 

@@ -63,9 +63,9 @@ def expression(
 ) -> ast.expr:
     """The expression of a template with its holes filled."""
     (statement,) = statements(text, expressions, None, keywords)
-    if not isinstance(statement, ast.Expr):
-        raise ValueError(f"not an expression: {text}")
-    return statement.value
+    if isinstance(statement, ast.Expr):
+        return statement.value
+    raise ValueError(f"not an expression: {text}")
 
 
 def holes(text: str) -> frozenset[str]:
@@ -95,14 +95,14 @@ class _Filler(ast.NodeTransformer):
         self._bodies = bodies
         self._keywords = keywords
 
-    def visit_Expr(self, node: ast.Expr) -> ast.stmt | list[ast.stmt]:  # noqa: N802 (ast's name)
+    def visit_Expr(self, node: ast.Expr) -> ast.stmt | list[ast.stmt]:
         name = _hole(node.value)
         if name is not None and name in self._bodies:
             return list(self._bodies[name]) or [ast.Pass()]
         node.value = self.visit(node.value)
         return node
 
-    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802 (ast's name)
+    def visit_Name(self, node: ast.Name) -> ast.expr:
         name = _hole(node)
         if name is None:
             return node
@@ -110,7 +110,7 @@ class _Filler(ast.NodeTransformer):
         # A variable may stand in several holes, read here and written there: each gets a node of its own.
         return ast.Name(filling.id, node.ctx) if isinstance(filling, ast.Name) else filling
 
-    def visit_Call(self, node: ast.Call) -> ast.Call:  # noqa: N802 (ast's name)
+    def visit_Call(self, node: ast.Call) -> ast.Call:
         keywords: list[ast.keyword] = []
         for keyword in node.keywords:
             name = _hole(keyword.value)

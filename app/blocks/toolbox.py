@@ -17,8 +17,8 @@ def editor_definitions(
     """Definitions for the editor.
 
     ``blocks`` are Blockly's JSON definitions of all categories and of all robots, connected or `absent`;
-    ``toolbox`` is a category toolbox; ``styles`` are the names of the styles; ``robots`` and ``topics`` are what
-    the drop-downs offer.
+    ``toolbox`` is a category toolbox; ``styles`` are the names of the styles; ``robots`` and ``topics`` are
+    what the drop-downs offer.
     """
     catalogue = Catalogue(robots, absent)
     return {
@@ -34,7 +34,7 @@ def editor_definitions(
 
 
 def _toolbox(catalogue: Catalogue) -> dict[str, object]:
-    contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": "Blocks"}]
+    contents: list[Mapping[str, object]] = [{"kind": "heading", "name": "Blocks"}]
     contents += [_category(category) for category in categories() if category.blocks]
     known = (*catalogue.connected.values(), *catalogue.absent.values())
     for robot in catalogue.connected.values():

@@ -14,7 +14,10 @@ _MANUAL = "MANUALLY_DISABLED"
 
 @dataclass(frozen=True)
 class Placed:
-    """A block as it was placed: its fields as saved, and what is in its inputs (a list: statements follow)."""
+    """A block as it was placed.
+
+    Its fields as saved, and what is in its inputs (a list: statements follow).
+    """
 
     id: str
     type: str
@@ -102,9 +105,7 @@ def _block(saved: Mapping[str, object], depth: int, numbers: _Numbers, *, shadow
             if isinstance(connection, Mapping):
                 real = connection.get("block")
                 inner = real if isinstance(real, Mapping) else connection.get("shadow")
-                inputs[str(name)] = _chain(
-                    inner, depth + 1, numbers, shadow=not isinstance(real, Mapping)
-                )
+                inputs[str(name)] = _chain(inner, depth + 1, numbers, shadow=not isinstance(real, Mapping))
     return Placed(
         id=id,
         type=str(saved["type"]),

@@ -34,6 +34,16 @@ CATEGORY = Category(
             arguments=(TextField("FIELD", "name"), ValueInput("VALUE", None, "Ada"), TopicField("TOPIC")),
         ),
         Block(
+            type="messages_write",
+            text="write %VALUE to the console",
+            shape="statement",
+            style="messages",
+            icon="terminal",
+            tooltip="Shows a value as a line in the console.",
+            python="write(%VALUE)",
+            arguments=(ValueInput("VALUE", None, "Hello"),),
+        ),
+        Block(
             type="messages_newest",
             text="newest %FIELD of %TOPIC",
             shape="value",

@@ -1,4 +1,7 @@
-"""The blocks of robots, made from their descriptions: what they can do, what they tell, what happens to them."""
+"""The blocks of robots, made from their descriptions.
+
+What they can do, what they tell, what happens to them.
+"""
 
 from __future__ import annotations
 
@@ -84,9 +87,7 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         python=do if returns is None else ask,
         arguments=(*arguments, *(argument for _, argument in inputs)),
         constants={"X_NAME": action.name} | ({} if returns is None else {"X_FIELD": returns}),
-        keywords={
-            "X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)
-        },
+        keywords={"X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)},
         robot=RobotUse("action", action.name, action.title, robot.model),
     )
 
@@ -154,7 +155,7 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
 
 
 def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
-    """ "when Pepper battery changes" and "when Pepper distance goes below 0.5"."""
+    """The two hats for sensors: “when battery changes” and “when distance goes below 0.5”."""
     told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _TELLS]
     numbers = [sensor for sensor in told if sensor.kind in _NUMBERS]
     hats = []

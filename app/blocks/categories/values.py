@@ -16,7 +16,14 @@ _ARITHMETIC = {
     "%": "%A % %B",
     "**": "%A ** %B",
 }
-_SIGNS = (("+", "+"), ("−", "-"), ("×", "*"), ("÷", "/"), ("remainder of ÷", "%"), ("to the power of", "**"))
+_SIGNS = (
+    ("+", "+"),
+    ("−", "-"),  # noqa: RUF001 (the sign that people read)
+    ("×", "*"),  # noqa: RUF001 (the sign that people read)
+    ("÷", "/"),
+    ("remainder of ÷", "%"),
+    ("to the power of", "**"),
+)
 
 _COMPARE = {
     "==": "%A == %B",

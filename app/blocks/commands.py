@@ -1,0 +1,73 @@
+"""What a program file calls: ``from app.blocks.commands import robot, run, wait``.
+
+The same functions as in Studio, for the one program of this process. ``run("Greeting")`` at the end of the
+file finds the robots, runs all scripts and tells the robots to stop when it ends, also at Ctrl+C.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from app.blocks import values
+from app.blocks.fleet_search import find_robots
+from app.blocks.network import Network
+from app.blocks.runtime import Runtime
+from nep import node as new_node
+
+__all__ = [
+    "fail", "join", "length", "newest", "on_message", "on_start", "on_true", "part", "publish",
+    "random_number", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_program",
+    "wait", "wait_until", "write",
+]  # fmt: skip
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+
+
+_runtime = Runtime(_say)
+
+fail = _runtime.fail
+newest = _runtime.newest
+on_message = _runtime.on_message
+on_start = _runtime.on_start
+on_true = _runtime.on_true
+publish = _runtime.publish
+robot = _runtime.robot
+stop_program = _runtime.stop_program
+wait = _runtime.wait
+wait_until = _runtime.wait_until
+write = _runtime.write
+
+join = values.join
+length = values.length
+part = values.part
+random_number = values.random_number
+repeat = values.repeat
+rounded = values.rounded
+rounded_down = values.rounded_down
+rounded_up = values.rounded_up
+
+LOOK_S = 3.0
+STOP_ANSWER_S = 1.0
+
+
+def run(name: str) -> None:
+    """Run all scripts until they end or Ctrl+C; SystemExit with a sentence when a block fails."""
+    with new_node(f"program {name}") as node:
+        robots = find_robots(node, LOOK_S)
+        network = Network(node, f"program {name}", robots)
+        try:
+            _runtime.start(network, robots)
+            while not _runtime.finished.wait(0.1):
+                pass
+        except KeyboardInterrupt:
+            pass
+        finally:
+            _runtime.scheduler.stop()
+            silent = network.stop_robots(STOP_ANSWER_S)
+            network.close()
+    for robot_name in silent:
+        _say(f"{robot_name} did not answer. Switch it off by hand.")
+    if _runtime.error is not None:
+        sys.exit(_runtime.error.sentence)

@@ -1,0 +1,65 @@
+"""What a problem's button does to the blocks: pure functions from one workspace to the next."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+
+LIMIT_S = 10
+
+
+def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
+    """The workspace after a problem's ``mend_action``; None for an action that is no matter of blocks.
+
+    ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script that
+    nothing starts.
+    """
+    verb, _, object_ = action.partition(":")
+    made: dict[str, object] = copy.deepcopy(dict(workspace))
+    if verb == "limit":
+        for block in _blocks(made):
+            if block.get("id") == object_ and block.get("type") == "control_wait_until":
+                _limit(block)
+                return made
+    if verb == "add":
+        return _started(made, object_)
+    return None
+
+
+def _limit(block: dict[str, object]) -> None:
+    block["type"] = "control_wait_until_at_most"
+    inputs = block.setdefault("inputs", {})
+    if isinstance(inputs, dict):
+        inputs["SECONDS"] = {"shadow": {"type": "values_number", "fields": {"NUMBER": LIMIT_S}}}
+
+
+def _started(workspace: dict[str, object], block_type: str) -> dict[str, object]:
+    blocks = workspace.setdefault("blocks", {"languageVersion": 0, "blocks": []})
+    tops = blocks.get("blocks") if isinstance(blocks, dict) else None
+    if not isinstance(tops, list):
+        return workspace
+    starter: dict[str, object] = {"type": block_type, "x": 40, "y": 40}
+    for number, top in enumerate(tops):
+        if isinstance(top, dict):
+            starter |= {name: top.pop(name) for name in ("x", "y") if name in top}
+            starter["next"] = {"block": top}
+            tops[number] = starter
+            return workspace
+    tops.append(starter)
+    return workspace
+
+
+def _blocks(workspace: Mapping[str, object]) -> Iterator[dict[str, object]]:
+    """Every block, outermost first."""
+    blocks = workspace.get("blocks")
+    waiting = list(blocks.get("blocks", ())) if isinstance(blocks, Mapping) else []
+    while waiting:
+        block = waiting.pop(0)
+        if not isinstance(block, dict):
+            continue
+        yield block
+        inputs = block.get("inputs")
+        connections = list(inputs.values()) if isinstance(inputs, Mapping) else []
+        for connection in (*connections, block.get("next")):
+            if isinstance(connection, Mapping):
+                waiting += [connection[name] for name in ("block", "shadow") if name in connection]

@@ -1,0 +1,162 @@
+"""A robot as a program sees it: do an action and wait for it, read a sensor, begin a script at an event."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from app.blocks import values
+from app.blocks.explain import BehaviourError
+from app.blocks.link import Call, Link
+from app.blocks.scheduler import Scheduler
+from app.robots.description import Action, Parameter, Robot
+
+FIRST_ANSWER_S = 3.0
+FIRST_VALUE_S = 2.0
+LONGEST_S = 60.0
+MARGIN_S = 2.0
+
+_PLACE = re.compile(r"%([A-Za-z_]\w*)")
+
+
+Decorator = Callable[[Callable[..., None]], Callable[..., None]]
+
+
+class Stage(Protocol):
+    """What a robot's handle needs of the program that runs."""
+
+    scheduler: Scheduler
+
+    def described(self, name: str) -> Robot:
+        """The description of a robot that is there."""
+        ...
+
+    def linked(self) -> Link:
+        """The network."""
+        ...
+
+    def tell(self, sentence: str) -> None:
+        """What a robot does now."""
+        ...
+
+    def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
+        """Begin a script at a robot's event."""
+        ...
+
+    def on_change(self, robot: str, sensor: str) -> Decorator:
+        """Begin a script at a sensor's change."""
+        ...
+
+    def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
+        """Begin a script when a sensor passes a limit."""
+        ...
+
+
+class RobotHandle:
+    """``robot("Pepper")``."""
+
+    def __init__(self, name: str, runtime: Stage) -> None:
+        self._name = name
+        self._runtime = runtime
+
+    def do(self, action: str, /, **input: object) -> None:
+        """Let the robot do an action and wait until it is done; BehaviourError with the robot's sentence."""
+        self._invoke(action, input)
+
+    def ask(self, action: str, field: str, /, **input: object) -> object:
+        """The same for an action that answers: what it says in this field."""
+        return self._invoke(action, input).output.get(field)
+
+    def get(self, sensor: str, field: str | None = None) -> object:
+        """A sensor's newest value, or one field of it; None while it is not known."""
+        robot = self._runtime.described(self._name)
+        link, scheduler = self._runtime.linked(), self._runtime.scheduler
+        if robot.sensor(sensor) is None:
+            raise BehaviourError(f"{self._name} has no sensor “{sensor}”.")
+        if link.sensor(self._name, sensor) is None:
+            # Sensors tell their value several times a second: the first one may still be under way.
+            scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_S)
+        told = link.sensor(self._name, sensor)
+        return told if field is None else values.part(told, field)
+
+    def on(self, event: str, /, **filters: object) -> Decorator:
+        """The script below runs each time this happens to the robot."""
+        return self._runtime.on_event(self._name, event, filters)
+
+    def on_change(self, sensor: str) -> Decorator:
+        """The script below runs each time the sensor tells another value."""
+        return self._runtime.on_change(self._name, sensor)
+
+    def on_pass(self, sensor: str, side: str, limit: float) -> Decorator:
+        """The script below runs each time the sensor passes the limit: "below" or "above" it."""
+        return self._runtime.on_pass(self._name, sensor, side, limit)
+
+    def _invoke(self, name: str, given: Mapping[str, object]) -> Call:
+        robot = self._runtime.described(self._name)
+        action = robot.action(name)
+        if action is None:
+            raise BehaviourError(f"{self._name} can't “{name}”.")
+        input = {key: _fitting(action, key, value) for key, value in given.items()}
+        wrong = action.check(action.complete(input))
+        if wrong:
+            raise BehaviourError(f"{self._name} can't do this: {wrong[0]}.")
+        self._runtime.tell(sentence(robot, action, input))
+        call = self._runtime.linked().invoke(self._name, name, action.complete(input))
+        try:
+            self._await(robot, action, call)
+        finally:
+            self._runtime.tell("")
+        if call.state == "failed":
+            raise BehaviourError(_ended(f"{self._name}: {call.error or f'“{action.title}” failed'}"))
+        return call
+
+    def _await(self, robot: Robot, action: Action, call: Call) -> None:
+        wait_for = self._runtime.scheduler.wait_for
+        if robot.dialect == "native" and not wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
+            raise BehaviourError(f"{self._name} does not answer. Check that it is on and in the same Wi-Fi.")
+        limit = action.timeout_s or LONGEST_S
+        if not wait_for(lambda: call.done, limit + MARGIN_S):
+            self._runtime.linked().cancel(call)
+            raise BehaviourError(f"{self._name} has not ended “{action.title}” within {limit:g} s.")
+
+
+def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
+    """What the robot does now: "Pepper says “Touch my head.”"."""
+
+    def place(match: re.Match[str]) -> str:
+        if match[1] == "robot":
+            return robot.name
+        parameter = action.parameter(match[1])
+        value = input.get(match[1], parameter.default if parameter else None)
+        if parameter is not None:
+            value = next((choice.title for choice in parameter.choices if choice.value == value), value)
+        return values.text(value)
+
+    return " ".join(_PLACE.sub(place, action.says or action.text).split())
+
+
+def _fitting(action: Action, name: str, value: object) -> object:
+    """A value as the parameter wants it: text of a number, a whole number of 2.0, a list of "yes, no"."""
+    parameter = action.parameter(name)
+    if parameter is None:
+        return value
+    if value is None:
+        raise BehaviourError(
+            f"“{action.title}” needs a value for “{parameter.title}” that is not known yet.", unknown=True
+        )
+    return _as_kind(parameter, value)
+
+
+def _as_kind(parameter: Parameter, value: object) -> object:
+    if parameter.kind in ("text", "image"):
+        return values.text(value)
+    if parameter.kind == "integer" and isinstance(value, float) and value.is_integer():
+        return int(value)
+    if parameter.kind == "list" and isinstance(value, str):
+        return [word.strip() for word in value.split(",") if word.strip()]
+    return value
+
+
+def _ended(words: str) -> str:
+    return words if words.endswith((".", "!", "?", "”")) else f"{words}."
