@@ -1,0 +1,117 @@
+"""Samples, and a person at the mouse, for the tests of the block editor."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app import resources
+from app.ui.blockly_view import BlocklyView
+
+DATA = Path(__file__).resolve().parents[1] / "data" / "blockly"
+DEFINITIONS = json.loads((DATA / "definitions.json").read_text("utf-8"))
+PICTURE = json.loads((DATA / "picture.json").read_text("utf-8"))
+UNKNOWN = json.loads((DATA / "unknown.json").read_text("utf-8"))
+TOKENS = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
+START = {"type": "events_started", "id": "start", "x": 56, "y": 56}
+WAIT_MS = 10_000
+
+
+def workspace(*blocks: dict) -> dict:
+    return {"blocks": {"languageVersion": 0, "blocks": list(blocks)}}
+
+
+def outlined(name: str) -> str:
+    """A script: ids of the blocks with this outline."""
+    return f"[...document.querySelectorAll('.nepState-{name}')].map(e => e.parentElement.dataset.id)"
+
+
+class Person:
+    """Looks at the page and uses the mouse and the keyboard in it."""
+
+    def __init__(self, qtbot, view: BlocklyView) -> None:
+        self._qtbot = qtbot
+        self.view = view
+
+    def ask(self, script: str):
+        answers: list = []
+        self.view.web.page.runJavaScript(f"JSON.stringify({script})", answers.append)
+        self._qtbot.waitUntil(lambda: bool(answers), timeout=WAIT_MS)
+        return json.loads(answers[0]) if answers[0] else None
+
+    def wait_for(self, script: str, expected: object = True) -> None:
+        self._qtbot.waitUntil(lambda: self.ask(script) == expected, timeout=WAIT_MS)
+
+    def newest(self) -> dict:
+        got: list[dict] = []
+        self.view.flush(got.append)
+        self._qtbot.waitUntil(lambda: bool(got), timeout=WAIT_MS)
+        return got[0]
+
+    def tops(self) -> list[dict]:
+        return self.newest().get("blocks", {}).get("blocks", [])
+
+    def box(self, selector: str) -> dict:
+        """Where an element is on the screen of the page, once it is there and has stopped moving."""
+        script = (
+            f"(e => e && (r => r.width > 0 && [r.left, r.top, r.right, r.bottom])(e.getBoundingClientRect()))"
+            f"(document.querySelector({json.dumps(selector)}))"
+        )
+        before: list = []
+
+        def still() -> bool:
+            now = self.ask(script)
+            same = bool(now) and now == (before[-1] if before else None)
+            before.append(now)
+            return same
+
+        self._qtbot.waitUntil(still, timeout=WAIT_MS)
+        left, top, right, bottom = before[-1]
+        return {"left": left, "top": top, "right": right, "bottom": bottom}
+
+    @property
+    def target(self):
+        return self.view.web.keyboard()
+
+    def click(self, selector: str, dx: float = 14, dy: float = 14) -> None:
+        box = self.box(selector)
+        QTest.mouseClick(
+            self.target, Qt.LeftButton, pos=QPoint(round(box["left"] + dx), round(box["top"] + dy))
+        )
+
+    def press(self, key: Qt.Key, modifiers=Qt.NoModifier) -> None:
+        QTest.keyClick(self.target, key, modifiers)
+
+    def open_category(self, name: str) -> None:
+        labels = "[...document.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+        number = self.ask(f"{labels}.findIndex(e => e.textContent == {name!r})")
+        assert number >= 0
+        rows = ".blocklyToolboxCategoryContainer"
+        self.ask(f"document.querySelectorAll({rows!r})[{number}].setAttribute('data-test', 'open')")
+        self.click("[data-test=open]", dx=60)
+        self.box(".blocklyFlyout .blocklyBlock")
+
+    def hold(self, selector: str) -> QPoint:
+        box = self.box(selector)
+        start = QPoint(round(box["left"] + 12), round(box["top"] + 18))
+        QTest.mouseMove(self.target, start)
+        QTest.mousePress(self.target, Qt.LeftButton, pos=start)
+        return start
+
+    def move(self, start: QPoint, end: QPoint, steps: int = 10) -> None:
+        for step in range(1, steps + 1):
+            part = step / steps
+            QTest.mouseMove(
+                self.target, start + QPoint(round((end - start).x() * part), round((end - start).y() * part))
+            )
+
+    def drop(self, at: QPoint) -> None:
+        QTest.mouseRelease(self.target, Qt.LeftButton, pos=at)
+
+    def drag(self, selector: str, end: QPoint) -> None:
+        start = self.hold(selector)
+        self.move(start, end)
+        self.drop(end)

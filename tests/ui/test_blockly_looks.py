@@ -1,0 +1,150 @@
+"""What the block editor shows: theme, states, toolbox."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+
+from tests.ui.blockly_person import PICTURE, START, TOKENS, WAIT_MS, outlined
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+
+def test_a_change_of_theme_keeps_program_and_undo(qtbot, view, person):
+    them = person(START)
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.press(Qt.Key_Delete)
+    qtbot.waitUntil(lambda: them.tops() == [], timeout=WAIT_MS)
+    view.set_theme(TOKENS, dark=True)
+    dark = TOKENS["colour"]["dark"]["workspace"]
+    them.wait_for(
+        "getComputedStyle(document.querySelector('.blocklyMainBackground').closest('svg')).backgroundColor",
+        "rgb({}, {}, {})".format(*QColor(dark).getRgb()[:3]),
+    )
+    view.undo()
+    qtbot.waitUntil(lambda: them.tops() == [START], timeout=WAIT_MS)
+    primary = TOKENS["block"]["events"]["dark"]["tertiary"].lower()
+    assert (
+        them.ask("document.querySelector('[data-id=start] > .blocklyPath').getAttribute('stroke')") == primary
+    )
+
+
+def test_the_flat_tokens_of_the_theme_do_as_well(view, person):
+    them = person(START)
+    light = TOKENS["colour"]["light"]
+    flat = {
+        "colour": {name: value for name, value in light.items() if isinstance(value, str)}
+        | {"grid": "#123456"},
+        "block": {name: {**each["light"], "icon": each["icon"]} for name, each in TOKENS["block"].items()},
+        "reducedMotion": True,
+    }
+    view.set_theme(flat, dark=False)
+    them.wait_for("getComputedStyle(document.documentElement).getPropertyValue('--nep-grid')", "#123456")
+    them.wait_for("document.documentElement.classList.contains('reduced')")
+
+
+def test_running_blocks_glow_in_the_page(view, person):
+    them = person(state=PICTURE)
+    view.highlight(["say_touch", "battery"])
+    them.wait_for(outlined("running") + ".sort()", ["battery", "say_touch"])
+    shape = "document.querySelector('[data-id=say_touch] > {}').getAttribute('d')"
+    assert them.ask(shape.format(".nepState .nepOutline")) == them.ask(shape.format(".blocklyPath"))
+    animated = "getComputedStyle(document.querySelector('.nepGlow')).animationName"
+    assert them.ask(animated) == "nepBreathe"
+    view.set_reduced_motion(True)
+    them.wait_for(animated, "none")
+    view.highlight([])
+    view.mark_stopped(["say_touch"])
+    them.wait_for(outlined("running"), [])
+    them.wait_for(outlined("stopped"), ["say_touch"])
+
+
+def test_thirty_highlights_a_second_are_cheap(qtbot, view, person):
+    them = person(state=PICTURE)
+    ids = ["say_touch", "battery", "wave"]
+    for number in range(300):
+        view.highlight([ids[number % 3]])
+    them.wait_for(outlined("running"), ["wave"])
+    script = (
+        "(() => { const begin = performance.now();"
+        "document.body.getBoundingClientRect(); return performance.now() - begin; })()"
+    )
+    assert them.ask(script) < 100
+
+
+def test_an_error_has_its_sentence_beside_the_block(view, person):
+    them = person(state=PICTURE)
+    view.set_errors({"say_touch": "Pepper does not answer."})
+    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper does not answer.")
+    assert them.ask(outlined("error")) == ["say_touch"]
+    block = them.box("[data-id=say_touch] > .blocklyPath")
+    bubble = them.box(".nepBubble")
+    assert 0 < bubble["left"] - block["right"] < 30
+    assert block["top"] - 5 < bubble["top"] < block["bottom"]
+    view.set_errors({})
+    them.wait_for("document.querySelectorAll('.nepBubble, .nepState').length", 0)
+
+
+def test_absent_robots_are_grey_with_the_reason(view, person):
+    them = person(state=PICTURE)
+    view.set_absent(["wave"])
+    grey = "[...document.querySelectorAll('.nepAbsent')].map(e => e.dataset.id)"
+    them.wait_for(grey, ["wave"])
+    assert them.newest() == PICTURE
+    view.set_absent([])
+    them.wait_for(grey, [])
+
+
+def test_live_values_are_shown_but_no_edit(qtbot, view, person):
+    them = person(state=PICTURE)
+    shown = "document.querySelector('[data-id=battery] .nepLive').textContent.replaceAll('\\u00a0', ' ')"
+    with qtbot.assertNotEmitted(view.changed, wait=300), qtbot.assertNotEmitted(view.history_changed):
+        view.set_live_values({"Pepper/battery": "84 %"})
+        them.wait_for(shown, "84 %")
+        view.set_live_values({"battery": "83 %"})
+        them.wait_for(shown, "83 %")
+    assert them.newest() == PICTURE
+
+
+def test_an_empty_program_is_nothing_but_dots(person):
+    them = person()
+    assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .blocklyBlock').length") == 0
+    assert them.ask("document.querySelectorAll('.blocklyTrash, .blocklyZoom').length") == 0
+    assert them.ask("document.querySelectorAll('.nepZoom button').length") == 3
+    assert them.view.web.fence.blocked == []
+
+
+def test_zoom_and_fit(qtbot, view, person):
+    them = person(state=PICTURE)
+    canvas = "document.querySelector('svg.blocklySvg .blocklyBlockCanvas')"
+    scale = f"Math.round(new DOMMatrix(getComputedStyle({canvas}).transform).a * 1000) / 1000"
+    them.wait_for(scale, 0.8)
+    view.zoom_in()
+    them.wait_for(f"{scale} > 0.9")
+    view.zoom_out()
+    view.zoom_out()
+    them.wait_for(f"{scale} < 0.75")
+    view.zoom_to_fit()
+    them.wait_for(f"{scale} > 0.75 && {scale} <= 1")
+    view.show_block("battery")
+    them.wait_for("!!document.querySelector('[data-id=battery].blocklySelected')")
+
+
+def test_the_toolbox_is_that_of_the_picture(person):
+    them = person()
+    labels = them.ask(
+        "[...document.querySelectorAll('.nepHeading, .blocklyToolboxCategoryLabel')].map(e => e.textContent)"
+    )
+    assert labels == [
+        "Blocks", "Events", "Control", "Values", "Variables", "Functions", "Messages",
+        "Peppervirtual", "Speech", "Movement", "Face and lights", "Sensors", "NAOnot connected",
+    ]  # fmt: skip
+    box = them.box(".blocklyToolbox")
+    assert box["right"] - box["left"] == 196
+    row = them.box(".blocklyToolboxCategory")
+    assert row["bottom"] - row["top"] == 36
+    tile = "getComputedStyle(document.querySelector('.nepTile')).backgroundColor"
+    events = QColor(TOKENS["block"]["events"]["light"]["primary"]).getRgb()[:3]
+    assert them.ask(tile) == "rgb({}, {}, {})".format(*events)

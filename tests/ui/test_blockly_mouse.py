@@ -1,0 +1,110 @@
+"""The block editor under a real mouse and real keys."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMainWindow
+
+from app.ui.blockly_view import BlocklyView
+from tests.ui.blockly_person import DEFINITIONS, START, WAIT_MS, Person, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+
+def test_a_block_dragged_under_the_hat_snaps_there(qtbot, view, person):
+    them = person(START)
+    hat = them.box("[data-id=start] > .blocklyPath")
+    them.open_category("Control")
+    with qtbot.waitSignal(view.changed, timeout=WAIT_MS) as changed:
+        start = them.hold(".blocklyFlyout .control_wait")
+        end = QPoint(round(hat["left"] + 16), round(hat["bottom"] + 22))
+        them.move(start, QPoint(700, 300))
+        them.move(QPoint(700, 300), end)
+        them.drop(end)
+    (top,) = changed.args[0]["blocks"]["blocks"]
+    assert top["next"]["block"]["type"] == "control_wait"
+    assert top["next"]["block"]["inputs"]["SECONDS"]["shadow"]["fields"] == {"NUMBER": 1}
+    assert them.newest() == changed.args[0]
+
+
+def test_undo_redo_and_their_announcement(qtbot, view, person):
+    them = person(START)
+    history: list[tuple[bool, bool]] = []
+    view.history_changed.connect(lambda *each: history.append(each))
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.press(Qt.Key_Delete)
+    qtbot.waitUntil(lambda: them.tops() == [] and history[-1:] == [(True, False)], timeout=WAIT_MS)
+    view.undo()
+    qtbot.waitUntil(lambda: them.tops() == [START] and history[-1] == (False, True), timeout=WAIT_MS)
+    view.redo()
+    qtbot.waitUntil(lambda: them.tops() == [] and history[-1] == (True, False), timeout=WAIT_MS)
+    them.press(Qt.Key_Z, Qt.ControlModifier)
+    qtbot.waitUntil(lambda: them.tops() == [START] and history[-1] == (False, True), timeout=WAIT_MS)
+    assert history == [(True, False), (False, True), (True, False), (False, True)]
+
+
+def test_copy_and_paste_by_keys(qtbot, person):
+    them = person(START)
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.press(Qt.Key_C, Qt.ControlModifier)
+    them.press(Qt.Key_V, Qt.ControlModifier)
+    qtbot.waitUntil(lambda: [top["type"] for top in them.tops()] == ["events_started"] * 2, timeout=WAIT_MS)
+
+
+def test_the_selected_block_is_told(qtbot, view, person):
+    them = person(START)
+    with qtbot.waitSignal(view.block_selected, timeout=WAIT_MS, check_params_cb=lambda id: id == "start"):
+        them.click("[data-id=start] > .blocklyPath", dy=30)
+
+
+def test_typing_in_a_text_changes_the_program(qtbot, view, person):
+    text = {"shadow": {"type": "values_text", "id": "t", "fields": {"TEXT": "x"}}}
+    say = {"type": "robot_pepper_do_say", "id": "say", "x": 28, "y": 28, "inputs": {"TEXT": text}}
+    them = person(say)
+    them.click("[data-id=t] .blocklyInputField", dx=8, dy=8)
+    them.wait_for("!!document.querySelector('.blocklyHtmlInput')")
+    QTest.keyClicks(them.target, "Hello, you")
+    them.press(Qt.Key_Return)
+
+    def typed() -> str:
+        return them.tops()[0]["inputs"]["TEXT"]["shadow"]["fields"]["TEXT"]
+
+    qtbot.waitUntil(lambda: typed() == "Hello, you", timeout=WAIT_MS)
+
+
+def test_f12_reaches_the_window_while_the_page_has_the_keyboard(qtbot, view, person):
+    them = person(START)
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    with qtbot.waitSignal(view.key_pressed, timeout=WAIT_MS) as pressed:
+        them.press(Qt.Key_F12)
+    assert pressed.args == ["F12"]
+
+
+def test_a_shortcut_of_the_window_wins_over_the_page_and_runs_once(qtbot):
+    window = QMainWindow()
+    qtbot.addWidget(window)
+    view = BlocklyView()
+    view.set_definitions(DEFINITIONS)
+    window.setCentralWidget(view)
+    window.resize(1031, 586)
+    stops: list[str] = []
+    action = QAction("Stop", window)
+    action.setShortcut("F12")
+    action.setShortcutContext(Qt.ApplicationShortcut)
+    action.triggered.connect(lambda: stops.append("action"))
+    window.addAction(action)
+    view.key_pressed.connect(stops.append)
+    view.load(workspace(START))
+    with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+        window.show()
+    window.activateWindow()
+    them = Person(qtbot, view)
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.press(Qt.Key_F12)
+    qtbot.waitUntil(lambda: bool(stops), timeout=WAIT_MS)
+    qtbot.wait(100)
+    assert len(stops) == 1
