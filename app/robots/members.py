@@ -28,3 +28,15 @@ def text(value: object) -> str | None:
 def number(value: object) -> float | None:
     """The number as it is (a whole one stays whole), or None; yes and no are no numbers."""
     return value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
+
+
+def number_of(value: object) -> float | None:
+    """The number that RIZE may have sent as text; None when it is none."""
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, (int, float)):
+        return float(value)
+    try:
+        return float(text(value) or "")
+    except ValueError:
+        return None

@@ -24,6 +24,7 @@ PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
 _MOST_PROBLEMS = 20
 _DEEPEST = 40
 _LARGEST = 1e15
+_RESERVED = {"description", "command", "answer", "state", "world"}
 
 
 @lru_cache(maxsize=1)
@@ -132,6 +133,8 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     elif part(part(actions, stop), "input").get("required"):
         yield f"'{stop}' is the safe stop, so its input must not require anything"
     resources_named = set(names(model.get("rb:resources")))
+    for name in (set(properties) | _RESERVED) & set(part(model, "events")) | set(properties) & _RESERVED:
+        yield f"'{name}' names two things of one robot; its topics would be the same"
     for name, action in actions.items():
         yield from _of_action(name, as_part(action), resources_named, properties)
     for name, sensor in properties.items():

@@ -1,1 +1,1 @@
-"""The virtual robot's room, body, camera and eyes: no messaging in here, and no clock."""
+"""The virtual robot's room, body, camera and eyes: no messaging in here."""

@@ -127,10 +127,32 @@ class Body:
             self._base.halt()
         for wave in self._waves:
             wave.halt()
-        for joint in self._joints():
-            joint.hold()
+        self.hold_joints()
         self.hush()
         self.emotion = "neutral"
+
+    def hold_joints(self) -> None:
+        """Keep head and arms where they are now."""
+        for joint in self._joints():
+            joint.hold()
+
+    def reset(self, room: Room) -> None:
+        """Back to the start, in this room, with nothing going on."""
+        self.halt()
+        if self._base is not None:
+            self._base.block()
+        self._base = None
+        self.room = room
+        self.x, self.y, self.theta_deg = START
+        self.eyes, self.shoulders = EYES, SHOULDERS
+        for place in sorted(self.touched):
+            self.touch(place, down=False)
+        self.stand()
+
+    @property
+    def joints_still(self) -> bool:
+        """True when head and arms have arrived."""
+        return all(joint.arrived for joint in self._joints())
 
     @property
     def speech(self) -> str | None:
@@ -145,7 +167,7 @@ class Body:
     @property
     def still(self) -> bool:
         """True when nothing at all moves."""
-        return not self.rolling and not self._waves and all(joint.arrived for joint in self._joints())
+        return not self.rolling and not self._waves and self.joints_still
 
     @property
     def distance(self) -> float:

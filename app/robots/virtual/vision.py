@@ -80,7 +80,7 @@ class Eyes:
         """ArUco cards of the dictionary 4x4, 50."""
         corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
         # OpenCV gives None for no markers, which its annotations do not know.
-        numbers: list[int] = np.asarray(ids).ravel().tolist() if len(corners) else []
+        numbers = [int(one) for one in np.asarray(ids).ravel()] if len(corners) else []
         return [
             Detection(f"marker {number}", 1.0, _box_of(outline[0]))
             for outline, number in zip(corners, numbers, strict=True)

@@ -1,0 +1,94 @@
+"""What a driver's function is given: the call it serves, and the link to the people who watch."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Time, so that tests can bring their own."""
+
+    def now(self) -> float:
+        """Seconds that never run backwards."""
+
+    def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
+        """Wait until the event is set (True) or the time is over (False); None waits for ever."""
+
+
+class MonotonicClock:
+    """The computer's own clock."""
+
+    def now(self) -> float:
+        """Seconds since some start."""
+        return time.monotonic()
+
+    def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
+        """Wait on the event."""
+        return event.wait(timeout_s)
+
+
+class Canceled(Exception):  # noqa: N818 - not an error: the word of the answer's state
+    """The action is to end now; drivers let it pass, after putting away what they hold."""
+
+
+class Failed(Exception):  # noqa: N818 - the word of the answer's state
+    """The action can't be done; its sentence is shown to people: ``Failed("no ball in sight")``."""
+
+
+class Link(Protocol):
+    """How a robot tells what it senses and what happens to it; works in any thread."""
+
+    name: str
+
+    def sense(self, sensor: str, value: object) -> None:
+        """Publish a sensor's new value; an object sensor takes a mapping, a camera a picture or JPEG."""
+
+    def happen(self, event: str, **data: object) -> None:
+        """Publish an event."""
+
+    def tell(self, leaf: str, value: object) -> None:
+        """Publish something that the description doesn't name on ``/<name>/<leaf>``, such as ``state``."""
+
+    def watchers(self, leaf: str) -> int:
+        """How many subscribers the topic of a sensor has: nobody needs a picture that nobody sees."""
+
+    def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
+        """Let people act on a virtual robot's world; `changed` is called with each message."""
+
+
+class Call:
+    """One run of an action. Everything here may be used from the function's thread."""
+
+    def __init__(self, action: str, clock: Clock, report: Callable[[Mapping[str, object]], None]) -> None:
+        self.action = action
+        self.clock = clock
+        self._report = report
+        self._ended = threading.Event()
+
+    @property
+    def canceled(self) -> bool:
+        """True once the action is to end."""
+        return self._ended.is_set()
+
+    def cancel(self) -> None:
+        """End the action: the function's next wait raises Canceled."""
+        self._ended.set()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass; raises Canceled as soon as the action is to end."""
+        if self.clock.wait(self._ended, seconds):
+            raise Canceled
+
+    def until(self, done: Callable[[], bool], *, every_s: float = 1 / 30) -> None:
+        """Wait until `done` is true, looking every so often; raises Canceled."""
+        while not done():
+            self.wait(every_s)
+
+    def feedback(self, **values: object) -> None:
+        """Tell how far it is; also a good place to notice a cancel."""
+        if self.canceled:
+            raise Canceled
+        self._report(values)

@@ -1,0 +1,257 @@
+"""Declaring a robot in Python: its actions, sensors, events and safe stop; its Thing Model is made from them.
+
+A robot is a class. Its constructor takes a :class:`~app.robots.calls.Link`; methods marked with
+:class:`action` are its actions; :func:`sensor`, :func:`picture`, :func:`detections` and :func:`event` are
+class attributes; exactly one method is marked with :func:`safe_stop`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias, TypeVar
+
+from app.errors import DescriptionError
+from app.robots.calls import Link
+from app.robots.profile import validate
+from app.robots.typed import Schema, fields_schema, input_schema, schema_of
+
+Function = TypeVar("Function", bound=Callable[..., object])
+Busy: TypeAlias = Literal["queue", "replace", "reject"]
+Risk: TypeAlias = Literal["moves", "locomotes"]
+FromRize: TypeAlias = Callable[[str, Mapping[str, object]], Mapping[str, object]]
+ToRize: TypeAlias = Callable[[Mapping[str, object]], tuple[str, Mapping[str, object]]]
+_CONTEXT = ["https://www.w3.org/2022/wot/td/v1.1", {"rb": "https://nep-studio.example/robot-blocks/v1#"}]
+_MARK = "__robot_action__"
+_STOP_MARK = "__robot_stop__"
+
+
+@dataclass(frozen=True)
+class action:  # noqa: N801 - used as a decorator
+    """Make a method an action: ``def walk(self, call: Call, distance: Annotated[float, Range(...)])``.
+
+    `text` is its block with ``%parameter`` in it, `says` the same in the third person. `rize` names RIZE's
+    primitive; `from_rize` turns RIZE's input and options into the action's input where names alone don't.
+    """
+
+    text: str
+    category: str
+    icon: str
+    says: str | None = None
+    title: str | None = None
+    uses: tuple[str, ...] = ()
+    on_busy: Busy = "queue"
+    timeout_s: float | None = None
+    risk: Risk | None = None
+    cancellable: bool = True
+    output: Mapping[str, object] | None = None
+    feedback: Mapping[str, object] | None = None
+    rize: str | None = None
+    from_rize: FromRize | None = None
+
+    def __call__(self, function: Function) -> Function:
+        """Mark the function and check its types at once."""
+        setattr(function, _MARK, ActionSpec(self._part(function), self.rize, self.from_rize))
+        return function
+
+    def _part(self, function: Callable[..., object]) -> Schema:
+        part: Schema = {
+            "title": self.title or function.__name__.replace("_", " "),
+            "synchronous": not self.cancellable,
+            **_given({"description": inspect.getdoc(function), "input": input_schema(function)}),
+        }
+        if self.output:
+            part["output"] = fields_schema(self.output)
+        if self.feedback:
+            part["rb:feedback"] = fields_schema(self.feedback)
+        part |= {"rb:cancel": self.cancellable, "rb:uses": list(self.uses), "rb:onBusy": self.on_busy}
+        part |= _given({"rb:timeout": self.timeout_s, "rb:risk": self.risk})
+        block: Schema = {"category": self.category, "icon": self.icon, "text": {"en": self.text}}
+        part["rb:block"] = block | ({"says": {"en": self.says}} if self.says else {})
+        return part
+
+
+@dataclass(frozen=True)
+class ActionSpec:
+    """What the decorator :class:`action` was told."""
+
+    part: Schema
+    primitive: str | None
+    from_rize: FromRize | None
+
+
+@dataclass(frozen=True)
+class StopSpec:
+    """What the decorator :func:`safe_stop` was told."""
+
+    watchdog_s: float
+    within_s: float
+
+
+@dataclass(frozen=True)
+class SensorSpec:
+    """A sensor's part of the description."""
+
+    part: Schema
+    is_image: bool = False
+    is_object: bool = False
+
+
+@dataclass(frozen=True)
+class EventSpec:
+    """An event's part of the description, and how RIZE's blackboard calls it."""
+
+    part: Schema
+    to_rize: ToRize | None = None
+
+
+def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Function], Function]:
+    """Make a method the robot's stop: it takes nothing and returns when the robot stands still."""
+
+    def mark(function: Function) -> Function:
+        setattr(function, _STOP_MARK, StopSpec(watchdog_s, within_s))
+        return function
+
+    return mark
+
+
+def sensor(
+    kind: object, *, title: str, text: str = "", icon: str = "activity", rate_hz: float | None = None
+) -> SensorSpec:
+    """A sensor of a type, or of an object when `kind` is a mapping of named types; `text` is its block."""
+    is_object = isinstance(kind, Mapping)
+    schema = fields_schema(kind) if isinstance(kind, Mapping) else schema_of(kind)
+    part: Schema = {**schema, "title": title, "readOnly": True, "observable": True}
+    part |= _given({"rb:rate": rate_hz})
+    part["rb:block"] = {"category": "Sensors", "icon": icon} | ({"text": {"en": text}} if text else {})
+    return SensorSpec(part, is_object=is_object)
+
+
+def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: float) -> SensorSpec:
+    """A camera: pictures with the codec ``image``."""
+    part: Schema = {"title": title, "type": "string", "readOnly": True, "observable": True}
+    part |= {"contentEncoding": "base64", "contentMediaType": "image/jpeg", "rb:widget": "image"}
+    part |= {"rb:rate": rate_hz, "rb:image": {"width": width, "height": height, "hfov": hfov_deg}}
+    part["rb:block"] = {"category": "Sensors", "icon": "camera"}
+    return SensorSpec(part, is_image=True)
+
+
+def detections(*, title: str, camera: str, icon: str, rate_hz: float | None = None) -> SensorSpec:
+    """Boxes with names in the pixels of a camera's picture."""
+    part: Schema = {**fields_schema({"count": int, "name": str}), "title": title}
+    part |= {"readOnly": True, "observable": True, "rb:widget": "detections", "rb:camera": camera}
+    part |= _given({"rb:rate": rate_hz})
+    part["rb:block"] = {"category": "Sensors", "icon": icon}
+    return SensorSpec(part, is_object=True)
+
+
+def event(
+    text: str,
+    *,
+    title: str,
+    icon: str,
+    fields: Mapping[str, object],
+    choose: tuple[str, ...] = (),
+    rize: ToRize | None = None,
+) -> EventSpec:
+    """Something that happens, with typed fields; blocks offer the fields of `choose` as choices."""
+    block: Schema = {"category": "Events", "icon": icon, "text": {"en": text}}
+    part: Schema = {
+        "title": title,
+        "data": fields_schema(fields),
+        "rb:filter": list(choose),
+        "rb:block": block,
+    }
+    return EventSpec(part, rize)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of robot: the class that drives it and its Thing Model; DescriptionError tells what is wrong."""
+
+    model: str
+    title: str
+    body: Callable[[Link], object]
+    virtual: bool = False
+    kinds: tuple[str, ...] = ()
+    driver: str = "python"
+    description: str = ""
+    thing_model: Mapping[str, object] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        made = self._thing_model()
+        problems = validate(made)
+        if problems:
+            raise DescriptionError(self.model, problems)
+        object.__setattr__(self, "thing_model", made)
+
+    @property
+    def actions(self) -> dict[str, ActionSpec]:
+        """The marked methods, in the order of the class."""
+        return {name: getattr(member, _MARK) for name, member in self._members() if hasattr(member, _MARK)}
+
+    @property
+    def sensors(self) -> dict[str, SensorSpec]:
+        """The sensors, in the order of the class."""
+        return {name: member for name, member in self._members() if isinstance(member, SensorSpec)}
+
+    @property
+    def events(self) -> dict[str, EventSpec]:
+        """The events, in the order of the class."""
+        return {name: member for name, member in self._members() if isinstance(member, EventSpec)}
+
+    @property
+    def stop(self) -> tuple[str, StopSpec]:
+        """The name of the stop method and what its decorator was told."""
+        found = [(name, getattr(m, _STOP_MARK)) for name, m in self._members() if hasattr(m, _STOP_MARK)]
+        if len(found) != 1:
+            raise DescriptionError(self.model, ("exactly one method must be marked with safe_stop",))
+        return found[0]
+
+    def _members(self) -> list[tuple[str, object]]:
+        if not isinstance(self.body, type):
+            raise DescriptionError(self.model, ("a robot is declared by a class",))
+        found: dict[str, object] = {}
+        for owner in reversed(self.body.__mro__):
+            found.update(vars(owner))
+        return list(found.items())
+
+    def _thing_model(self) -> Schema:
+        stop, timing = self.stop
+        actions = {name: spec.part for name, spec in self.actions.items()}
+        stopping: Schema = {"category": "Movement", "icon": "octagon-x", "text": {"en": "stop moving"}}
+        actions[stop] = {"title": "stop", "synchronous": True, "idempotent": True, "rb:cancel": False}
+        actions[stop] |= {"rb:uses": [], "rb:block": stopping | {"says": {"en": "stops"}}}
+        used = (name for part in actions.values() for name in _listed(part.get("rb:uses")))
+        about: Schema = {"model": self.model, "title": self.title, "virtual": self.virtual}
+        about |= {"kinds": list(self.kinds), "driver": self.driver, "dialect": "native"}
+        return {
+            "@context": _CONTEXT,
+            "@type": ["tm:ThingModel", "rb:Robot"],
+            "title": self.title,
+            **_given({"description": self.description or None}),
+            "version": {"model": "1.0.0"},
+            "rb:profile": 1,
+            "rb:robot": about,
+            "rb:resources": list(dict.fromkeys(used)),
+            "rb:safeStop": {
+                "action": stop,
+                "watchdog": timing.watchdog_s,
+                "within": timing.within_s,
+                "onProgramEnd": True,
+                "onDisconnect": True,
+                "confirmed": True,
+            },
+            "properties": {name: spec.part for name, spec in self.sensors.items()},
+            "actions": actions,
+            "events": {name: spec.part for name, spec in self.events.items()},
+        }
+
+
+def _listed(value: object) -> list[str]:
+    return [str(item) for item in value] if isinstance(value, list) else []
+
+
+def _given(found: Mapping[str, object]) -> Schema:
+    return {name: value for name, value in found.items() if value is not None}

@@ -1,0 +1,119 @@
+"""Where commands come in: ``robot/command`` messages become tasks, answers ``robot/answer`` messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+from app.robots.calls import Call
+from app.robots.inputs import near_miss
+from app.robots.members import as_part, text
+from app.robots.parts import Action, Robot
+from app.robots.tasks import Answer, Task, Tasks
+
+Publish: TypeAlias = Callable[[Mapping[str, object]], None]
+_LONGEST_ID = 200
+
+
+class Desk:
+    """Takes the commands for one robot; all methods are for the deciding thread of its tasks."""
+
+    def __init__(self, robot: Robot, body: object, tasks: Tasks, publish: Publish) -> None:
+        self._robot, self._body, self._tasks, self._publish = robot, body, tasks, publish
+        self._open: set[str] = set()
+
+    def receive(self, command: object) -> None:
+        """One message of the command topic; whatever it is, it is answered or has no id to answer to."""
+        message = as_part(command)
+        wanted = text(message.get("id"))
+        program = text(message.get("from"))
+        operation = message.get("op")
+        if program is not None:
+            self._tasks.sign_of_life(program, watch=operation == "invoke")
+        if operation == "alive" or wanted is None or len(wanted) > _LONGEST_ID:
+            return
+        if operation == "stop":
+            self._tasks.stop(self._answering(wanted, "stop", self._robot.safe_stop.action))
+        elif operation == "cancel":
+            self._cancel(wanted, str(message.get("action") or ""))
+        elif operation == "invoke":
+            self._invoke(wanted, str(message.get("action") or ""), message.get("input"))
+        else:
+            error = f"there is no “{operation}”; a command is invoke, cancel, stop or alive"
+            self._answering(wanted, str(operation), "")(Answer("failed", error=error))
+
+    def task(
+        self, wanted: str, action: Action, given: Mapping[str, object], answer: Callable[[Answer], None]
+    ) -> Task:
+        """The task that runs an action of the body with an input that has been checked."""
+        typed = {name: _typed(action, name, value) for name, value in action.complete(given).items()}
+        function: Callable[..., object] = getattr(self._body, action.name)
+
+        def run(call: Call) -> object:
+            return function(call, **typed)
+
+        return Task(
+            id=wanted,
+            action=action.name,
+            run=run,
+            answer=answer,
+            uses=action.uses,
+            on_busy=action.on_busy,
+            timeout_s=action.timeout_s,
+            cancellable=action.cancellable,
+        )
+
+    def unknown(self, name: str) -> str:
+        """The sentence for an action that the robot has not."""
+        return f"{self._robot.name} can't “{name}”{near_miss(name, [a.name for a in self._robot.actions])}"
+
+    def _invoke(self, wanted: str, name: str, given: object) -> None:
+        if wanted in self._open:
+            return  # the same command a second time
+        answer = self._answering(wanted, "invoke", name)
+        action = self._robot.action(name)
+        if action is None:
+            answer(Answer("failed", error=self.unknown(name)))
+            return
+        if name == self._robot.safe_stop.action:
+            self._tasks.stop(answer)
+            return
+        sentences = action.check({} if given is None else given)
+        if sentences:
+            answer(Answer("failed", error="; ".join(sentences)))
+            return
+        self._open.add(wanted)
+        self._tasks.submit(self.task(wanted, action, as_part(given), answer))
+
+    def _cancel(self, wanted: str, name: str) -> None:
+        error = self._tasks.cancel(lambda task: task.id == wanted)
+        if error is not None:
+            self._answering(wanted, "cancel", name)(Answer("failed", error=error))
+
+    def _answering(self, wanted: str, operation: str, name: str) -> Callable[[Answer], None]:
+        def answer(given: Answer) -> None:
+            if given.is_final and operation == "invoke":
+                self._open.discard(wanted)
+            self._publish(
+                {
+                    "id": wanted,
+                    "op": operation,
+                    "action": name,
+                    "state": given.state,
+                    "output": dict(given.output),
+                    "feedback": dict(given.feedback),
+                    "error": given.error,
+                }
+            )
+
+        return answer
+
+
+def _typed(action: Action, name: str, value: object) -> object:
+    """JSON has one kind of number: give the function the one its parameter says."""
+    parameter = action.parameter(name)
+    if parameter is None or isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    if parameter.kind == "integer":
+        return int(value)
+    return float(value) if parameter.kind in {"number", "angle"} else value

@@ -1,0 +1,141 @@
+"""The dialect of RIZE: ``robot_action`` in, ``action_state`` out (docs/robots.md).
+
+A command is ``{"node": "action", "primitives": {...} or [...], "robots": "Pepper", "state": "idle", ...}``; a
+list of primitives runs side by side. The answer is the same object with the state ``success`` or ``failure``.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from app.robots.calls import Call
+from app.robots.declare import ActionSpec
+from app.robots.desk import Desk
+from app.robots.inputs import Parameter
+from app.robots.members import as_part, names, number_of
+from app.robots.parts import Action, Robot
+from app.robots.tasks import Answer, Task, Tasks
+
+Publish: TypeAlias = Callable[[Mapping[str, object]], None]
+_LONGEST_WAIT_S = 3600.0
+
+
+@dataclass(eq=False)
+class _Group:
+    """The primitives of one command, which are answered together."""
+
+    command: Mapping[str, object]
+    open: int
+    states: list[str] = field(default_factory=list)
+
+
+class Dialect:
+    """Speaks RIZE for one robot; all methods are for the deciding thread of its tasks."""
+
+    def __init__(
+        self, robot: Robot, specs: Mapping[str, ActionSpec], desk: Desk, tasks: Tasks, publish: Publish
+    ) -> None:
+        self._robot, self._desk, self._tasks, self._publish = robot, desk, tasks, publish
+        self._specs = {spec.primitive: (name, spec) for name, spec in specs.items() if spec.primitive}
+        self._numbers = itertools.count(1)
+
+    def receive(self, message: object) -> None:
+        """One message of ``robot_action``; those for other robots are nobody's business here."""
+        command = as_part(message)
+        robots = command.get("robots")
+        if self._robot.name not in ((robots,) if isinstance(robots, str) else names(robots)):
+            return
+        if command.get("node") == "cancel":
+            self._tasks.cancel(lambda task: task.id.startswith(_PREFIX))
+        elif command.get("node") == "action":
+            self._run(command)
+
+    def _run(self, command: Mapping[str, object]) -> None:
+        given = command.get("primitives")
+        primitives: Sequence[object] = given if isinstance(given, list) else [given]
+        group = _Group(command, open=len(primitives))
+        if not primitives:
+            self._publish({**command, "state": "failure"})
+        for primitive in primitives:
+            self._start(as_part(primitive), lambda answer: self._answered(group, answer))
+
+    def _answered(self, group: _Group, answer: Answer) -> None:
+        if not answer.is_final:
+            return
+        group.open -= 1
+        group.states.append(answer.state)
+        if group.open == 0:
+            good = all(state == "succeeded" for state in group.states)
+            self._publish({**group.command, "state": "success" if good else "failure"})
+
+    def _start(self, primitive: Mapping[str, object], answer: Callable[[Answer], None]) -> None:
+        name, given = str(primitive.get("primitive") or ""), str(primitive.get("input") or "")
+        wanted = f"{_PREFIX}{next(self._numbers)}"
+        known, spec = self._specs.get(name, (name, None))
+        action = self._robot.action(known)
+        if action is not None and action.name == self._robot.safe_stop.action:
+            self._tasks.stop(answer)
+            return
+        task = None
+        if action is not None:
+            meant = _meant(action, spec, given, as_part(primitive.get("options")))  # options may be "none"
+            if meant is not None and not action.check(meant):
+                task = self._desk.task(wanted, action, meant, answer)
+        elif name == "wait":
+            task = _waiting(wanted, given, answer)
+        if task is None:
+            answer(Answer("failed"))
+        else:
+            self._tasks.submit(task)
+
+
+_PREFIX = "rize:"
+
+
+def _waiting(wanted: str, given: str, answer: Callable[[Answer], None]) -> Task | None:
+    seconds = number_of(given)
+    if seconds is None or not 0 <= seconds <= _LONGEST_WAIT_S:
+        return None
+    return Task(wanted, "wait", lambda call: _wait(call, seconds), answer)
+
+
+def _wait(call: Call, seconds: float) -> None:
+    call.wait(seconds)
+
+
+def _meant(
+    action: Action, spec: ActionSpec | None, given: str, options: Mapping[str, object]
+) -> Mapping[str, object] | None:
+    """The action's input that RIZE's input and options mean; None when they mean nothing here."""
+    if spec is None or spec.from_rize is None:
+        return _by_name(action, given, options)
+    try:
+        return spec.from_rize(given, options)
+    except (ValueError, KeyError):
+        return None
+
+
+def _by_name(action: Action, given: str, options: Mapping[str, object]) -> dict[str, object]:
+    """The input goes to the first parameter, options to those of their names; the others are left out."""
+    meant: dict[str, object] = {}
+    if action.parameters and given:
+        first = action.parameters[0]
+        meant[first.name] = _of_kind(first, given)
+    for name, value in options.items():
+        parameter = action.parameter(name)
+        if parameter is not None:
+            meant[name] = _of_kind(parameter, value)
+    return meant
+
+
+def _of_kind(parameter: Parameter, value: object) -> object:
+    """RIZE sends numbers as text and switches as text or truth values: what the parameter needs instead."""
+    if parameter.kind in {"number", "integer", "angle"} and isinstance(value, str):
+        number = number_of(value)
+        return value if number is None else number
+    if parameter.kind == "boolean" and isinstance(value, str):
+        return {"true": True, "false": False}.get(value.lower(), value)
+    return value

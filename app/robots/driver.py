@@ -1,0 +1,185 @@
+"""A robot on the network: its topics, its commands, its watchdog, made from its kind."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import nep
+from app.robots.calls import Clock, MonotonicClock
+from app.robots.declare import Kind
+from app.robots.description import parse, td_for, topic_of
+from app.robots.desk import Desk
+from app.robots.dialect import Dialect
+from app.robots.members import as_part
+from app.robots.tasks import Tasks
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+RIZE_COMMANDS, RIZE_ANSWERS, RIZE_EVENTS = "robot_action", "action_state", "rize_event"
+BLACKBOARD = "/blackboard"
+_BACKLOG = 2000
+_log = logging.getLogger(__name__)
+
+
+class Driver:
+    """Runs one robot of a kind under a name; it is the :class:`~app.robots.calls.Link` of the robot's class.
+
+    `node` is borrowed: closing the driver closes what it made on it, not the node. Works in any thread.
+    """
+
+    def __init__(self, kind: Kind, name: str, node: nep.Node, *, clock: Clock | None = None) -> None:
+        self.name = name
+        self.kind = kind
+        self.description = td_for(kind.thing_model, name)
+        self.robot = parse(self.description)
+        self._node = node
+        self._clock = clock or MonotonicClock()
+        self._lock = threading.Lock()
+        self._publishers: dict[str, nep.Publisher] = {}
+        self._subscribers: list[nep.Subscriber] = []
+        self._body: object = None
+        self._tasks: Tasks | None = None
+        self._unread: set[str] = set()
+
+    # ---- life -------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Make the topics, then the robot, then announce it.
+
+        Raises the errors of ``nep`` without a master; then nothing is left behind and it may be tried again.
+        """
+        try:
+            self._make_topics()
+            self._body = self.kind.body(self)
+            self._take_commands(self._body)
+            self._open(self.robot.topics.description, "robot/description", latched=True)
+        except nep.NepError:
+            self.close()
+            raise
+        self._publish(self.robot.topics.description, self.description)
+        self._publish(RIZE_EVENTS, {"robot": "ready", "name": self.name})
+
+    def _make_topics(self) -> None:
+        for name, spec in self.kind.sensors.items():
+            msg_type = "image" if spec.is_image else "json"
+            self._open(topic_of(self.name, name), msg_type, latched=not spec.is_image)
+        for name in self.kind.events:
+            self._open(topic_of(self.name, name))
+        self._open(self.robot.topics.answer, "robot/answer")
+        self._open(RIZE_ANSWERS)
+        self._open(RIZE_EVENTS, latched=True)
+        if any(spec.to_rize for spec in self.kind.events.values()):
+            self._open(BLACKBOARD)
+
+    def _take_commands(self, body: object) -> None:
+        stop, timing = self.kind.stop
+        stop_body: Callable[[], None] = getattr(body, stop)
+        self._tasks = tasks = Tasks(
+            self.name, stop_body, self._clock, within_s=timing.within_s, watchdog_s=timing.watchdog_s
+        )
+        desk = Desk(self.robot, body, tasks, partial(self._publish, self.robot.topics.answer))
+        dialect = Dialect(self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS))
+        tasks.start()
+        self._listen(self.robot.topics.command, "robot/command", desk.receive)
+        self._listen(RIZE_COMMANDS, "json", dialect.receive)
+
+    def close(self) -> None:
+        """Stop the robot, answer what is open, end its threads, leave the network. May be called twice."""
+        for subscriber in self._subscribers:
+            subscriber.close()
+        self._subscribers.clear()
+        tasks, self._tasks = self._tasks, None
+        if tasks is not None:
+            tasks.close()
+        close, self._body = getattr(self._body, "close", None), None
+        if callable(close):
+            close()
+        with self._lock:
+            publishers, self._publishers = list(self._publishers.values()), {}
+        for publisher in publishers:
+            publisher.close()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    # ---- what the robot tells ---------------------------------------------------------------------
+
+    def sense(self, sensor: str, value: object) -> None:
+        """Publish a sensor's new value; KeyError when the kind has no such sensor."""
+        spec = self.kind.sensors[sensor]
+        plain = spec.is_image or spec.is_object
+        self._publish(topic_of(self.name, sensor), value if plain else {"value": value})
+
+    def happen(self, event: str, **data: object) -> None:
+        """Publish an event, also to RIZE's blackboard if it knows it; KeyError when there is none such."""
+        spec = self.kind.events[event]
+        self._publish(topic_of(self.name, event), data)
+        if spec.to_rize is not None:
+            primitive, given = spec.to_rize(data)
+            self._publish(BLACKBOARD, {"primitive": primitive, "input": dict(given), "robot": self.name})
+
+    def tell(self, leaf: str, value: object) -> None:
+        """Publish on a topic of the robot that its description doesn't name, such as ``state``."""
+        topic = topic_of(self.name, leaf)
+        if topic not in self._publishers:
+            self._open(topic)
+        self._publish(topic, value)
+
+    def watchers(self, leaf: str) -> int:
+        """How many subscribers one of the robot's topics has now."""
+        publisher = self._publishers.get(topic_of(self.name, leaf))
+        return 0 if publisher is None else publisher.subscribers
+
+    def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
+        """Call `changed` with every message of ``/<name>/world``, in the network's thread: be quick."""
+        self._subscribe(topic_of(self.name, "world"), "json", lambda payload: changed(as_part(payload)))
+
+    # ---- topics -----------------------------------------------------------------------------------
+
+    def _open(self, topic: str, msg_type: str = "json", *, latched: bool = False) -> None:
+        publisher = self._node.new_pub(topic, msg_type, latched=latched)
+        with self._lock:
+            self._publishers[topic] = publisher
+
+    def _publish(self, topic: str, value: object) -> None:
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            return  # closed meanwhile
+        try:
+            publisher.publish(value)
+        except nep.ClosedError:
+            return
+        except nep.EncodeError as error:
+            _log.warning("%s: nothing is published on '%s': %s", self.name, topic, error)
+
+    def _listen(self, topic: str, msg_type: str, receive: Callable[[object], None]) -> None:
+        def hand_over(payload: object) -> None:
+            tasks = self._tasks
+            # A flood of commands must not pile up without end; a stop always gets through.
+            if tasks is not None and (tasks.backlog < _BACKLOG or as_part(payload).get("op") == "stop"):
+                tasks.call_soon(partial(receive, payload))
+
+        self._subscribe(topic, msg_type, hand_over)
+
+    def _subscribe(self, topic: str, msg_type: str, use: Callable[[object], None]) -> None:
+        def take(messages: Sequence[nep.Message]) -> None:
+            for message in messages:
+                try:
+                    payload = message.payload
+                except nep.DecodeError as error:
+                    if topic not in self._unread:
+                        self._unread.add(topic)
+                        _log.warning("%s: a message on '%s' can't be read: %s", self.name, topic, error)
+                else:
+                    use(payload)
+
+        self._subscribers.append(self._node.new_sub(topic, msg_type, sink=take))

@@ -1,0 +1,95 @@
+"""A driver as a process of its own: its arguments, its master, and its end when its owner is gone."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from types import FrameType
+
+import psutil
+
+import nep
+from app.robots.declare import Kind
+from app.robots.driver import Driver
+
+_OWNER_CHECK_S = 0.5
+
+
+def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
+    """Run a robot of this kind until it is asked to end (SIGTERM, Ctrl+C) or its owner is gone.
+
+    Without a master it waits for one. 0 on an orderly end, 2 for wrong arguments.
+    """
+    parser = argparse.ArgumentParser(description=f"Drive a robot: {kind.title}.")
+    parser.add_argument("--name", default=kind.title, help="the robot's name; its topics begin with it")
+    parser.add_argument("--master", default=None, help="the master's address (default: $NEP_MASTER)")
+    parser.add_argument("--owner-pid", type=int, default=None, help="end when this process is gone")
+    chosen = parser.parse_args(arguments)
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(name)s: %(message)s")
+    ended = threading.Event()
+    _on_signals(ended)
+    run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
+    return 0
+
+
+def run(
+    kind: Kind, name: str, ended: threading.Event, *, master: str | None = None, owner_pid: int | None = None
+) -> None:
+    """Drive a robot until `ended` is set or the owner is gone; then stop it and leave the network."""
+    owner = _process(owner_pid)
+    if owner_pid is not None and owner is None:
+        return
+    with nep.node(name, master=master) as node:
+        driver = Driver(kind, name, node)
+        try:
+            while not _started(driver):
+                if _over(ended, owner):
+                    return
+            while not _over(ended, owner):
+                ended.wait(_OWNER_CHECK_S)
+        finally:
+            driver.close()
+
+
+def _started(driver: Driver) -> bool:
+    try:
+        driver.start()
+    except nep.MasterUnreachable:
+        return False
+    return True
+
+
+def _over(ended: threading.Event, owner: psutil.Process | None) -> bool:
+    # is_running knows a process by its pid and the time it began, so a reused pid is not taken for it.
+    return ended.is_set() or (owner is not None and _is_gone(owner))
+
+
+def _is_gone(owner: psutil.Process) -> bool:
+    try:
+        return not owner.is_running() or owner.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+
+
+def _process(pid: int | None) -> psutil.Process | None:
+    if pid is None:
+        return None
+    try:
+        return psutil.Process(pid)
+    except psutil.NoSuchProcess:
+        return None
+
+
+def _on_signals(ended: threading.Event) -> None:
+    def end(_number: int, _frame: FrameType | None) -> None:
+        ended.set()
+
+    signal.signal(signal.SIGTERM, end)
+    signal.signal(signal.SIGINT, end)
+    if os.name == "nt":
+        signal.signal(signal.SIGBREAK, end)  # type: ignore[attr-defined,unused-ignore]

@@ -1,0 +1,349 @@
+"""The virtual robot: ``python -m app.robots.simulated --name Pepper`` drives it in a process of its own.
+
+It lives in a small room (:mod:`app.robots.virtual`); Studio draws it from ``/<name>/state``, and people act on
+its world through ``/<name>/world``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal, TypeAlias
+
+from app.robots.calls import Call, Canceled, Failed, Link, MonotonicClock
+from app.robots.declare import Kind, action, safe_stop
+from app.robots.process import main as drive
+from app.robots.typed import Colour, Range, Suggested, Text, Title, Words
+from app.robots.virtual import from_rize
+from app.robots.virtual.body import START_PITCH, Body
+from app.robots.virtual.camera import lens_of
+from app.robots.virtual.life import Life
+from app.robots.virtual.motion import Motion
+from app.robots.virtual.room import Room
+from app.robots.virtual.senses import Senses
+from app.robots.virtual.vision import angles_to
+
+SPEECH, MOVEMENT, FACE = "Speech", "Movement", "Face and lights"
+Emotion: TypeAlias = Literal["happy", "surprised", "sad", "angry", "neutral"]
+Side: TypeAlias = Literal["left", "right"]
+Language: TypeAlias = Annotated[
+    Literal["en", "fr", "ja"], Words({"en": "English", "fr": "French", "ja": "Japanese"})
+]
+Target: TypeAlias = Annotated[
+    Literal["ahead", "left", "right", "up", "down", "face", "ball"],
+    Words({"face": "the face", "ball": "the ball", "left": "the left", "right": "the right"}),
+]
+_HEAD = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
+_HEAD |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
+_FEEDBACK_S = 0.2
+
+
+class VirtualPepper(Senses):
+    """A friendly robot on wheels with a head, two arms, a voice and lights."""
+
+    start_room: ClassVar[Room] = Room()
+
+    def __init__(self, link: Link) -> None:
+        self._life = Life(Body(room=self.start_room), link, MonotonicClock())
+        self._volume, self._language = 60, "en"
+        link.on_world(self._life.act)
+        self._life.start()
+
+    def close(self) -> None:
+        """End its threads."""
+        self._life.close()
+
+    # ---- speech -----------------------------------------------------------------------------------
+
+    @action(
+        "say %text",
+        SPEECH,
+        "message-circle",
+        says="says “%text”",
+        uses=("speech",),
+        timeout_s=60,
+        feedback={"word": str},
+        output={"seconds": Annotated[float, Range(unit="s")]},
+        rize="say",
+    )
+    def say(
+        self,
+        call: Call,
+        text: Annotated[str, Text(1, 500), Suggested("Hello! I am Pepper.")],
+        volume: Annotated[int, Range(0, 100, 5, "%")] = 60,
+        language: Language = "en",
+    ) -> Mapping[str, object]:
+        """Say a text; the words stand in a bubble for as long as they take."""
+        with self._life.changed:
+            self._volume, self._language = volume, language
+            speech = self._life.body.say(text)
+        try:
+            while not speech.done:
+                call.feedback(word=speech.word)
+                call.until(lambda: speech.done, every_s=_FEEDBACK_S)
+        except Canceled:
+            with self._life.changed:
+                if not speech.done:
+                    self._life.body.hush()
+            raise
+        return {"seconds": round(speech.seconds, 2)}
+
+    # ---- movement ---------------------------------------------------------------------------------
+
+    @action(
+        "turn %direction by %angle °",
+        MOVEMENT,
+        "rotate-ccw",
+        says="turns %direction by %angle °",
+        uses=("base",),
+        on_busy="replace",
+        timeout_s=60,
+        risk="locomotes",
+        feedback={"to_go": Annotated[float, Range(unit="deg")]},
+        rize="turn",
+        from_rize=from_rize.turn,
+    )
+    def turn(
+        self,
+        call: Call,
+        direction: Side = "left",
+        angle: Annotated[float, Range(-360, 360, 5, "deg")] = 30.0,
+        speed: Annotated[float, Range(5, 90, 5, "deg/s")] = 40.0,
+    ) -> None:
+        """Turn on the spot."""
+        signed = angle if direction == "left" else -angle
+        self._roll(call, lambda body: body.turn(signed, speed))
+
+    @action(
+        "walk %distance m",
+        MOVEMENT,
+        "footprints",
+        says="walks %distance m",
+        uses=("base",),
+        on_busy="replace",
+        timeout_s=60,
+        risk="locomotes",
+        feedback={"to_go": Annotated[float, Range(unit="m")]},
+        rize="walk",
+        from_rize=from_rize.walk,
+    )
+    def walk(
+        self,
+        call: Call,
+        distance: Annotated[float, Range(-2, 2, 0.05, "m")] = 0.5,
+        speed: Annotated[float, Range(0.05, 0.35, 0.05, "m/s")] = 0.3,
+    ) -> None:
+        """Walk straight, backwards when the distance is negative."""
+        motion = self._roll(call, lambda body: body.walk(distance, speed))
+        if motion.blocked:
+            raise Failed(f"walk: something is in the way after {abs(motion.moved):.2f} m")
+
+    @action(
+        "look at %target",
+        MOVEMENT,
+        "eye",
+        title="look at",
+        says="looks at %target",
+        uses=("head",),
+        on_busy="replace",
+        timeout_s=10,
+        risk="moves",
+    )
+    def look_at(self, call: Call, target: Target = "face") -> None:
+        """Turn the head to a side, or to the face or the ball that is in the picture."""
+        with self._life.changed:
+            yaw, pitch = self._direction_of(target)
+        self._turn_head(call, yaw, pitch)
+
+    @action(
+        "turn head %yaw ° left and %pitch ° down",
+        MOVEMENT,
+        "move",
+        title="turn head",
+        says="turns its head",
+        uses=("head",),
+        on_busy="replace",
+        timeout_s=10,
+        risk="moves",
+    )
+    def head(
+        self,
+        call: Call,
+        yaw: Annotated[float, Range(-119, 119, 5, "deg", "angle"), Title("to the left")] = 0.0,
+        pitch: Annotated[float, Range(-40, 36, 2, "deg", "angle"), Title("down")] = START_PITCH,
+    ) -> None:
+        """Turn the head; right and up are negative."""
+        self._turn_head(call, yaw, pitch)
+
+    @action(
+        "wave %hand hand",
+        MOVEMENT,
+        "hand",
+        says="waves its %hand hand",
+        uses=("arms",),
+        on_busy="replace",
+        timeout_s=20,
+        risk="moves",
+        rize="wave",
+    )
+    def wave(self, call: Call, hand: Side = "right") -> None:
+        """Greet with one hand."""
+        with self._life.changed:
+            wave = self._life.body.wave(hand)
+        self._until(call, lambda: wave.done, wave.halt)
+
+    @action(
+        "stand straight",
+        MOVEMENT,
+        "person-standing",
+        says="stands straight",
+        uses=("arms", "head"),
+        on_busy="replace",
+        timeout_s=10,
+        risk="moves",
+    )
+    def stand(self, call: Call) -> None:
+        """Let the arms hang and look ahead."""
+        with self._life.changed:
+            self._life.body.stand()
+        self._until(call, lambda: self._life.body.joints_still, self._life.body.hold_joints)
+
+    # ---- face and lights --------------------------------------------------------------------------
+
+    @action(
+        "look %emotion for %seconds s",
+        FACE,
+        "smile",
+        title="show emotion",
+        says="looks %emotion for %seconds s",
+        uses=("face",),
+        on_busy="replace",
+        timeout_s=65,
+        rize="robot_emotion",
+    )
+    def show_emotion(
+        self,
+        call: Call,
+        emotion: Emotion = "happy",
+        seconds: Annotated[float, Range(0.5, 60, 0.5, "s")] = 2.0,
+    ) -> None:
+        """Make a face for a while."""
+        with self._life.changed:
+            self._life.body.emotion = emotion
+        try:
+            call.wait(seconds)
+        finally:
+            with self._life.changed:
+                self._life.body.emotion = "neutral"
+
+    @action(
+        "light %where %colour",
+        FACE,
+        "lightbulb",
+        says="lights its %where",
+        uses=("lights",),
+        cancellable=False,
+        rize="leds",
+        from_rize=from_rize.light,
+    )
+    def light(
+        self,
+        call: Call,  # noqa: ARG002 - every action is given its call
+        where: Literal["eyes", "shoulders", "both"] = "eyes",
+        colour: Colour = "#35b0fa",
+    ) -> None:
+        """Give the lights a colour."""
+        with self._life.changed:
+            if where in {"eyes", "both"}:
+                self._life.body.eyes = colour
+            if where in {"shoulders", "both"}:
+                self._life.body.shoulders = colour
+
+    # ---- stopping ---------------------------------------------------------------------------------
+
+    @safe_stop(watchdog_s=1.0, within_s=0.2)
+    def stop(self) -> None:
+        """Brake, hold the joints, be quiet; returns when nothing moves any more."""
+        with self._life.changed:
+            self._life.body.halt()
+        if not self._life.wait_for(lambda: self._life.body.still, timeout_s=2.0):
+            raise Failed("the virtual robot goes on moving")
+
+    # ---- how it is done ---------------------------------------------------------------------------
+
+    def _roll(self, call: Call, start: Callable[[Body], Motion]) -> Motion:
+        with self._life.changed:
+            motion = start(self._life.body)
+        try:
+            while not motion.done:
+                call.feedback(to_go=round(abs(motion.remaining), 2))
+                call.wait(_FEEDBACK_S / 4)
+        except Canceled:
+            self._brake(motion)
+            raise
+        return motion
+
+    def _brake(self, motion: Motion) -> None:
+        with self._life.changed:
+            motion.halt()
+        self._life.wait_for(lambda: motion.done, timeout_s=1.0)
+
+    def _turn_head(self, call: Call, yaw: float, pitch: float) -> None:
+        with self._life.changed:
+            self._life.body.head_yaw.aim(yaw)
+            self._life.body.head_pitch.aim(pitch)
+        self._until(call, lambda: self._life.body.joints_still, self._life.body.hold_joints)
+
+    def _direction_of(self, target: str) -> tuple[float, float]:
+        if target in _HEAD:
+            return _HEAD[target]
+        found = self._life.seen.get("faces" if target == "face" else "balls", [])
+        if not found:
+            raise Failed(f"look at: there is no {target} in the picture")
+        left, down = angles_to(lens_of(self._life.body), found[0].middle)
+        body = self._life.body
+        return body.head_yaw.angle + left, body.head_pitch.angle + down
+
+    def _until(self, call: Call, done: Callable[[], bool], halt: Callable[[], None]) -> None:
+        try:
+            call.until(done)
+        except Canceled:
+            with self._life.changed:
+                halt()
+            raise
+
+
+ROBOT = Kind(
+    model="pepper",
+    title="Pepper",
+    body=VirtualPepper,
+    virtual=True,
+    kinds=("humanoid", "mobile", "speaking"),
+    driver="virtual",
+    description="A virtual humanoid on wheels in a small room: speech, head, arms, lights, camera, touch.",
+)
+
+
+def room_of(seed: int | None) -> Room:
+    """The room with its things in their usual places, or, with a seed, elsewhere: the same each time."""
+    if seed is None:
+        return Room()
+    places = random.Random(seed)  # noqa: S311 - furniture, not secrets
+    room = Room().moved("ball", places.uniform(1.2, 2.6), places.uniform(-1.4, -0.5))
+    return room.moved("person", places.uniform(0.8, 1.6), places.uniform(-0.3, 0.6))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Drive the virtual robot; ``--seed`` puts ball and person elsewhere, the rest is the kit's."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--seed", type=int, default=None)
+    chosen, others = parser.parse_known_args(arguments)
+    body = type("VirtualPepper", (VirtualPepper,), {"start_room": room_of(chosen.seed)})
+    return drive(replace(ROBOT, body=body), others)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,295 @@
+"""Running what a robot is asked to do: who goes first, who waits, who is ended, when the robot is still.
+
+All decisions are taken in one thread, ``<name> commands``; each running task has a thread of its own. The
+deciding thread never waits for a driver's function, so a stop is acted on at once.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Literal, TypeAlias
+
+from app.robots.calls import Call, Canceled, Clock, Failed
+
+State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "canceled"]
+_LONGEST_QUEUE = 50
+_GRACE_S = 1.0
+_JOIN_S = 2.0
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How a task stands; `error` is a sentence for people."""
+
+    state: State
+    output: Mapping[str, object] = field(default_factory=dict)
+    feedback: Mapping[str, object] = field(default_factory=dict)
+    error: str | None = None
+
+    @property
+    def is_final(self) -> bool:
+        """True when no other answer follows."""
+        return self.state in {"succeeded", "failed", "canceled"}
+
+
+@dataclass(eq=False)
+class Task:
+    """Something to run: `run` gets its :class:`Call` in a thread, `answer` is called in the deciding one."""
+
+    id: str
+    action: str
+    run: Callable[[Call], object]
+    answer: Callable[[Answer], None]
+    uses: tuple[str, ...] = ()
+    on_busy: str = "queue"
+    timeout_s: float | None = None
+    cancellable: bool = True
+    call: Call | None = None
+    thread: threading.Thread | None = None
+    due_s: float | None = None
+    ending: Answer | None = None
+    answered: bool = False
+
+    def end(self, how: Answer) -> None:
+        """Ask the running function to end; `how` is what will be answered, whatever it returns."""
+        self.ending = self.ending or how
+        if self.call is not None:
+            self.call.cancel()
+
+    def finish(self, answer: Answer) -> None:
+        """Give the final answer, once."""
+        if not self.answered:
+            self.answered = True
+            self.answer(answer)
+
+
+class Tasks:
+    """The tasks of one robot. Methods without another word are for the deciding thread only."""
+
+    def __init__(
+        self, name: str, stop: Callable[[], None], clock: Clock, *, within_s: float, watchdog_s: float | None
+    ) -> None:
+        self._name, self._stop_body, self._clock = name, stop, clock
+        self._patience_s = max(1.0, 5 * within_s)
+        self._watchdog_s = watchdog_s
+        self._inbox: deque[Callable[[], None]] = deque()
+        self._wake = threading.Event()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._decide, name=f"{name} commands", daemon=True)
+        self._running: list[Task] = []
+        self._queue: list[Task] = []
+        self._alive: dict[str, float] = {}
+        self._stopper: threading.Thread | None = None
+        self._stop_answers: list[tuple[float, Callable[[Answer], None]]] = []
+
+    # ---- for every thread -------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Begin to decide."""
+        self._thread.start()
+
+    def call_soon(self, what: Callable[[], None]) -> None:
+        """Let the deciding thread do something next."""
+        self._inbox.append(what)
+        self._wake.set()
+
+    @property
+    def backlog(self) -> int:
+        """How many things the deciding thread has still to do."""
+        return len(self._inbox)
+
+    def close(self) -> None:
+        """Stop the robot, end everything and join the threads; a function that never ends is left behind."""
+        stopped = threading.Event()
+        self.call_soon(lambda: self.stop(lambda _: stopped.set(), "the driver ends"))
+        stopped.wait(self._patience_s + _GRACE_S)
+        self._closing.set()
+        self._wake.set()
+        self._thread.join(_JOIN_S)
+
+    # ---- what is asked ----------------------------------------------------------------------------
+
+    def submit(self, task: Task) -> None:
+        """Run a task as soon as what it uses is free; refuse it, or end others, by its busy policy."""
+        if self._stopper is not None:
+            task.finish(Answer("failed", error=f"{task.action}: {self._name} is stopping"))
+            return
+        clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
+        if clashing and task.on_busy == "reject":
+            busy = f"{task.action}: {self._name} is busy with {clashing[0].action}"
+            task.finish(Answer("failed", error=busy))
+            return
+        if len(self._queue) >= _LONGEST_QUEUE:
+            full = f"{task.action}: {_LONGEST_QUEUE} other actions are waiting already"
+            task.finish(Answer("failed", error=full))
+            return
+        task.answer(Answer("accepted"))
+        if task.on_busy == "replace":
+            replaced = Answer("canceled", error=f"{task.action} took its place")
+            self._drop([other for other in clashing if other in self._queue], replaced)
+            for other in clashing:
+                if other.cancellable:
+                    self._end(other, replaced)
+        self._queue.append(task)
+        self._start_ready()
+
+    def cancel(self, wanted: Callable[[Task], bool]) -> str | None:
+        """End the tasks that are wanted; None when there was one, else a sentence."""
+        found = [task for task in (*self._running, *self._queue) if wanted(task)]
+        if not found:
+            return "nothing with this id runs"
+        stubborn = [task for task in found if task in self._running and not task.cancellable]
+        if stubborn:
+            return f"{stubborn[0].action} can't be canceled; it ends by itself"
+        self._drop([task for task in found if task in self._queue], Answer("canceled"))
+        for task in found:
+            self._end(task, Answer("canceled"))
+        return None
+
+    def sign_of_life(self, program: str, *, watch: bool) -> None:
+        """A program said something; `watch` begins to expect more (it asked the robot to act)."""
+        if watch or program in self._alive:
+            self._alive[program] = self._clock.now()
+
+    def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
+        """End everything; `answer` is called when the robot stands still and every function has ended."""
+        if answer is not None:
+            self._stop_answers.append((self._clock.now() + self._patience_s, answer))
+        self._alive.clear()
+        ended = Answer("canceled", error=why)
+        self._drop(list(self._queue), ended)
+        for task in self._running:
+            self._end(task, ended)
+        if self._stopper is None:
+            self._stopper = threading.Thread(target=self._run_stop, name=f"{self._name} stop", daemon=True)
+            self._stopper.start()
+
+    # ---- the deciding thread ----------------------------------------------------------------------
+
+    def _decide(self) -> None:
+        while not self._closing.is_set():
+            self._clock.wait(self._wake, self._next_due())
+            self._wake.clear()
+            while self._inbox:
+                self._inbox.popleft()()
+            self._look_at_clock(self._clock.now())
+
+    def _next_due(self) -> float | None:
+        due = [task.due_s for task in self._running if task.due_s is not None]
+        due += [limit for limit, _ in self._stop_answers]
+        if self._watchdog_s is not None:
+            due += [seen + self._watchdog_s for seen in self._alive.values()]
+        return max(0.0, min(due) - self._clock.now()) if due else None
+
+    def _look_at_clock(self, now: float) -> None:
+        for task in self._running:
+            if task.due_s is not None and now >= task.due_s:
+                self._overdue(task)
+        late = [answer for limit, answer in self._stop_answers if now >= limit]
+        self._stop_answers = [pair for pair in self._stop_answers if now < pair[0]]
+        names = ", ".join(task.action for task in self._running) or "the stop itself"
+        for answer in late:
+            answer(Answer("failed", error=f"{self._name} may still move: {names} did not end"))
+        silent = [name for name, seen in self._alive.items() if now - seen >= (self._watchdog_s or now)]
+        if silent:
+            self.stop(None, f"no sign of life from its program for {self._watchdog_s:g} s")
+
+    def _end(self, task: Task, how: Answer) -> None:
+        """Ask for the end; a function that goes on all the same is answered for after a second."""
+        if task.ending is None:
+            task.end(how)
+            task.due_s = self._clock.now() + _GRACE_S
+
+    def _overdue(self, task: Task) -> None:
+        if task.ending is None:
+            self._end(task, Answer("failed", error=f"{task.action} took longer than {task.timeout_s:g} s"))
+        else:
+            task.due_s = None
+            task.finish(task.ending)
+
+    def _drop(self, tasks: list[Task], how: Answer) -> None:
+        self._queue = [task for task in self._queue if task not in tasks]
+        for task in tasks:
+            task.finish(how)
+
+    def _start_ready(self) -> None:
+        taken = {used for task in self._running for used in task.uses}
+        for task in list(self._queue):
+            if not taken & set(task.uses):
+                self._queue.remove(task)
+                self._start(task)
+            taken |= set(task.uses)  # also for one that waits: nobody overtakes it
+
+    def _start(self, task: Task) -> None:
+        def report(values: Mapping[str, object]) -> None:
+            self.call_soon(partial(self._progress, task, dict(values)))
+
+        task.call = Call(task.action, self._clock, report)
+        task.due_s = None if task.timeout_s is None else self._clock.now() + task.timeout_s
+        self._running.append(task)
+        task.answer(Answer("running"))
+        name = f"{self._name} {task.action}"
+        task.thread = threading.Thread(target=self._work, args=(task, task.call), name=name, daemon=True)
+        task.thread.start()
+
+    def _progress(self, task: Task, values: dict[str, object]) -> None:
+        if not task.answered:
+            task.answer(Answer("running", feedback=values))
+
+    def _work(self, task: Task, call: Call) -> None:
+        try:
+            output = task.run(call)
+            done = Answer("succeeded", output=output if isinstance(output, Mapping) else {})
+        except Canceled:
+            done = Answer("canceled")
+        except Failed as failed:
+            done = Answer("failed", error=str(failed))
+        except Exception as error:  # noqa: BLE001 - a driver's function may raise anything; it is answered
+            _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
+            done = Answer("failed", error=f"{task.action} broke off: {_said(error)}")
+        self.call_soon(partial(self._ended, task, done))
+
+    def _ended(self, task: Task, done: Answer) -> None:
+        if task.thread is not None:
+            task.thread.join(_JOIN_S)
+        self._running.remove(task)
+        # A function that was told to end may return as if it had finished: what was asked counts.
+        task.finish(done if task.ending is None or done.state == "failed" else task.ending)
+        self._start_ready()
+        self._settle()
+
+    def _run_stop(self) -> None:
+        error = None
+        try:
+            self._stop_body()
+        except Exception as failed:  # noqa: BLE001 - a driver's stop may raise anything; it is answered
+            _log.warning("%s: its stop broke off", self._name, exc_info=True)
+            error = f"{self._name} may still move: its stop broke off: {_said(failed)}"
+        self.call_soon(partial(self._stop_ended, error))
+
+    def _stop_ended(self, error: str | None) -> None:
+        if self._stopper is not None:
+            self._stopper.join(_JOIN_S)
+        self._stopper = None
+        if error is not None:
+            answers, self._stop_answers = self._stop_answers, []
+            for _, answer in answers:
+                answer(Answer("failed", error=error))
+        self._settle()
+
+    def _settle(self) -> None:
+        """Answer the stops once its function is through and nothing runs any more."""
+        if self._stopper is None and not self._running:
+            answers, self._stop_answers = self._stop_answers, []
+            for _, answer in answers:
+                answer(Answer("succeeded"))
+
+
+def _said(error: Exception) -> str:
+    return str(error) or type(error).__name__

@@ -1,0 +1,172 @@
+"""What keeps the virtual robot going: one thread that moves it 30 times a second, one that looks 15 times."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+
+import cv2
+
+from app.robots.calls import Clock, Link
+from app.robots.virtual.body import Body, Happening
+from app.robots.virtual.camera import Camera, lens_of
+from app.robots.virtual.drawing import drawable
+from app.robots.virtual.vision import Detection, Eyes, message
+
+BODY_HZ = 30.0
+CAMERA_HZ = 15.0
+_LOOK_EVERY = 3  # pictures; people and balls do not come and go faster
+_SLOW_EVERY = 3  # steps between two values of pose and distance
+_CALM_EVERY = 30  # steps between two values of what hardly changes
+_LONGEST_STEP_S = 0.25  # after a suspended computer the world goes on from where it was
+_LOST_AFTER_S = 0.5
+_STOP_S = 2.0
+
+
+class Life:
+    """Owns the body, its lock and the two threads; `link` hears of everything."""
+
+    def __init__(self, body: Body, link: Link, clock: Clock) -> None:
+        self.body = body
+        self.changed = threading.Condition()  # guards the body; notified after each step
+        self.seen: Mapping[str, list[Detection]] = {}
+        self._link, self._clock = link, clock
+        self._start_room = body.room
+        self._camera, self._eyes = Camera(body.room), Eyes()
+        self._ended = threading.Event()
+        self._face: str | None = None
+        self._face_seen_s = 0.0
+        self._threads = [
+            threading.Thread(target=self._move, name=f"{link.name} body", daemon=True),
+            threading.Thread(target=self._look, name=f"{link.name} camera", daemon=True),
+        ]
+
+    def start(self) -> None:
+        """Begin to live."""
+        cv2.setNumThreads(1)  # small pictures: more threads cost more than they bring
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        """End both threads."""
+        self._ended.set()
+        for thread in self._threads:
+            thread.join(_STOP_S)
+
+    def wait_for(self, true: Callable[[], bool], timeout_s: float) -> bool:
+        """Wait, step by step, until something is true of the body; False when it took too long."""
+        with self.changed:
+            return self.changed.wait_for(true, timeout_s)
+
+    # ---- moving -----------------------------------------------------------------------------------
+
+    def _move(self) -> None:
+        last = self._clock.now()
+        for step, now in enumerate(self._beat(BODY_HZ)):
+            seconds, last = min(now - last, _LONGEST_STEP_S), now
+            with self.changed:
+                self.body.step(seconds)
+                happenings = list(self.body.happenings)
+                self.body.happenings.clear()
+                self.changed.notify_all()
+            self.tell(happenings, step)
+
+    def tell(self, happenings: list[Happening], step: int) -> None:
+        """Publish what happened, the drawing, and the sensors whose turn it is."""
+        for happening in happenings:
+            self._link.happen(happening.event, **happening.data)
+            if happening.event in {"touched", "released"}:
+                self._link.sense("head_touched", "head" in self.body.touched)
+            elif happening.event == "heard":
+                self._link.sense("heard_word", self.body.heard)
+        with self.changed:
+            state, distance = drawable(self.body), self.body.distance
+            pose = {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]}
+        self._link.tell("state", state)
+        if step % _SLOW_EVERY == 0:
+            self._link.sense("pose", pose)
+            self._link.sense("distance", round(distance, 2))
+        if step % _CALM_EVERY == 0:
+            self._link.sense("battery", int(self.body.battery))
+            self._link.sense("head_touched", "head" in self.body.touched)
+            self._link.sense("heard_word", self.body.heard)
+
+    # ---- looking ----------------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        for count, _ in enumerate(self._beat(CAMERA_HZ)):
+            is_watched = self._link.watchers("camera") > 0
+            is_turn = count % _LOOK_EVERY == 0
+            if is_watched or is_turn:
+                self.look(publish=is_watched, recognise=is_turn)
+
+    def look(self, *, publish: bool, recognise: bool) -> None:
+        """Take one picture; publish it, and what is recognised in it."""
+        with self.changed:
+            room, lens = self.body.room, lens_of(self.body)
+        picture = self._camera.picture(room, lens)
+        if publish:
+            self._link.sense("camera", picture)
+        if not recognise:
+            return
+        seen = {
+            "faces": self._eyes.faces(room, lens),
+            "balls": self._eyes.balls(picture),
+            "markers": self._eyes.markers(picture),
+        }
+        with self.changed:
+            self.seen = seen
+        for sensor, found in seen.items():
+            self._link.sense(sensor, message(found, lens))
+        self._link.sense("sees_face", bool(seen["faces"]))
+        self._link.sense("sees_ball", bool(seen["balls"]))
+        self._notice_face(seen["faces"])
+
+    def _notice_face(self, faces: list[Detection]) -> None:
+        now = self._clock.now()
+        name = faces[0].name if faces else None
+        if name is not None:
+            self._face_seen_s = now
+            if self._face != name:
+                self._face = name
+                self._link.happen("face_seen", name=name)
+        elif self._face is not None and now - self._face_seen_s >= _LOST_AFTER_S:
+            gone, self._face = self._face, None
+            self._link.happen("face_lost", name=gone)
+
+    # ---- time and people --------------------------------------------------------------------------
+
+    def _beat(self, rate_hz: float) -> _Beat:
+        return _Beat(self._clock, self._ended, 1 / rate_hz)
+
+    def act(self, change: Mapping[str, object]) -> None:
+        """A person does something to the world: touch, move, say, reset."""
+        place, moved, word = change.get("touch"), change.get("move"), change.get("say")
+        x, y = change.get("x"), change.get("y")
+        with self.changed:
+            if place in {"head", "left_hand", "right_hand"}:
+                self.body.touch(str(place), down=change.get("down") is not False)
+            if isinstance(moved, str) and isinstance(x, (int, float)) and isinstance(y, (int, float)):
+                self.body.room = self.body.room.moved(moved, float(x), float(y))
+            if isinstance(word, str) and word.strip():
+                self.body.hear(word.strip())
+            if change.get("reset") is True:
+                self.body.reset(self._start_room)
+
+
+class _Beat:
+    """Times of a steady beat, until an event is set; beats that are late are left out, not made up for."""
+
+    def __init__(self, clock: Clock, ended: threading.Event, period_s: float) -> None:
+        self._clock, self._ended, self._period_s = clock, ended, period_s
+        self._next = clock.now()
+
+    def __iter__(self) -> _Beat:
+        return self
+
+    def __next__(self) -> float:
+        if self._clock.wait(self._ended, max(0.0, self._next - self._clock.now())):
+            raise StopIteration
+        now = self._clock.now()
+        self._next = max(self._next + self._period_s, now)
+        return now
