@@ -1,59 +1,17 @@
-"""The bar at the top of every layout: logo, menus, layout switch, the robots' chip, and on the start page Stop."""
+"""The bar above every layout: logo, menus, layout switch, the robots' chip, on the start page Stop."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
 from app.ui.layouts import Layout
+from app.ui.logo import Logo
 from app.ui.theme import Theme
-from app.ui.widgets import Chip, Segments, StopButton, paint
-
-LOGO = 22
-AMBER_ENDS = 0.12
-
-
-class Logo(QWidget):
-    """An N between two amber joints, on the accent."""
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self.setFixedSize(LOGO, LOGO)
-        self.setAccessibleName("NEP Studio")
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        paint_logo(painter, QRectF(self.rect()), self._theme)
-        painter.end()
-
-
-def paint_logo(painter: QPainter, rect: QRectF, theme: Theme) -> None:
-    """The logo in a square."""
-    side = rect.width()
-
-    def at(x: float, y: float) -> QPointF:
-        return QPointF(rect.left() + x * side, rect.top() + y * side)
-
-    paint.box(painter, rect, side * 0.27, theme.colour("accent"))
-    painter.setPen(
-        QPen(
-            theme.colour("onAccent"),
-            side * 0.11,
-            Qt.PenStyle.SolidLine,
-            Qt.PenCapStyle.RoundCap,
-            Qt.PenJoinStyle.RoundJoin,
-        )
-    )
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.drawPolyline(QPolygonF([at(0.3, 0.71), at(0.3, 0.29), at(0.7, 0.71), at(0.7, 0.29)]))
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(theme.colour("running"))
-    for joint in (at(0.3, 0.71), at(0.7, 0.29)):
-        painter.drawEllipse(joint, side * AMBER_ENDS, side * AMBER_ENDS)
+from app.ui.widgets import Chip, Segments, StopButton
 
 
 class AppBar(QWidget):
@@ -88,7 +46,7 @@ class AppBar(QWidget):
         menus.setContentsMargins(0, 0, 0, 0)
         menus.setSpacing(10)
         menus.addWidget(Logo(self._theme))
-        menus.addWidget(self.menus)
+        menus.addWidget(self.menus, 0, Qt.AlignmentFlag.AlignVCenter)
         menus.addStretch(1)
         robots = QHBoxLayout(right)
         robots.setContentsMargins(0, 0, 0, 0)

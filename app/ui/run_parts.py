@@ -1,4 +1,4 @@
-"""Parts of the run bar and the tool bar: the mark of the state, its sentence, and the result of the last stop."""
+"""Parts of the run bar and the tool bar: the state's mark, its sentence, and the last stop's result."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Sentence(QWidget):
 
 
 class Result(QWidget):
-    """The result of a stop beside the button: proven, counted, or not answered; a small reminder while running."""
+    """What a stop brought, beside the button: proven, counted, not answered; while running a reminder."""
 
     def __init__(self, theme: Theme, *, compact: bool = False) -> None:
         super().__init__()
@@ -158,10 +158,10 @@ class Result(QWidget):
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self._text)
         if self._look == "counting":
-            return QSize(round(width) + 2, 44 if not self._compact else 28)
-        width += self._icon() + 8
+            return QSize(round(width) + 10, 44 if not self._compact else 28)
+        width += self._icon() + (6 if self._compact or self._look == "reminder" else 10)
         if self._look != "reminder":
-            width += 20 if self._compact else 30
+            width += 17 if self._compact else 28
         least = 28 if self._compact else 44
         return QSize(round(width) + 2, max(least, round(paint.height_of(self._font())) + 10))
 
@@ -173,7 +173,8 @@ class Result(QWidget):
         painter = QPainter(self)
         rect = QRectF(self.rect())
         if self._look == "counting":
-            paint.words(painter, rect, self._text, self._font(), theme.colour("textSecondary"), paint.RIGHT)
+            area, ink = rect.adjusted(0, 0, -8, 0), theme.colour("textSecondary")
+            paint.words(painter, area, self._text, self._font(), ink, paint.RIGHT)
         elif self._look == "reminder":
             self._paint_reminder(painter, rect)
         else:

@@ -63,22 +63,27 @@ class Workbench(QMainWindow):
         for old in list(self.docks.values()):
             old.setFloating(False)
             self.removeDockWidget(old)
-        heads: list[Dock] = []
+        # All columns first, then what is below in each: the other way round the rows would cross the columns.
+        waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
+        last: Dock | None = None
         for column in self._layout.columns:
-            before: Dock | None = None
-            for names, _height in column.rows:
-                placed = self._put(names, before, heads)
-                if placed is not None and before is None:
-                    heads.append(placed)
-                before = placed or before
+            rows = [names for names, _height in column.rows if any(name in self._panels for name in names)]
+            head = self._put(rows[0], None, last) if rows else None
+            if head is not None:
+                waiting.append((head, rows[1:]))
+                last = head
+        for head, rows in waiting:
+            above = head
+            for names in rows:
+                above = self._put(names, above, None) or above
         self._arranged = True
         self._narrow = False
         self._size()
         QTimer.singleShot(0, self, self._size)
         self._adapt()
 
-    def _put(self, names: Sequence[str], above: Dock | None, heads: Sequence[Dock]) -> Dock | None:
-        """One place of a column: below ``above``, or right of the column before."""
+    def _put(self, names: Sequence[str], above: Dock | None, left: Dock | None) -> Dock | None:
+        """Put panels that share a place below ``above``, or right of ``left``."""
         first: Dock | None = None
         for name in names:
             dock = self._dock(name)
@@ -88,8 +93,8 @@ class Workbench(QMainWindow):
                 self.tabifyDockWidget(first, dock)
             elif above is not None:
                 self.splitDockWidget(above, dock, DOWN)
-            elif heads:
-                self.splitDockWidget(heads[-1], dock, ACROSS)
+            elif left is not None:
+                self.splitDockWidget(left, dock, ACROSS)
             else:
                 self.addDockWidget(AREA, dock)
             dock.show()

@@ -1,0 +1,97 @@
+"""Brings the window up: scheme, fonts, theme, session, panels, commands; and takes it down in order."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QCoreApplication, Qt, QTimer
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import QApplication
+
+from app import resources
+from app.core.journal import left_behind
+from app.core.session import Session
+from app.ui import fonts
+from app.ui.blockly_scheme import register_scheme
+from app.ui.commands import Commands
+from app.ui.logo import LogoEngine
+from app.ui.main_window import MainWindow
+from app.ui.panels.base import Panel
+from app.ui.self_drive import SelfDrive
+from app.ui.start_page import read_examples
+from app.ui.theme import MODES, Theme
+from nep.plugins import discover
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line asks of the window."""
+
+    file: Path | None = None
+    demo: bool = False
+    theme: str | None = None
+    self_drive: Path | None = None
+
+
+def make_application() -> QApplication:
+    """The one QApplication, with the editor's scheme, our name and our fonts."""
+    existing = QApplication.instance()
+    if isinstance(existing, QApplication):
+        return existing
+    QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+    register_scheme()
+    application = QApplication(sys.argv[:1])
+    application.setApplicationName("nep-studio")
+    application.setApplicationDisplayName("NEP Studio")
+    application.setDesktopFileName("nep-studio")
+    refused = fonts.load()
+    if refused:
+        sys.stderr.write(f"Qt can't use the fonts {', '.join(refused)}; others stand in\n")
+    return application
+
+
+def find_panels() -> Mapping[str, Panel]:
+    """Every panel of Studio and of installed plug-ins, by name."""
+    return discover("app.ui.panels", "PANEL", Panel)
+
+
+def make_window(session: Session, options: Options) -> tuple[MainWindow, Commands]:
+    """The window with its commands, as it was left; nothing runs yet."""
+    theme = Theme("light")
+    window = MainWindow(session, theme, find_panels(), read_examples(resources.folder() / "examples"))
+    window.state.apply_theme(theme)
+    chosen = next((mode for mode in MODES if mode == options.theme), None)
+    if chosen is not None:
+        theme.set_mode(chosen)
+    window.setWindowIcon(QIcon(LogoEngine(theme)))
+    commands = Commands(window)
+    window.state.place(window)
+    if options.self_drive is None:
+        commands.offer_unsaved(left_behind())
+    return window, commands
+
+
+def run(options: Options) -> int:
+    """Show the window until it is closed; the exit code is 0 when that was in order."""
+    application = make_application()
+    session = Session()
+    window, commands = make_window(session, options)
+    application.setQuitOnLastWindowClosed(False)
+    window.on_shut = lambda: QTimer.singleShot(0, application.quit)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: QTimer.singleShot(0, window.close))
+    window.show()
+    window.begin()
+    if options.file is not None:
+        commands.open_at_start(options.file)
+    elif options.demo:
+        commands.demo()
+    driver = SelfDrive(window, commands, options.self_drive) if options.self_drive is not None else None
+    code = application.exec()
+    if driver is not None and not driver.well:
+        return 1
+    return code

@@ -1,0 +1,269 @@
+"""The window: bars, banner, the start page and one workbench for each layout, refreshed 30 times a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtWidgets import QApplication, QLineEdit, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.session import Session
+from app.ui.app_bar import AppBar
+from app.ui.banner import BannerPlace
+from app.ui.docks import Dock
+from app.ui.focus_ring import FocusRing
+from app.ui.layouts import LAYOUTS, layout_named
+from app.ui.panels.base import ANY_TYPE, Panel, PanelContext
+from app.ui.robots_chip import robots_chip
+from app.ui.run_bar import RunBar, ToolBar
+from app.ui.start_page import Example, StartPage
+from app.ui.status_bar import Facts, StatusBar
+from app.ui.theme import Theme
+from app.ui.toast import Toast
+from app.ui.widgets import Button
+from app.ui.window_state import WindowState
+from app.ui.workbench import Workbench
+
+TICK_MS = 33
+SMALLEST = QSize(1100, 700)
+FIRST_SIZE = QSize(1440, 900)
+START = "start"
+
+
+class MainWindow(QMainWindow):
+    """One session in one window. `run` is set by the commands (`app.ui.commands`)."""
+
+    def __init__(
+        self, session: Session, theme: Theme, panels: Mapping[str, Panel], examples: Sequence[Example] = ()
+    ) -> None:
+        super().__init__()
+        self.session, self.theme, self.panels = session, theme, panels
+        self.state = WindowState(session.settings)
+        self.run: Callable[[str], object] = lambda _name: None
+        self.on_shut: Callable[[], object] = lambda: None
+        self.showing = ""
+        self.benches: dict[str, Workbench] = {}
+        self._facts = Facts(session)
+        self._alerts_seen = -1
+        self._shut = False
+        self._build(examples)
+        self.context = PanelContext(session, theme, self.open_topic, self.toast.say, self._run)
+        self.ring = FocusRing(theme, self)
+        self.timer = QTimer(self)
+        self.timer.setInterval(TICK_MS)
+        self.timer.timeout.connect(self.tick)
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._focus_changed)
+        self.show_start()
+
+    def _build(self, examples: Sequence[Example]) -> None:
+        theme = self.theme
+        self.setWindowTitle("NEP Studio")
+        self.setMinimumSize(SMALLEST)
+        self.resize(FIRST_SIZE)
+        self.bar = AppBar(theme, LAYOUTS)
+        self.setMenuWidget(self.bar)
+        self.run_bar, self.tool_bar = RunBar(theme), ToolBar(theme)
+        self.use_robot = Button(theme, "Use the virtual robot", "bot", size="small")
+        self.tool_bar.add_tool(self.use_robot)
+        self.banner = BannerPlace(theme)
+        self.start = StartPage(theme, examples)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.start)
+        self.status = StatusBar(theme)
+        middle = QWidget()
+        column = QVBoxLayout(middle)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget in (self.run_bar, self.tool_bar, self.banner):
+            column.addWidget(widget)
+        column.addWidget(self.pages, 1)
+        column.addWidget(self.status)
+        self.setCentralWidget(middle)
+        self.toast = Toast(theme, self)
+
+    # -- what shows -------------------------------------------------------------------------------
+
+    def show_start(self) -> None:
+        """Show the start page."""
+        self.showing = START
+        self.pages.setCurrentWidget(self.start)
+        self.start.show_recent(self.session.settings.recent)
+        self._show_bars(None)
+        self.start.focus_first()
+
+    def show_layout(self, name: str) -> Workbench:
+        """Show a layout; it is made, as it was left, when it is the first time."""
+        layout = layout_named(name)
+        if layout.name not in self.benches:
+            bench = Workbench(self.theme, layout, self.panels, self.context)
+            bench.panel_failed.connect(self._panel_failed)
+            self.benches[layout.name] = bench
+            self.pages.addWidget(bench)
+            bench.resize(self.pages.size())
+            saved = self.state.of_layout(layout.name)
+            if not saved or not bench.restore(saved):
+                bench.arrange()
+        bench = self.benches[layout.name]
+        self.showing = layout.name
+        self.pages.setCurrentWidget(bench)
+        self._show_bars(layout.name)
+        self.state.keep_layout(layout.name)
+        return bench
+
+    def _show_bars(self, layout: str | None) -> None:
+        self.bar.show_layout(layout)
+        self.run_bar.setVisible(layout == "behaviour")
+        self.tool_bar.setVisible(layout == "developer")
+        self.status.setVisible(layout is not None)
+        self._show_session()
+
+    @property
+    def bench(self) -> Workbench | None:
+        """The workbench that shows; None on the start page."""
+        return self.benches.get(self.showing)
+
+    def open_panel(self, name: str) -> Dock | None:
+        """Show a panel in this layout; "behaviour" in its own layout only."""
+        wanted = "behaviour" if name == "behaviour" or self.bench is None else self.showing
+        return self.show_layout(wanted).open(name)
+
+    def open_topic(self, topic: str) -> None:
+        """Show a topic in the open panel that fits it best, else in the inspector."""
+        known = self.session.topics.get(topic)
+        kinds = {known.codec, known.msg_type} if known is not None else set()
+        bench = self.bench if self.bench is not None else self.show_layout("developer")
+        dock = _fitting(bench, kinds)
+        if dock is None:
+            bench = self.show_layout("developer")
+            dock = _fitting(bench, kinds) or bench.open("inspector")
+        if dock is not None:
+            dock.show()
+            dock.raise_()
+            dock.panel.show_topic(topic)
+
+    def _run(self, name: str) -> None:
+        self.run(name)
+
+    # -- the tick ---------------------------------------------------------------------------------
+
+    def tick(self) -> None:
+        """Take what is new, and let everything that can be seen show it."""
+        began = time.perf_counter()
+        self.session.tick()
+        self._show_session()
+        if self.bench is not None:
+            self.bench.refresh()
+        spent = (time.perf_counter() - began) * 1000
+        self._facts.window_ms += 0.1 * (spent - self._facts.window_ms)
+
+    def _show_session(self) -> None:
+        view = self.session.runs.view()
+        words, status = robots_chip(self.session)
+        self.bar.show_robots(words, status)
+        facts = self._facts
+        if self.showing == START:
+            self.bar.stop.show_state(view.stop_word, ring=view.state == "stopping", filled=self._moves())
+            there = any(link.state in {"ready", "busy"} for link in self.session.fleet.links)
+            self.start.show_robot(words if there else "", status)
+        elif self.showing == "behaviour":
+            self.run_bar.show_view(view)
+            self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach()))
+        else:
+            self.tool_bar.show_view(view)
+            self.use_robot.setVisible(not self.session.fleet.links)
+            reach = ("lock", facts.reach()[1], None)
+            self.status.show_facts((facts.master(), reach, facts.traffic(), facts.lost()), (facts.window(),))
+        self._show_alerts()
+
+    def _moves(self) -> bool:
+        return self.session.runs.active or any(link.state == "busy" for link in self.session.fleet.links)
+
+    def _show_alerts(self) -> None:
+        alerts = self.session.alerts
+        if alerts.revision == self._alerts_seen:
+            return
+        self._alerts_seen = alerts.revision
+        shown = [a for a in alerts.active if a.severity != "info" and not alerts.dismissed(a.id)]
+        self.banner.show_alerts(shown)
+
+    def _panel_failed(self, name: str, sentence: str) -> None:
+        self.session.console.add("error", f"panel {name}", sentence)
+
+    # -- the keyboard -----------------------------------------------------------------------------
+
+    def next_panel(self, step: int) -> None:
+        """Give the keyboard to the next panel that can be seen, or the one before."""
+        if self.bench is None:
+            return
+        docks = [dock for dock in self.bench.docks.values() if dock.shown()]
+        if not docks:
+            return
+        current = self.focused_dock()
+        place = docks.index(current) if current in docks else (-1 if step > 0 else 0)
+        self.bench.focus_panel(docks[(place + step) % len(docks)])
+
+    def panel_number(self, number: int) -> None:
+        """Give the keyboard to the n-th open panel, from 1."""
+        if self.bench is not None:
+            names = self.bench.open_names()
+            if 0 < number <= len(names):
+                self.bench.focus_panel(self.bench.docks[names[number - 1]])
+
+    def focused_dock(self) -> Dock | None:
+        """The panel that has the keyboard."""
+        focus = QApplication.focusWidget()
+        if self.bench is None or focus is None:
+            return None
+        return next((d for d in self.bench.docks.values() if d is focus or d.isAncestorOf(focus)), None)
+
+    def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
+        if new is None or self._shut or self.bench is None:
+            return
+        for dock in self.bench.docks.values():
+            dock.title.set_active(dock is new or dock.isAncestorOf(new))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        dock = self.focused_dock()
+        if event.text() == "/" and dock is not None and dock.panel.focus_filter():
+            event.accept()
+        elif event.key() == Qt.Key.Key_Escape and dock is not None:
+            if isinstance(QApplication.focusWidget(), QLineEdit):
+                dock.panel.setFocus(Qt.FocusReason.OtherFocusReason)
+            event.accept()
+        else:
+            super().keyPressEvent(event)
+
+    # -- beginning and end ------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Start the session and the tick."""
+        self.session.start()
+        self.timer.start()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        if not self._shut:
+            self._shut = True
+            self.timer.stop()
+            self.state.keep_place(self)
+            self.state.keep_layouts({name: bench.save() for name, bench in self.benches.items()})
+            self.state.keep_theme(self.theme)
+            self.hide()
+            for bench in self.benches.values():
+                bench.shut()
+            self.session.close()
+            self.on_shut()
+        super().closeEvent(event)
+
+
+def _fitting(bench: Workbench, kinds: set[str]) -> Dock | None:
+    """The open panel that shows one of these kinds: one made for it before one that shows anything."""
+    docks = [bench.docks[name] for name in bench.open_names()]
+    for wanted in (kinds, {ANY_TYPE}):
+        for dock in docks:
+            if wanted & set(dock.description.accepts):
+                return dock
+    return None

@@ -1,0 +1,139 @@
+"""Drives the real window through the main job, with nobody there: each step waits for what it must see.
+
+Screenshots of every station go to a folder; a step that sees nothing in time ends it with what was missing.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer
+from PySide6.QtWidgets import QApplication
+
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+
+LOOK_MS = 100
+SETTLE_S = 0.6
+
+
+@dataclass(frozen=True)
+class Step:
+    """What to do, what must be seen afterwards, within which time, and the picture's name ("": none)."""
+
+    what: str
+    do: Callable[[], object]
+    seen: Callable[[], bool]
+    within_s: float = 20.0
+    picture: str = ""
+    settle_s: float = SETTLE_S
+
+
+class SelfDrive(QObject):
+    """Does the steps one after the other, then closes the window; ``well`` tells whether all were seen."""
+
+    def __init__(self, window: MainWindow, commands: Commands, folder: Path) -> None:
+        super().__init__(window)
+        self._window, self._commands, self._folder = window, commands, folder
+        self.well = False
+        self.pictures: list[Path] = []
+        self._steps = iter(self._plan())
+        self._step: Step | None = None
+        self._began = 0.0
+        self._seen_at: float | None = None
+        folder.mkdir(parents=True, exist_ok=True)
+        self._timer = QTimer(self)
+        self._timer.setInterval(LOOK_MS)
+        self._timer.timeout.connect(self._look)
+        self._next()
+        self._timer.start()
+
+    def _plan(self) -> list[Step]:
+        window, session = self._window, self._window.session
+        run = self._commands.run
+
+        def robot_there() -> bool:
+            return any(link.state in {"ready", "busy"} for link in session.fleet.links)
+
+        def state(*names: str) -> Callable[[], bool]:
+            return lambda: session.runs.view().state in names
+
+        def glows() -> bool:
+            return session.runs.view().state == "running" and bool(session.runs.running_blocks)
+
+        def inspected() -> bool:
+            return any(topic.watched and topic.newest is not None for topic in session.topics)
+
+        return [
+            Step("the start page", window.show_start, window.isVisible, picture="start-light"),
+            Step("its dark colours", lambda: run("theme.dark"), window.isVisible, picture="start-dark"),
+            Step("the virtual robot", self._begin, robot_there, 40, settle_s=2.5),
+            Step("the program runs", lambda: run("run.run"), glows, 30, "behaviour-light", 1.5),
+            Step("dark while it runs", lambda: run("theme.dark"), lambda: True, 5, "behaviour-dark"),
+            Step("every robot stopped", lambda: run("run.stop"), state("proven"), 5, "stopped-dark"),
+            Step("the topics", lambda: run("layout.developer"), self._has_topics, 20),
+            Step("a message", self._inspect, inspected, 20, "developer-dark", 2.5),
+            Step("light again", lambda: run("theme.light"), lambda: True, 5, "developer-light"),
+            Step("the stopped program", lambda: run("layout.behaviour"), lambda: True, 5, "stopped-light"),
+        ]
+
+    def _begin(self) -> None:
+        self._commands.run("theme.light")
+        self._commands.demo()
+
+    def _has_topics(self) -> bool:
+        return len(self._window.session.topics) > 3
+
+    def _inspect(self) -> None:
+        topics = self._window.session.topics
+        poses = [topic.name for topic in topics if topic.name.endswith(("/pose", "/state"))]
+        cameras = [topic.name for topic in topics if topic.codec == "image"]
+        if cameras:
+            self._window.open_topic(cameras[0])
+        if poses:
+            self._commands.run(f"inspect:{poses[0]}")
+
+    def _next(self) -> None:
+        self._step = next(self._steps, None)
+        self._seen_at = None
+        self._began = time.monotonic()
+        if self._step is None:
+            self._end(True, f"the main job was done; {len(self.pictures)} pictures are in {self._folder}")
+            return
+        self._step.do()
+
+    def _look(self) -> None:
+        step, now = self._step, time.monotonic()
+        if step is None:
+            return
+        if self._seen_at is None and step.seen():
+            self._seen_at = now
+        if self._seen_at is not None:
+            if now - self._seen_at >= step.settle_s:
+                self._grab(step.picture)
+                self._next()
+        elif now - self._began > step.within_s:
+            self._grab("failed")
+            self._end(False, f"not seen within {step.within_s:g} s: {step.what}")
+
+    def _grab(self, name: str) -> None:
+        if not name:
+            return
+        path = self._folder / f"{name}.png"
+        if self._window.grab().save(str(path)):
+            self.pictures.append(path)
+        else:
+            sys.stderr.write(f"the picture {path} can't be written\n")
+
+    def _end(self, well: bool, words: str) -> None:
+        self.well = well
+        self._timer.stop()
+        self._step = None
+        (sys.stdout if well else sys.stderr).write(words + "\n")
+        for widget in QApplication.topLevelWidgets():
+            if widget is self._window:
+                widget.close()

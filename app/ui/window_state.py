@@ -1,0 +1,76 @@
+"""What of the window comes back at the next start: its place, its layouts, theme and size of text."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Mapping
+
+from PySide6.QtCore import QByteArray
+from PySide6.QtWidgets import QMainWindow
+
+from app.core.settings import Settings
+from app.errors import SettingsError
+from app.ui.theme import MODES, Mode, Theme
+
+Saved = dict[str, object]
+
+
+class WindowState:
+    """Reads and writes the keys "window", "layout", "layouts", "theme" and "text_percent"."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self.problem: str | None = None
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Give the theme what was chosen before; it is applied once."""
+        chosen = self._settings.get("theme", "system")
+        mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
+        theme.set_text_percent(self._settings.get("text_percent", 100))
+        theme.set_mode(mode)
+
+    def keep_theme(self, theme: Theme) -> None:
+        """Keep what is chosen now."""
+        self._set("theme", theme.mode)
+        self._set("text_percent", theme.text_percent)
+
+    def place(self, window: QMainWindow) -> bool:
+        """Put the window where it was; False when it was nowhere yet."""
+        text = self._settings.get("window", "")
+        try:
+            data = base64.b64decode(text, validate=True)
+        except (binascii.Error, ValueError):
+            return False
+        return bool(data) and window.restoreGeometry(QByteArray(data))
+
+    def keep_place(self, window: QMainWindow) -> None:
+        """Keep where the window is."""
+        self._set("window", base64.b64encode(window.saveGeometry().data()).decode("ascii"))
+
+    @property
+    def layout(self) -> str:
+        """The layout that showed last."""
+        return self._settings.get("layout", "behaviour")
+
+    def keep_layout(self, name: str) -> None:
+        """Keep which layout shows."""
+        self._set("layout", name)
+
+    def of_layout(self, name: str) -> Mapping[str, object]:
+        """What a layout looked like; empty when it never showed."""
+        layouts: Saved = self._settings.get("layouts", {})
+        found = layouts.get(name)
+        return found if isinstance(found, Mapping) else {}
+
+    def keep_layouts(self, found: Mapping[str, Mapping[str, object]]) -> None:
+        """Keep what these layouts look like now."""
+        layouts: Saved = dict(self._settings.get("layouts", {}))
+        layouts.update(found)
+        self._set("layouts", layouts)
+
+    def _set(self, key: str, value: object) -> None:
+        try:
+            self._settings.set(key, value)
+        except SettingsError as error:
+            self.problem = str(error)
