@@ -82,10 +82,17 @@ class Call:
         if self.clock.wait(self._ended, seconds):
             raise Canceled
 
-    def until(self, done: Callable[[], bool], *, every_s: float = 1 / 30) -> None:
-        """Wait until `done` is true, looking every so often; raises Canceled."""
+    def until(self, done: Callable[[], bool], *, for_s: float | None = None, every_s: float = 1 / 30) -> bool:
+        """Wait until `done` is true (True) or the time is over (False), looking every so often.
+
+        Raises Canceled.
+        """
+        limit = None if for_s is None else self.clock.now() + for_s
         while not done():
+            if limit is not None and self.clock.now() >= limit:
+                return False
             self.wait(every_s)
+        return True
 
     def feedback(self, **values: object) -> None:
         """Tell how far it is; also a good place to notice a cancel."""

@@ -1,6 +1,6 @@
 """The virtual robot: ``python -m app.robots.simulated --name Pepper`` drives it in a process of its own.
 
-It lives in a small room (:mod:`app.robots.virtual`); Studio draws it from ``/<name>/state``, and people act on
+It lives in a small room (:mod:`app.robots.virtual`). Studio draws it from ``/<name>/state``; people act on
 its world through ``/<name>/world``.
 """
 
@@ -9,22 +9,18 @@ from __future__ import annotations
 import argparse
 import random
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from app.robots.calls import Call, Canceled, Failed, Link, MonotonicClock
+from app.robots.calls import Call, Canceled, Failed
 from app.robots.declare import Kind, action, safe_stop
 from app.robots.process import main as drive
 from app.robots.typed import Colour, Range, Suggested, Text, Title, Words
 from app.robots.virtual import from_rize
-from app.robots.virtual.body import START_PITCH, Body
-from app.robots.virtual.camera import lens_of
-from app.robots.virtual.life import Life
-from app.robots.virtual.motion import Motion
+from app.robots.virtual.acting import FEEDBACK_S, Acting
+from app.robots.virtual.body import START_PITCH
 from app.robots.virtual.room import Room
-from app.robots.virtual.senses import Senses
-from app.robots.virtual.vision import angles_to
 
 SPEECH, MOVEMENT, FACE = "Speech", "Movement", "Face and lights"
 Emotion: TypeAlias = Literal["happy", "surprised", "sad", "angry", "neutral"]
@@ -36,25 +32,10 @@ Target: TypeAlias = Annotated[
     Literal["ahead", "left", "right", "up", "down", "face", "ball"],
     Words({"face": "the face", "ball": "the ball", "left": "the left", "right": "the right"}),
 ]
-_HEAD = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
-_HEAD |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
-_FEEDBACK_S = 0.2
 
 
-class VirtualPepper(Senses):
+class VirtualPepper(Acting):
     """A friendly robot on wheels with a head, two arms, a voice and lights."""
-
-    start_room: ClassVar[Room] = Room()
-
-    def __init__(self, link: Link) -> None:
-        self._life = Life(Body(room=self.start_room), link, MonotonicClock())
-        self._volume, self._language = 60, "en"
-        link.on_world(self._life.act)
-        self._life.start()
-
-    def close(self) -> None:
-        """End its threads."""
-        self._life.close()
 
     # ---- speech -----------------------------------------------------------------------------------
 
@@ -78,12 +59,12 @@ class VirtualPepper(Senses):
     ) -> Mapping[str, object]:
         """Say a text; the words stand in a bubble for as long as they take."""
         with self._life.changed:
-            self._volume, self._language = volume, language
+            self.voice = (volume, language)
             speech = self._life.body.say(text)
         try:
-            while not speech.done:
+            call.feedback(word=speech.word)
+            while not call.until(lambda: speech.done, for_s=FEEDBACK_S):
                 call.feedback(word=speech.word)
-                call.until(lambda: speech.done, every_s=_FEEDBACK_S)
         except Canceled:
             with self._life.changed:
                 if not speech.done:
@@ -271,49 +252,6 @@ class VirtualPepper(Senses):
             self._life.body.halt()
         if not self._life.wait_for(lambda: self._life.body.still, timeout_s=2.0):
             raise Failed("the virtual robot goes on moving")
-
-    # ---- how it is done ---------------------------------------------------------------------------
-
-    def _roll(self, call: Call, start: Callable[[Body], Motion]) -> Motion:
-        with self._life.changed:
-            motion = start(self._life.body)
-        try:
-            while not motion.done:
-                call.feedback(to_go=round(abs(motion.remaining), 2))
-                call.wait(_FEEDBACK_S / 4)
-        except Canceled:
-            self._brake(motion)
-            raise
-        return motion
-
-    def _brake(self, motion: Motion) -> None:
-        with self._life.changed:
-            motion.halt()
-        self._life.wait_for(lambda: motion.done, timeout_s=1.0)
-
-    def _turn_head(self, call: Call, yaw: float, pitch: float) -> None:
-        with self._life.changed:
-            self._life.body.head_yaw.aim(yaw)
-            self._life.body.head_pitch.aim(pitch)
-        self._until(call, lambda: self._life.body.joints_still, self._life.body.hold_joints)
-
-    def _direction_of(self, target: str) -> tuple[float, float]:
-        if target in _HEAD:
-            return _HEAD[target]
-        found = self._life.seen.get("faces" if target == "face" else "balls", [])
-        if not found:
-            raise Failed(f"look at: there is no {target} in the picture")
-        left, down = angles_to(lens_of(self._life.body), found[0].middle)
-        body = self._life.body
-        return body.head_yaw.angle + left, body.head_pitch.angle + down
-
-    def _until(self, call: Call, done: Callable[[], bool], halt: Callable[[], None]) -> None:
-        try:
-            call.until(done)
-        except Canceled:
-            with self._life.changed:
-                halt()
-            raise
 
 
 ROBOT = Kind(

@@ -1,0 +1,103 @@
+"""Robots of RIZE: what a driver that speaks only ``robot_action`` can do, and its messages, both ways.
+
+Such a robot tells nothing about itself, so everybody gets the primitives that RIZE's drivers have. It has no
+stop and never answers one: ``safe_stop.confirmed`` is False, and people read "stop sent; this robot cannot
+confirm".
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+
+from app import resources
+from app.errors import RobotInputError
+from app.robots.description import parse
+from app.robots.inputs import pretty_number
+from app.robots.members import as_part, names, part, text
+from app.robots.parts import Robot
+
+COMMANDS, ANSWERS, EVENTS = "robot_action", "action_state", "rize_event"
+_STATES = {"success": "succeeded", "failure": "failed"}
+_FAILED = "{robot} could not {action}"
+
+
+@lru_cache(maxsize=1)
+def thing_model() -> Mapping[str, object]:
+    """The Thing Model of every robot of RIZE."""
+    found = json.loads(resources.path("robots", "rize.tm.jsonld").read_text(encoding="utf-8"))
+    return as_part(found)
+
+
+def robot(name: str) -> Robot:
+    """A robot of RIZE under the name that its driver was given; commands go to ``robot_action``."""
+    return parse({**thing_model(), "title": name})
+
+
+def ready(message: object) -> str | None:
+    """The robot's name when a message of ``rize_event`` says that one is ready, else None."""
+    said = as_part(message)
+    return text(said.get("name")) if said.get("robot") == "ready" else None
+
+
+def to_command(robot: Robot, action: str, given: Mapping[str, object], command_id: str) -> dict[str, object]:
+    """The message for ``robot_action``; RobotInputError when the robot would refuse the input.
+
+    The stop is the cancel that RIZE's older drivers know; newer ones ignore it.
+    """
+    if action == robot.safe_stop.action:
+        return {"node": "cancel", "robots": robot.name, "state": "idle", "times": 0, "id": command_id}
+    known = robot.action(action)
+    if known is None:
+        raise RobotInputError((f"{robot.name} can't “{action}”",))
+    sentences = known.check(given)
+    if sentences:
+        raise RobotInputError(sentences)
+    return {
+        "node": "action",
+        "primitives": _primitive(robot, action, known.complete(given)),
+        "robots": robot.name,
+        "state": "idle",
+        "times": 0,
+        "id": command_id,
+    }
+
+
+def _primitive(robot: Robot, action: str, given: Mapping[str, object]) -> dict[str, object]:
+    hint = part(part(part(robot.source, "actions"), action), "rb:rize")
+    options = {name: given[name] for name in names(hint.get("options")) if name in given}
+    return {
+        "primitive": text(hint.get("primitive")) or action,
+        "input": _as_text(given.get(text(hint.get("input")) or "", "")),
+        "options": options or "none",
+    }
+
+
+def _as_text(value: object) -> str:
+    """RIZE's input is always text, numbers too."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return pretty_number(value)
+    return str(value)
+
+
+def from_answer(message: object) -> dict[str, object] | None:
+    """A message of ``action_state`` in the shape of ``robot/answer``; None while it tells no end."""
+    said = as_part(message)
+    state = _STATES.get(str(said.get("state")))
+    wanted = text(said.get("id"))
+    if state is None or wanted is None:
+        return None
+    primitives = said.get("primitives")
+    first = as_part(primitives[0] if isinstance(primitives, list) and primitives else primitives)
+    action = str(first.get("primitive") or "")
+    error = _FAILED.format(robot=said.get("robots") or "the robot", action=action or "do it")
+    return {
+        "id": wanted,
+        "op": "invoke",
+        "action": action,
+        "state": state,
+        "output": {},
+        "feedback": {},
+        "error": error if state == "failed" else None,
+    }

@@ -1,0 +1,76 @@
+"""How the virtual robot does things: start a movement, wait for its end, brake when it is canceled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from app.robots.calls import Call, Canceled, Failed, Link, MonotonicClock
+from app.robots.virtual.body import START_PITCH, Body
+from app.robots.virtual.camera import lens_of
+from app.robots.virtual.life import Life
+from app.robots.virtual.motion import Motion
+from app.robots.virtual.room import Room
+from app.robots.virtual.senses import Senses
+from app.robots.virtual.vision import angles_to
+
+_HEAD = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
+_HEAD |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
+FEEDBACK_S = 0.2
+"""Seconds between two messages of feedback."""
+
+
+class Acting(Senses):
+    """The life of the virtual robot and the ways its actions use it."""
+
+    start_room: ClassVar[Room] = Room()
+
+    def __init__(self, link: Link) -> None:
+        self._life = Life(Body(room=self.start_room), link, MonotonicClock())
+        self.voice: tuple[int, str] = (60, "en")
+        link.on_world(self._life.act)
+        self._life.start()
+
+    def close(self) -> None:
+        """End its threads."""
+        self._life.close()
+
+    def _roll(self, call: Call, start: Callable[[Body], Motion]) -> Motion:
+        with self._life.changed:
+            motion = start(self._life.body)
+        try:
+            while not call.until(lambda: motion.done, for_s=FEEDBACK_S):
+                call.feedback(to_go=round(abs(motion.remaining), 2))
+        except Canceled:
+            self._brake(motion)
+            raise
+        return motion
+
+    def _brake(self, motion: Motion) -> None:
+        with self._life.changed:
+            motion.halt()
+        self._life.wait_for(lambda: motion.done, timeout_s=1.0)
+
+    def _turn_head(self, call: Call, yaw: float, pitch: float) -> None:
+        with self._life.changed:
+            self._life.body.head_yaw.aim(yaw)
+            self._life.body.head_pitch.aim(pitch)
+        self._until(call, lambda: self._life.body.joints_still, self._life.body.hold_joints)
+
+    def _direction_of(self, target: str) -> tuple[float, float]:
+        if target in _HEAD:
+            return _HEAD[target]
+        found = self._life.seen.get("faces" if target == "face" else "balls", [])
+        if not found:
+            raise Failed(f"look at: there is no {target} in the picture")
+        left, down = angles_to(lens_of(self._life.body), found[0].middle)
+        body = self._life.body
+        return body.head_yaw.angle + left, body.head_pitch.angle + down
+
+    def _until(self, call: Call, done: Callable[[], bool], halt: Callable[[], None]) -> None:
+        try:
+            call.until(done)
+        except Canceled:
+            with self._life.changed:
+                halt()
+            raise
