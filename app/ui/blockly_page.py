@@ -51,6 +51,7 @@ class BlocklyWeb:
         self.view = QWebEngineView(owner)
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
         profile = QWebEngineProfile(None)
+        self._profile = profile
         self.fence = Fence(profile)
         self._handler = SchemeHandler(profile)
         profile.setUrlRequestInterceptor(self.fence)
@@ -69,6 +70,11 @@ class BlocklyWeb:
     def start(self) -> None:
         """Load the editor, also again after the web process was killed."""
         self.page.load(QUrl(PAGE))
+
+    def close(self) -> None:
+        """Delete the view and its page, then the profile, when control returns to the event loop."""
+        self.view.deleteLater()
+        self._profile.deleteLater()
 
     def keyboard(self) -> QObject | None:
         """The widget that receives the keys while the page has the focus."""

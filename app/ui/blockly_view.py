@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QKeySequence, QShowEvent
 from PySide6.QtWebEngineCore import QWebEnginePage
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -111,7 +111,7 @@ class BlocklyView(QWidget):
         if isinstance(tokens.get("reducedMotion"), bool):
             self.set_reduced_motion(bool(tokens["reducedMotion"]))
         if self._web is not None:
-            self._web.page.setBackgroundColor(self._background())
+            self._dress(self._web)
         self._tell("theme", self._theme)
 
     def set_reduced_motion(self, reduced: bool) -> None:
@@ -190,7 +190,24 @@ class BlocklyView(QWidget):
         self.setFocusProxy(self._web.view)
         self._web.view.installEventFilter(self)
         self._web.page.renderProcessTerminated.connect(self._died)
+        self._dress(self._web)
+        application = QCoreApplication.instance()
+        if application is not None:
+            application.aboutToQuit.connect(self._close_page)
         self._web.start()
+
+    def _close_page(self) -> None:
+        """Let the page go before its profile, whatever order the interpreter ends things in."""
+        web, self._web, self._up = self._web, None, False
+        if web is not None:
+            web.close()
+
+    def _dress(self, web: BlocklyWeb) -> None:
+        """What the theme decides outside the page: the colour before the first picture, the size of text."""
+        web.page.setBackgroundColor(self._background())
+        tokens = cast("Mapping[str, object]", self._theme["tokens"])
+        percent = tokens.get("textPercent")
+        web.view.setZoomFactor(percent / 100 if isinstance(percent, int | float) else 1.0)
 
     def _watch_keys(self) -> None:
         """The widget that gets the keys is made by the web engine, and made again with a new process."""

@@ -76,6 +76,56 @@ def test_typing_in_a_text_changes_the_program(qtbot, view, person):
     qtbot.waitUntil(lambda: typed() == "Hello, you", timeout=WAIT_MS)
 
 
+def test_a_colour_is_chosen_from_the_palette_or_typed(qtbot, view, person):
+    them = person({"type": "robot_pepper_do_light", "id": "light", "x": 28, "y": 28})
+
+    def colour() -> str:
+        return them.tops()[0]["fields"]["COLOUR"]
+
+    assert colour() == "#3db8ff"
+    them.click("[data-id=light] .nepColour", dx=12, dy=9)
+    them.click(".nepPalette [title=red]")
+    qtbot.waitUntil(lambda: colour() == "#ff3b30", timeout=WAIT_MS)
+    them.click("[data-id=light] .nepColour", dx=12, dy=9)
+    them.click(".nepPalette input", dx=60)
+    them.press(Qt.Key_A, Qt.ControlModifier)
+    QTest.keyClicks(them.target, "#01ABef")
+    them.press(Qt.Key_Return)
+    qtbot.waitUntil(lambda: colour() == "#01abef", timeout=WAIT_MS)
+
+
+def test_a_topic_that_is_not_there_yet_can_be_typed(qtbot, view, person):
+    them = person({"type": "events_message", "id": "on", "x": 56, "y": 56})
+    them.click("[data-id=on] .blocklyDropdownField", dx=12, dy=10)
+    topics = "[...document.querySelectorAll('.blocklyMenuItemContent')].map(e => e.textContent)"
+    them.wait_for(topics, ["/blackboard", "/faces", "other topic…"])
+    for key in (Qt.Key_End, Qt.Key_Return):
+        them.press(key)
+    them.wait_for("document.activeElement.className", "blocklyDialogInput")
+    QTest.keyClicks(them.target, "/not/yet")
+    them.press(Qt.Key_Return)
+    qtbot.waitUntil(lambda: them.tops()[0]["fields"] == {"TOPIC": "/not/yet"}, timeout=WAIT_MS)
+
+
+def test_a_program_is_made_with_the_keyboard_alone(qtbot, view, person):
+    them = person(START)
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.press(Qt.Key_T)
+    them.wait_for("document.activeElement.textContent", "Events")
+    them.press(Qt.Key_Down)
+    them.wait_for("document.activeElement.textContent", "Control")
+    them.press(Qt.Key_Right)
+    them.wait_for("!!document.activeElement.closest('.blocklyFlyout .control_wait')")
+    them.press(Qt.Key_Return)
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    them.press(Qt.Key_Return)
+
+    def next_type() -> str | None:
+        return them.tops()[0].get("next", {}).get("block", {}).get("type")
+
+    qtbot.waitUntil(lambda: next_type() == "control_wait", timeout=WAIT_MS)
+
+
 def test_f12_reaches_the_window_while_the_page_has_the_keyboard(qtbot, view, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)

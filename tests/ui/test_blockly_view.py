@@ -5,6 +5,9 @@ from __future__ import annotations
 import copy
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -14,6 +17,8 @@ from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outline
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def with_rover() -> dict:
@@ -121,3 +126,25 @@ def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
     with qtbot.waitSignal(view.key_pressed, timeout=WAIT_MS):
         them.press(Qt.Key_F12)
     assert "ended" in caplog.text
+
+
+ENDING = """
+import sys
+from PySide6.QtWidgets import QApplication
+from app.ui.blockly_view import BlocklyView, register_scheme
+
+register_scheme()
+application = QApplication([])
+view = BlocklyView()
+view.ready.connect(application.quit)
+view.show()
+sys.exit(application.exec())
+"""
+
+
+def test_the_application_ends_in_order():
+    done = subprocess.run(
+        [sys.executable, "-c", ENDING], cwd=ROOT, capture_output=True, text=True, timeout=50, check=False
+    )
+    assert done.returncode == 0
+    assert "Release of profile" not in done.stderr

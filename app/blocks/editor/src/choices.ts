@@ -89,6 +89,7 @@ export class FieldChoice extends Blockly.FieldDropdown {
       const name = words?.trim();
       if (name) this.setValue(name);
     });
+    document.querySelector<HTMLInputElement>('.blocklyDialogInput')?.select();
   }
 
   static override fromJson(config: Blockly.FieldConfig): FieldChoice {

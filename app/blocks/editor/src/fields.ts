@@ -103,6 +103,12 @@ export class FieldColourChip extends Blockly.Field {
     this.chip?.setAttribute('style', `fill:${this.value_ ?? ''}`);
   }
 
+  /** Where the palette points to; without this it would be the whole block. */
+  override getScaledBBox(): Blockly.utils.Rect {
+    const box = (this.chip ?? document.body).getBoundingClientRect();
+    return new Blockly.utils.Rect(box.top, box.bottom, box.left, box.right);
+  }
+
   protected override doClassValidation_(value?: unknown): string | null {
     return typeof value === 'string' && /^#[0-9a-f]{6}$/i.test(value) ? value.toLowerCase() : null;
   }
@@ -112,8 +118,8 @@ export class FieldColourChip extends Blockly.Field {
   }
 
   protected override showEditor_(): void {
-    const content = Blockly.DropDownDiv.getContentDiv();
     Blockly.DropDownDiv.clearContent();
+    const content = Blockly.DropDownDiv.getContentDiv();
     const box = document.createElement('div');
     box.className = 'nepPalette';
     box.setAttribute('role', 'group');
@@ -136,7 +142,7 @@ export class FieldColourChip extends Blockly.Field {
     other.onkeydown = (event) => {
       event.stopPropagation();
       if (event.key === 'Enter' && this.doClassValidation_(other.value) !== null) this.choose(other.value);
-      if (event.key === 'Escape') Blockly.DropDownDiv.hideIfOwner(this);
+      if (event.key === 'Escape') Blockly.DropDownDiv.hideIfOwner(this, true);
     };
     box.append(other);
     content.append(box);
@@ -147,7 +153,7 @@ export class FieldColourChip extends Blockly.Field {
 
   private choose(value: string): void {
     this.setValue(value);
-    Blockly.DropDownDiv.hideIfOwner(this);
+    Blockly.DropDownDiv.hideIfOwner(this, true);
   }
 
   static override fromJson(config: Blockly.FieldConfig): FieldColourChip {

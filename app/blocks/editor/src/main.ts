@@ -113,7 +113,8 @@ class Editor {
 
   private applyWhenIdle(): void {
     const busy = Blockly.Gesture.inProgress() || this.workspace.isDragging() ||
-      Blockly.WidgetDiv.isVisible() || Blockly.DropDownDiv.isVisible();
+      Blockly.WidgetDiv.isVisible() || Blockly.DropDownDiv.isVisible() ||
+      document.querySelector('dialog[open]') !== null;
     if (busy && this.waiting) window.setTimeout(() => this.applyWhenIdle(), BUSY_MS);
     else this.applyWaiting();
   }

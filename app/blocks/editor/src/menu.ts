@@ -11,6 +11,9 @@ const WORDS: Readonly<Record<string, string>> = {
   REMOVE_COMMENT: 'Remove the note',
   DELETE_BLOCK: 'Delete',
   DELETE_X_BLOCKS: 'Delete %1 blocks',
+  DIALOG_OK: 'Use it',
+  DIALOG_CANCEL: 'Not now',
+  NEW_VARIABLE_TITLE: 'Name of the variable',
   UNDO: 'Undo',
   REDO: 'Redo',
 };
