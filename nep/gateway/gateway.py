@@ -139,6 +139,7 @@ class Gateway:
     def _look(self) -> None:
         """Once a second: who has ended, which lines nobody uses, which taken ports are free now."""
         self._look_at = time.monotonic() + _LOOK_S
+        self._relay.look()
         self._census.look()
         if self._census.forget_the_gone():
             for line in [pair.line for pair in self._relay.pairs if not self._census.is_used(pair.line)]:

@@ -11,18 +11,8 @@ from hashlib import blake2b
 from nep.errors import BadTopicError
 from nep.gateway.census import Link, Program
 from nep.gateway.relay import Key
-from nep.requests import (
-    Join,
-    Leave,
-    NodeRecord,
-    PublisherCount,
-    PublisherRecord,
-    Renew,
-    Reply,
-    Request,
-    SubscriberCount,
-    SubscriberRecord,
-)
+from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.requests import Join, Leave, Renew, Reply, Request
 from nep.wire import check_topic
 
 _LANGUAGES = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from nep import images
 from nep.errors import BadTopicError, DecodeError, EncodeError, NepError
@@ -15,6 +16,7 @@ from nep.message import Message
 from nep.nodes import Node
 from nep.pubsub import Publisher, Subscriber
 
+_Made = TypeVar("_Made", Publisher, Subscriber)
 _READABLE = frozenset({"jpeg", "png", None})
 """Encodings of pictures that the originals read; without one, the bytes are a file that says it itself."""
 
@@ -86,7 +88,9 @@ class Native:
         try:
             return images.encode(message.payload).data
         except (DecodeError, EncodeError) as error:
-            self.tell(f"message:{message.topic}", f"Original programs get no pictures of “{message.topic}”: {error}")
+            self.tell(
+                f"message:{message.topic}", f"Original programs get no pictures of “{message.topic}”: {error}"
+            )
             return None
 
     def _arrived(self, messages: Sequence[Message]) -> None:
@@ -95,3 +99,55 @@ class Native:
             for message in messages:
                 if message.publisher not in self._own:
                     self._inbox.post(message)
+
+    def _try(self, topic: str, make: Callable[[Node], _Made]) -> _Made | None:
+        """Something native for a topic of the originals; what cannot be becomes an alert."""
+        id = f"topic:{topic}"
+        try:
+            if self._node is None:
+                self._node = self._make_node()
+            made = make(self._node)
+        except BadTopicError as error:
+            self.tell(
+                id, f"“{topic}” stays among original programs: {error.reason}", "Give the topic another name."
+            )
+            return None
+        except NepError as error:
+            self.tell(id, f"“{topic}” could not be joined to native programs: {error}")
+            return None
+        self.cure(id)
+        return made
+
+    # ---- the graph and the alerts
+
+    def show(self, programs: tuple[Program, ...]) -> None:
+        """See `Outside`."""
+        self._listing.show(programs)
+
+    def look(self) -> None:
+        """See `Outside`."""
+        self._listing.renew()
+        if self._inbox is not None and self._inbox.dropped != self._dropped:
+            lost = self._inbox.dropped - self._dropped
+            self._dropped = self._inbox.dropped
+            self.tell("gateway:full", f"{lost} messages did not reach original programs in the last second")
+        else:
+            self.cure("gateway:full")
+
+    def tell(self, id: str, sentence: str, hint: str = "") -> None:
+        """See `Alerts`."""
+        alert = Alert(id, sentence, hint)
+        if self._alerts.get(id) != alert:
+            self._alerts[id] = alert
+            self._report(tuple(self._alerts.values()))
+
+    def cure(self, id: str) -> None:
+        """See `Alerts`."""
+        if self._alerts.pop(id, None) is not None:
+            self._report(tuple(self._alerts.values()))
+
+    def close(self) -> None:
+        """See `Outside`."""
+        self._listing.close()
+        if self._node is not None:
+            self._node.close()

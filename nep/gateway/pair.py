@@ -90,6 +90,7 @@ class Pair:
         if end.bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
         monitor = opened.get_monitor_socket(_OPENED | _CLOSED)
+        undo.callback(monitor.close, 0)
         undo.callback(opened.disable_monitor)
         self.monitors[end.role] = monitor
         address = f"tcp://{LOOPBACK}:{end.port}"

@@ -76,6 +76,8 @@ class Relay:
         if pair is not None:
             pair.close()
             self.settle((line.topic, line.codec))
+            for role in ("publisher", "subscriber"):
+                self._alerts.cure(f"version:{line.topic}:{role}")
 
     def close(self) -> None:
         """Close everything."""
@@ -107,6 +109,11 @@ class Relay:
         """A native program has published: to every original that wants it, in its own form."""
         for pair in self._of((topic, codec)):
             pair.deliver(data)
+
+    def look(self) -> None:
+        """A second has passed: frames that came after their publisher had left may have left something behind."""
+        for key in {(line.topic, line.codec) for line in self._pairs}:
+            self.settle(key)
 
     def settle(self, key: Key) -> None:
         """Hold native publishers and subscriptions exactly while originals need them."""

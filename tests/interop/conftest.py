@@ -83,6 +83,11 @@ class Program:
                     f"{what} did not happen\nsaid: {self._said[-3:]}\n{''.join(self._printed)[-1500:]}"
                 )
 
+    def hears(self, value: object, timeout_s: float = LONG_S) -> bool:
+        """Whether it received this value, within the time."""
+        with self._news:
+            return self._news.wait_for(lambda: {"got": value} in self._said, timeout_s)
+
     def wait_ready(self) -> Program:
         """Wait until it has its sockets."""
         self.wait(lambda: "ready" in self._said, f"{self.process.args} being ready")
@@ -122,6 +127,8 @@ class Peers:
             script = folder / "peer.js"
             shutil.copyfile(SCRIPTS / "javascript_peer.js", script)
             return self.run(["node", str(script), *arguments])
+        if version == "native":
+            return self.run([sys.executable, str(SCRIPTS / "native_peer.py"), *arguments])
         folder = self._have(version, _install_python)
         return self.run([str(_python_of(folder)), str(SCRIPTS / "python_peer.py"), *arguments])
 
@@ -234,3 +241,30 @@ def peers(fixed_ports: None) -> Iterator[Peers]:
     peers = Peers()
     yield peers
     peers.close()
+
+
+@pytest.fixture
+def nep_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A master's address of its own on this computer, and a place of its own for what it keeps."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    monkeypatch.setenv("NEP_MASTER", address)
+    monkeypatch.setenv("NEP_STATE_DIR", str(tmp_path / "state"))
+    return address
+
+
+@pytest.fixture
+def master(peers: Peers, nep_home: str) -> Program:
+    """`nep master` with its gateway, as a process of its own."""
+    return start_master(peers, nep_home)
+
+
+def start_master(peers: Peers, address: str) -> Program:
+    """Start `nep master` and wait until it answers."""
+    from nep.masters import is_running
+
+    program = peers.run([sys.executable, "-m", "nep", "master"])
+    if not is_running(address, LONG_S):
+        raise AssertionError(f"the master does not answer\n{program.printed}")
+    return program

@@ -1,0 +1,105 @@
+"""`nep master`: the program that knows who publishes and who subscribes."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from nep.addresses import host_of, is_loopback, master_address
+from nep.cli.screen import console, show_alerts
+from nep.errors import AddressInUseError, NepError
+from nep.gateway.attachment import GatewayAttachment
+from nep.graph import Alert, GraphView
+from nep.masters import Attachment, Master, is_running
+
+
+def master(
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="The port; else that of NEP_MASTER, else 7780.", show_default=False
+        ),
+    ] = None,
+    owner_pid: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PID",
+            help="End when this process is gone and no program needs the master.",
+            show_default=False,
+        ),
+    ] = None,
+    gateway: Annotated[
+        bool, typer.Option("--gateway/--no-gateway", help="Join programs of the original NEP.")
+    ] = True,
+) -> None:
+    """Run the master: it knows who publishes and who subscribes. Ctrl+C ends it.
+
+    Messages never pass through it; while it is away, programs that have found each other go on.
+    """
+    address = _address(port)
+    printer = AlertPrinter()
+    attachments: list[Attachment] = [printer]
+    if gateway:
+        attachments.insert(0, GatewayAttachment())
+    try:
+        running = Master(address, attachments=attachments, owner_pid=owner_pid).start()
+    except AddressInUseError as error:
+        if is_running(address):
+            raise NepError(
+                f"a master already runs at '{address}'; use it, or choose another --port"
+            ) from error
+        raise
+    try:
+        _say_running(running.address, joins_originals=gateway)
+        signal.signal(signal.SIGTERM, _end)
+        running.wait()
+    finally:
+        running.close()
+
+
+class AlertPrinter:
+    """Attached to the master: writes each alert when it comes, and when it is cured."""
+
+    def __init__(self) -> None:
+        self._shown: dict[str, Alert] = {}
+
+    def start(self, _master: Master) -> None:
+        """See `Attachment`."""
+
+    def changed(self, view: GraphView) -> None:
+        """See `Attachment`."""
+        now = {alert.id: alert for alert in view.alerts}
+        for id in [known for known in self._shown if known not in now]:
+            console(stderr=True).print(f"cured: {self._shown.pop(id).sentence}", style="green", markup=False)
+        new = [alert for id, alert in now.items() if self._shown.get(id) != alert]
+        self._shown.update({alert.id: alert for alert in new})
+        show_alerts(new)
+
+    def close(self) -> None:
+        """See `Attachment`."""
+
+
+def _address(port: int | None) -> str:
+    address = master_address()
+    if port is not None:
+        address = f"{host_of(address)}:{port}"
+    if not is_loopback(address):
+        raise NepError(f"a master serves this computer only; '{address}' is another, use 127.0.0.1")
+    return address
+
+
+def _say_running(address: str, *, joins_originals: bool) -> None:
+    out = console(stderr=True)
+    out.print(f"[bold green]●[/] master at [bold]{address}[/]")
+    if joins_originals:
+        out.print("  programs of the original NEP join it too", style="dim")
+    out.print("  Ctrl+C ends it", style="dim")
+
+
+def _end(_signal: int, _frame: FrameType | None) -> None:
+    """A polite request to end: leave through the `finally` that closes the master."""
+    sys.exit(0)

@@ -1,0 +1,63 @@
+"""`nep node`: the programs that are there."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+
+import typer
+
+from nep.cli.graphs import look
+from nep.cli.options import JsonOption, MasterOption
+from nep.cli.screen import UNKNOWN, Column, duration, say, show_alerts, show_json, show_table
+from nep.graph import GraphView, NodeInfo
+
+app = typer.Typer(no_args_is_help=True, help="The programs that are there.")
+_COLUMNS = (
+    Column("node", style="bold"),
+    Column("language"),
+    Column("wire"),
+    Column("pid", "right"),
+    Column("since", "right"),
+    Column("publishes", style="green"),
+    Column("subscribes", style="cyan"),
+)
+_WIRES = {"native": "native", "A": "NEP ≤ 0.5.4.5", "B": "NEP 0.5.4.8"}
+
+
+@app.command("list")
+def list_nodes(master: MasterOption = None, as_json: JsonOption = False) -> None:
+    """List all nodes, with what they publish and subscribe."""
+    graph = look(master)
+    nodes = sorted(graph.nodes.values(), key=lambda node: (node.generation != "native", node.name, node.id))
+    if as_json:
+        show_json([{**asdict(node), **_topics_of(graph, node)} for node in nodes])
+        return
+    if nodes:
+        show_table(_COLUMNS, [_row(graph, node) for node in nodes])
+    else:
+        say("no nodes yet; they appear as soon as a program makes one")
+    show_alerts(graph.alerts)
+
+
+def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
+    topics = _topics_of(graph, node)
+    return (
+        node.name,
+        node.language or UNKNOWN,
+        _WIRES.get(node.generation, node.generation),
+        str(node.pid) if node.pid is not None else UNKNOWN,
+        duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
+        "\n".join(topics["publishes"]) or UNKNOWN,
+        "\n".join(topics["subscribes"]) or UNKNOWN,
+    )
+
+
+def _topics_of(graph: GraphView, node: NodeInfo) -> dict[str, list[str]]:
+    topics = graph.topics.values()
+    return {
+        "publishes": [each.name for each in topics if any(one.node_id == node.id for one in each.publishers)],
+        "subscribes": [
+            each.name for each in topics if any(one.node_id == node.id for one in each.subscribers)
+        ],
+    }

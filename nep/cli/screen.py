@@ -1,0 +1,131 @@
+"""How the command line looks: tables for people, lines of JSON for programs, sentences for errors."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import orjson
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
+
+    from nep.graph import Alert
+
+UNKNOWN = "\N{EN DASH}"
+"""What stands where nothing is known."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table: its head, its side, and how it is coloured."""
+
+    head: str
+    justify: Literal["left", "right"] = "left"
+    style: str = ""
+
+
+def console(*, stderr: bool = False) -> Console:
+    """A console for coloured text; rich is loaded when the first one is made."""
+    from rich.console import Console  # noqa: PLC0415 - 40 ms that `--json` and `--help` need not wait for
+
+    return Console(stderr=stderr, highlight=False, soft_wrap=True)
+
+
+def json_painter() -> Callable[[str, str], Text]:
+    """A function that colours a message: its head dim, its body as JSON."""
+    from rich.highlighter import JSONHighlighter  # noqa: PLC0415 - see `console`
+    from rich.text import Text  # noqa: PLC0415
+
+    highlight = JSONHighlighter()
+
+    def paint(head: str, body: str) -> Text:
+        painted = Text(body)
+        highlight.highlight(painted)
+        return Text.assemble((head, "dim"), "  ", painted)
+
+    return paint
+
+
+def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None:
+    """A table on the standard output."""
+    from rich import box  # noqa: PLC0415 - see `console`
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
+    for column in columns:
+        table.add_column(column.head, justify=column.justify, style=column.style, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell, style="dim" if cell == UNKNOWN else "") for cell in row))
+    console().print(table, soft_wrap=False)
+
+
+def show_alerts(alerts: Iterable[Alert]) -> None:
+    """What is wrong at present, under a table."""
+    from rich.text import Text  # noqa: PLC0415 - see `console`
+
+    for alert in alerts:
+        text = Text.assemble(("! ", "yellow bold"), (alert.sentence, "yellow"))
+        if alert.hint:
+            text.append(f"\n  {alert.hint}", style="dim")
+        console(stderr=True).print(text)
+
+
+def say(sentence: str) -> None:
+    """A sentence beside the results, on the standard error stream."""
+    console(stderr=True).print(sentence, style="dim", markup=False)
+
+
+def say_error(sentence: str) -> None:
+    """What went wrong, on the standard error stream."""
+    print(
+        f"nep: {sentence}", file=sys.stderr
+    )  # no rich: an error is shown at once and can be read by programs
+
+
+def show_json(value: object) -> None:
+    """One JSON text on one line, at once."""
+    sys.stdout.buffer.write(
+        orjson.dumps(value, default=_plain, option=orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
+        + b"\n"
+    )
+    sys.stdout.buffer.flush()
+
+
+def rate(value_hz: float | None) -> str:
+    """Messages a second."""
+    if value_hz is None:
+        return UNKNOWN
+    return f"{value_hz:.0f} /s" if value_hz >= 100 else f"{value_hz:.1f} /s"
+
+
+def size(value: float | None, per: str = "") -> str:
+    """Bytes with a unit that leaves at most four digits; `per` such as "/s" follows it."""
+    if value is None:
+        return UNKNOWN
+    for unit in ("B", "kB", "MB"):
+        if value < 1000:
+            digits = 0 if unit == "B" or value >= 100 else 1
+            return f"{value:.{digits}f} {unit}{per}"
+        value /= 1000
+    return f"{value:.1f} GB{per}"
+
+
+def duration(seconds: float) -> str:
+    """How long, in the unit that a person would say."""
+    if seconds < 60:
+        return f"{max(seconds, 0):.0f} s"
+    if seconds < 3600:
+        return f"{seconds / 60:.0f} min"
+    if seconds < 86400:
+        return f"{seconds / 3600:.1f} h"
+    return f"{seconds / 86400:.1f} d"
+
+
+def _plain(value: object) -> object:
+    """What orjson does not know: bytes as their hexadecimal digits, everything else as text."""
+    return value.hex() if isinstance(value, (bytes, bytearray, memoryview)) else str(value)

@@ -1,0 +1,61 @@
+"""`nep topic`: what is published, by whom, how fast; look into it, and publish by hand."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import typer
+
+from nep.cli.echo import echo
+from nep.cli.graphs import look
+from nep.cli.options import JsonOption, MasterOption
+from nep.cli.publish import publish
+from nep.cli.screen import UNKNOWN, Column, rate, say, show_alerts, show_json, show_table, size
+from nep.graph import GraphView, TopicInfo
+
+app = typer.Typer(no_args_is_help=True, help="What is published: list it, look into it, publish by hand.")
+app.command("echo")(echo)
+app.command("pub")(publish)
+_COLUMNS = (
+    Column("topic", style="bold"),
+    Column("type"),
+    Column("publishers", style="green"),
+    Column("subscribers", style="cyan"),
+    Column("rate", "right"),
+    Column("bandwidth", "right"),
+    Column("lost", "right"),
+)
+
+
+@app.command("list")
+def list_topics(master: MasterOption = None, as_json: JsonOption = False) -> None:
+    """List all topics, with who publishes and subscribes them and how fast."""
+    graph = look(master)
+    topics = [graph.topics[name] for name in sorted(graph.topics)]
+    if as_json:
+        show_json([asdict(topic) for topic in topics])
+        return
+    if topics:
+        show_table(_COLUMNS, [_row(graph, topic) for topic in topics])
+    else:
+        say("no topics yet; they appear as soon as a program publishes or subscribes one")
+    show_alerts(graph.alerts)
+
+
+def _row(graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
+    return (
+        topic.name,
+        topic.msg_type,
+        _names(graph, [each.node_id for each in topic.publishers]),
+        _names(graph, [each.node_id for each in topic.subscribers]),
+        rate(topic.rate_hz),
+        size(topic.bandwidth_Bps, "/s"),
+        UNKNOWN if topic.lost is None else str(topic.lost),
+    )
+
+
+def _names(graph: GraphView, node_ids: list[str]) -> str:
+    nodes = [graph.nodes[each] for each in node_ids if each in graph.nodes]
+    originals = any(node.generation not in {"native", "gateway"} for node in nodes)
+    named = [node.name for node in nodes if not (originals and node.generation == "gateway")]
+    return "\n".join(dict.fromkeys(named)) or UNKNOWN

@@ -1,0 +1,80 @@
+"""The gateway as something that lives with a master."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import psutil
+
+from nep.errors import ClosedError, WaitTimeoutError
+from nep.gateway.desk import Ports
+from nep.gateway.gateway import Gateway
+from nep.gateway.listing import Listing
+from nep.gateway.native import Native
+from nep.gateway.portmap import default_file
+from nep.gateway.processes import SystemProcesses
+from nep.graph import Alert, GraphView
+from nep.masters import Master
+from nep.nodes import Node
+from nep.requests import Reply, Request
+
+_WANTED_FILES = 8192
+
+
+class GatewayAttachment:
+    """Joins programs of the original NEP to the master that it is attached to (see `nep.masters.Attachment`).
+
+    `file` keeps who has which ports; by default it lies where the system keeps such files.
+    """
+
+    def __init__(self, file: Path | None = None, ports: Ports | None = None) -> None:
+        self._file = file
+        self._ports = ports
+        self._gateway: Gateway | None = None
+
+    def start(self, master: Master) -> None:
+        """Start the gateway. A port that is taken is an alert, not an error."""
+        allow_many_files()
+        address = master.address
+
+        def make_node() -> Node:
+            return Node("gateway", master=address, generation="gateway")
+
+        def submit(request: Request) -> Reply | None:
+            try:
+                return master.submit(request)
+            except (ClosedError, WaitTimeoutError):
+                return None  # the master is ending, and the graph with it
+
+        def report(alerts: tuple[Alert, ...]) -> None:
+            del alerts  # until the graph takes alerts
+
+        native = Native(make_node, Listing(submit, master.epoch), report)
+        file = self._file or default_file(int(address.rpartition(":")[2]))
+        self._gateway = Gateway(native, SystemProcesses(), file, ports=self._ports, boot=psutil.boot_time())
+        self._gateway.start()
+
+    def changed(self, view: GraphView) -> None:
+        """The graph has changed; the gateway follows its own sockets instead."""
+
+    def close(self) -> None:
+        """End the gateway and give its ports back."""
+        if self._gateway is not None:
+            self._gateway.close()
+            self._gateway = None
+
+
+def allow_many_files() -> None:
+    """Let this process open as many files as the system allows: each topic needs about twenty handles.
+
+    macOS starts programs with 256, which would be a dozen topics.
+    """
+    if sys.platform == "win32":
+        return
+    import resource  # noqa: PLC0415 - not on Windows
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _WANTED_FILES if hard == resource.RLIM_INFINITY else min(_WANTED_FILES, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

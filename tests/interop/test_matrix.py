@@ -1,0 +1,74 @@
+"""Every direction between native programs and the published packages of the original NEP."""
+
+from __future__ import annotations
+
+import pytest
+
+pytestmark = [pytest.mark.ports, pytest.mark.interop, pytest.mark.timeout(300)]
+
+KINDS = ("native", "0.5.3.5", "0.5.4.8", "nep-js")
+MESSAGES = 40
+
+
+def datum(kind, number):
+    return {
+        "from": kind,
+        "n": number,
+        "message": 'Grüße  aus 日本 😀, with  spaces, "quotes" and a \\ backslash',
+        "list": [1, -2.5, None, True, "x"],
+        "inner": {"a b": ""},
+    }
+
+
+def text(kind, number):
+    return f'{kind} {number} Grüße  aus 日本 😀 with  spaces and "quotes"'
+
+
+class Room:
+    """Programs of several kinds on one topic, each once as publisher and once as subscriber."""
+
+    def __init__(self, peers, kinds, topic, msg_type):
+        self.subscribers = {kind: peers.start(kind, "subscriber", topic, msg_type) for kind in kinds}
+        self.publishers = {kind: peers.start(kind, "publisher", topic, msg_type) for kind in kinds}
+        for program in (*self.subscribers.values(), *self.publishers.values()):
+            program.wait_ready()
+
+    def warm_up(self, make):
+        """Publish until the slow joiners of the originals have joined: everybody hears everybody."""
+        for kind, publisher in self.publishers.items():
+            for number in range(-1, -50, -1):
+                publisher.tell(make(kind, number))
+                if all([each.hears(make(kind, number), 0.3) for each in self.subscribers.values()]):
+                    break
+            else:
+                pytest.fail(f"{kind} is not heard by everybody")
+
+    def publish(self, make, first=0, count=MESSAGES):
+        """All publish in turn, each message after the one before was heard: originals keep the newest only."""
+        for number in range(first, first + count):
+            for kind, publisher in self.publishers.items():
+                publisher.tell(make(kind, number))
+                for to, subscriber in self.subscribers.items():
+                    assert subscriber.hears(make(kind, number)), f"{to} misses {number} from {kind}"
+
+    def assert_each_once(self, make, first=0, count=MESSAGES):
+        """Every subscriber got every message of every publisher exactly once."""
+        for kind in self.publishers:
+            for to, subscriber in self.subscribers.items():
+                got = subscriber.got
+                times = [got.count(make(kind, number)) for number in range(first, first + count)]
+                assert times == [1] * count, f"{kind} to {to}"
+
+
+def test_json_in_every_direction(peers, master):
+    room = Room(peers, KINDS, "matrix", "json")
+    room.warm_up(datum)
+    room.publish(datum)
+    room.assert_each_once(datum)
+
+
+def test_strings_in_every_direction(peers, master):
+    room = Room(peers, KINDS[:3], "words", "string")
+    room.warm_up(text)
+    room.publish(text)
+    room.assert_each_once(text)
