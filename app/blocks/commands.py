@@ -15,7 +15,7 @@ from app.blocks.runtime import Runtime
 from nep import node as new_node
 
 __all__ = [
-    "fail", "join", "length", "newest", "on_message", "on_start", "on_true", "part", "publish",
+    "fail", "is_known", "join", "length", "newest", "on_message", "on_start", "on_true", "part", "publish",
     "random_number", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_program",
     "wait", "wait_until", "write",
 ]  # fmt: skip
@@ -39,6 +39,7 @@ wait = _runtime.wait
 wait_until = _runtime.wait_until
 write = _runtime.write
 
+is_known = values.is_known
 join = values.join
 length = values.length
 part = values.part

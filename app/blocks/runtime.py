@@ -59,6 +59,7 @@ class Runtime:
         """The names of a program, each bound to what it does."""
         return {
             "fail": self.fail,
+            "is_known": values.is_known,
             "join": values.join,
             "length": values.length,
             "newest": self.newest,

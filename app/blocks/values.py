@@ -25,6 +25,11 @@ def text(value: object) -> str:
     return str(value)
 
 
+def is_known(value: object) -> bool:
+    """Whether a sensor or topic has told this value."""
+    return value is not None
+
+
 def join(first: object, second: object) -> str:
     """Both as one text."""
     return text(first) + text(second)

@@ -1,0 +1,126 @@
+"""A link without a network, and a way to run a program in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from app.blocks.compiler import compile_behaviour
+from app.blocks.link import Call
+from app.blocks.program import Program
+from app.blocks.runtime import Runtime
+from app.robots.description import Robot
+from tests.blocks.samples import robot
+
+LONG_S = 10.0
+
+
+class FakeLink:
+    """Robots that obey at once, unless a test holds them back; sensors and topics that a test sets."""
+
+    def __init__(self) -> None:
+        self.invoked: list[tuple[str, str, dict[str, object]]] = []
+        self.calls: list[Call] = []
+        self.canceled: list[Call] = []
+        self.published: list[tuple[str, object]] = []
+        self.sensors: dict[tuple[str, str], object] = {}
+        self.topics: dict[str, object] = {}
+        self.answers: dict[str, tuple[str, dict[str, object], str]] = {}
+        self.held: set[str] = set()
+        self.told: dict[object, list[Callable[[object], None]]] = {}
+        self.poke: Callable[[], None] = lambda: None
+        self.stopped_outside: Callable[[str], None] = lambda _: None
+
+    def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
+        self.poke, self.stopped_outside = poke, stopped_outside
+
+    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> Call:
+        self.invoked.append((robot, action, dict(input)))
+        call = Call(f"c{len(self.calls)}", robot, action)
+        self.calls.append(call)
+        if action in self.held:
+            call.state = "running"
+        else:
+            self.answer(call, *self.answers.get(action, ("succeeded", {}, "")))
+        return call
+
+    def answer(
+        self, call: Call, state: str, output: Mapping[str, object] | None = None, error: str = ""
+    ) -> None:
+        call.output, call.error = output or {}, error
+        call.state = state
+        if call.action in self.held:
+            self.poke()
+
+    def cancel(self, call: Call) -> None:
+        self.canceled.append(call)
+
+    def sensor(self, robot: str, name: str) -> object:
+        return self.sensors.get((robot, name))
+
+    def newest(self, topic: str) -> object:
+        return self.topics.get(topic)
+
+    def publish(self, topic: str, payload: object) -> None:
+        self.published.append((topic, payload))
+
+    def on_sensor(self, robot: str, name: str, told: Callable[[object], None]) -> None:
+        self.told.setdefault((robot, name), []).append(told)
+
+    def on_event(self, robot: str, name: str, told: Callable[[object], None]) -> None:
+        self.told.setdefault((robot, name), []).append(told)
+
+    def on_message(self, topic: str, told: Callable[[object], None]) -> None:
+        self.told.setdefault(topic, []).append(told)
+
+    def happen(self, where: object, data: object) -> None:
+        """An event, a sensor's value or a message arrives."""
+        for told in self.told.get(where, ()):
+            told(data)
+        self.poke()
+
+
+class Play:
+    """A program that runs in this process."""
+
+    def __init__(
+        self, program: Program, robots: tuple[Robot, ...] = (), link: FakeLink | None = None
+    ) -> None:
+        self.program = program
+        self.link = link or FakeLink()
+        self.lines: list[str] = []
+        self.runtime = Runtime(self.lines.append, labels=program.labels, readings=program.readings)
+        self.robots = robots
+        self.steps: list[str] = []
+
+    def start(self, *, paused: bool = False) -> Play:
+        self.names = self.runtime.namespace()
+        exec(compile(self.program.runnable, "<behaviour>", "exec"), self.names)
+        if paused:
+            self.runtime.scheduler.pause()
+        self.runtime.start(self.link, self.robots)
+        return self
+
+    def end(self, timeout_s: float = LONG_S) -> Play:
+        assert self.runtime.finished.wait(timeout_s), "the program has not ended"
+        return self
+
+    def stop(self) -> None:
+        self.runtime.scheduler.stop()
+        self.runtime.finished.set()
+
+
+def play(workspace: Mapping[str, object], link: FakeLink | None = None) -> Play:
+    """Compile and run to the end, with one Pepper."""
+    pepper = robot()
+    return Play(compile_behaviour(workspace, [pepper]), (pepper,), link).start().end()
+
+
+def until(ready: Callable[[], bool], timeout_s: float = LONG_S) -> None:
+    """Wait until something is so, without sleeping."""
+    import threading
+    import time
+
+    waiting, deadline = threading.Event(), time.monotonic() + timeout_s
+    while not ready():
+        assert time.monotonic() < deadline, "it has not happened"
+        waiting.wait(0.002)

@@ -1,0 +1,383 @@
+from __future__ import annotations
+
+import ast
+
+import pytest
+
+from app.blocks.catalogue import Catalogue, categories
+from app.blocks.compiler import COMMANDS, compile_behaviour
+from app.blocks.fields import StatementInput, ValueInput
+from app.blocks.program import Program
+from tests.blocks.fakes import FakeLink, Play, play
+from tests.blocks.samples import (
+    block,
+    boolean,
+    get,
+    nao,
+    number,
+    robot,
+    say,
+    stack,
+    started,
+    text,
+    workspace,
+    write,
+)
+
+CATALOGUE = Catalogue([robot()])
+ALL = sorted(CATALOGUE.blocks.values(), key=lambda each: each.type)
+
+
+def filled(described) -> dict[str, object]:
+    """A block with something in each gap."""
+    parts: dict[str, object] = {}
+    for argument in described.arguments:
+        if isinstance(argument, ValueInput):
+            default = argument.default
+            if argument.check == "Boolean":
+                parts[argument.name] = boolean(False)
+            else:
+                parts[argument.name] = text(default) if isinstance(default, str) else number(default or 1)
+        elif isinstance(argument, StatementInput):
+            parts[argument.name] = [write(text("inside"))]
+    if described.argument("ROBOT"):
+        parts["ROBOT"] = "Pepper"
+    if described.argument("VAR"):
+        parts["VAR"] = {"id": "score"}
+    if described.argument("SECONDS"):
+        parts["SECONDS"] = number(0.05)
+    if described.type == "robot_pepper_do_listen":
+        parts["WORDS"] = text("yes, no")
+    return block(described.type, "it", **parts)
+
+
+def around(described) -> dict[str, object]:
+    """A workspace with this block in it, in a script that ends by itself."""
+    it = filled(described)
+    if described.shape == "hat":
+        return workspace(stack(it, write(text("ran"))), started(), variables=("score",))
+    if described.shape in ("value", "boolean"):
+        it = write(it)
+    if described.needs_message:
+        return workspace(stack(block("events_message", TOPIC="/x"), it), variables=("score",))
+    end = [] if described.shape == "cap" else [block("control_stop_program")]
+    return workspace(started(it, *end), variables=("score",))
+
+
+def link() -> FakeLink:
+    made = FakeLink()
+    made.sensors = {
+        ("Pepper", "battery"): 80, ("Pepper", "distance"): 1.5, ("Pepper", "sees_face"): True,
+        ("Pepper", "pose"): {"x": 1.0, "y": 2.0},
+    }  # fmt: skip
+    made.topics = {"/faces": {"name": "Ada"}}
+    made.answers = {"listen": ("succeeded", {"word": "yes"}, "")}
+    return made
+
+
+@pytest.mark.parametrize("described", ALL, ids=lambda each: each.type)
+def test_every_block_compiles_and_its_python_runs(described):
+    pepper = robot()
+    program = compile_behaviour(around(described), [pepper])
+    assert not [problem for problem in program.problems if problem.severity != "info"]
+    ast.parse(program.source)
+    assert "it" in program.readings
+    run = Play(program, (pepper,), link()).start()
+    if described.type in ("control_forever", "control_wait_until", "control_while"):
+        run.stop()
+    elif described.shape == "hat" and described.type != "events_started":
+        run.stop()
+    elif described.needs_message:
+        run.link.happen("/x", {"name": "Ada"})
+        from tests.blocks.fakes import until
+
+        until(lambda: bool(run.lines))
+        run.stop()
+    run.end()
+    assert run.runtime.error is None
+
+
+def test_descriptions_are_sound():
+    assert not [problem for described in ALL for problem in described.problems()]
+    assert {category.name for category in categories()} >= {
+        "events", "control", "values", "variables", "messages", "robot",
+    }  # fmt: skip
+    for category in categories():
+        assert all(described.type.startswith(f"{category.name}_") for described in category.blocks)
+        assert all(described.tooltip.endswith(".") for described in category.blocks)
+
+
+def test_every_command_of_a_program_exists_for_its_file_too():
+    import app.blocks.commands as commands
+
+    assert set(commands.__all__) == COMMANDS
+    assert all(callable(getattr(commands, name)) for name in COMMANDS)
+
+
+def picture() -> dict[str, object]:
+    """The behaviour of the design's picture 02."""
+    return workspace(
+        started(
+            block("robot_pepper_do_light", ROBOT="Pepper", WHERE="eyes", COLOUR="#37B6FF"),
+            say("Hello! I am Pepper."),
+            block("control_wait_until", "w", CONDITION=block("robot_pepper_get_sees_face", ROBOT="Pepper")),
+            block("control_repeat", TIMES=number(3), BODY=[
+                block("robot_pepper_do_turn", "t", ROBOT="Pepper", DIRECTION="left", ANGLE=number(30)),
+                say("Touch my head."), block("control_wait", "s", SECONDS=number(2)),
+            ]),
+        ),
+        stack(
+            block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head"),
+            say(block("messages_newest", FIELD="name", TOPIC="/faces")),
+            block("robot_nao_do_wave", "n", ROBOT="NAO", HAND="right"),
+        ),
+        stack(
+            block("events_message", TOPIC="/blackboard"),
+            block("control_if", CONDITION=block("values_compare", RELATION="<",
+                  A=block("robot_pepper_get_battery", ROBOT="Pepper"), B=number(20)),
+                  BODY=[say("I need a rest."), block("messages_publish", VALUE=text("tired"), TOPIC="/blackboard")]),
+        ),
+    )  # fmt: skip
+
+
+def test_the_program_reads_well():
+    program = compile_behaviour(picture(), [robot()], absent=[nao()], name="Greeting")
+    assert (
+        program.source
+        == """from app.blocks.commands import newest, on_message, on_start, publish, repeat, robot, run, wait, wait_until
+
+
+@on_start
+def when_started():
+    robot('Pepper').do('light', where='eyes', colour='#37b6ff')
+    robot('Pepper').do('say', text='Hello! I am Pepper.')
+    wait_until(lambda: robot('Pepper').get('sees_face'))
+    for _ in repeat(3):
+        robot('Pepper').do('turn', direction='left', angle=30)
+        robot('Pepper').do('say', text='Touch my head.')
+        wait(2)
+
+
+@robot('Pepper').on('touched', place='head')
+def when_pepper_head_is_touched():
+    robot('Pepper').do('say', text=newest('/faces', 'name'))
+
+
+@on_message('/blackboard')
+def when_a_message_arrives_on_blackboard(message):
+    if robot('Pepper').get('battery') < 20:
+        robot('Pepper').do('say', text='I need a rest.')
+        publish('/blackboard', 'tired')
+
+
+run('Greeting')
+"""
+    )  # noqa: E501
+    assert program.lines[8] == "w"
+    assert program.lines[10] == "t"
+    assert "step" not in program.source
+    assert program.robots == ("Pepper",)
+    assert set(program.sensors) == {("Pepper", "sees_face"), ("Pepper", "battery")}
+    assert program.events == (("Pepper", "touched"),)
+    assert program.publishes == ("/blackboard",)
+    assert set(program.listens) == {"/faces", "/blackboard"}
+    assert program.readings["s"] == "wait 2 s"
+    assert program.readings["t"] == "Pepper turn left by 30 °"
+
+
+def test_the_problems_of_the_picture():
+    program = compile_behaviour(picture(), [robot()], absent=[nao()])
+    first, second = program.problems
+    assert (first.severity, first.block_id, first.category, first.icon) == ("warning", "n", "robot", "hand")
+    assert (first.subject, first.sentence) == ("wave", "NAO is not connected, so wave will be skipped.")
+    assert (first.mend, first.mend_action) == ("Connect NAO", "connect:NAO")
+    assert (second.severity, second.block_id, second.category) == ("info", "w", "control")
+    assert second.sentence == "wait until may wait for ever if nobody comes."
+    assert (second.subject, second.mend, second.mend_action) == ("wait until", "Add a time limit", "limit:w")
+
+
+def sentences(saved, robots=None) -> list[tuple[str, str]]:
+    program = compile_behaviour(saved, [robot()] if robots is None else robots)
+    ast.parse(program.source)
+    return [(problem.severity, problem.sentence) for problem in program.problems]
+
+
+def test_a_robot_that_was_never_seen_is_named_too():
+    saved = workspace(started(block("robot_nao_do_wave", ROBOT="NAO", HAND="left"), say("Hi")))
+    assert sentences(saved) == [("warning", "NAO is not connected, so wave will be skipped.")]
+    assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
+
+
+def test_an_unknown_block_is_kept_and_skipped():
+    saved = workspace(started(block("magic_wave_wand"), say("Hi")))
+    assert sentences(saved) == [
+        ("warning", "This file uses “wave wand”, which no connected robot can do. It is kept and skipped.")
+    ]
+    assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
+
+
+def test_a_block_with_an_absent_sensor_is_skipped_whole():
+    condition = block("robot_nao_get_battery", ROBOT="NAO")
+    saved = workspace(started(block("control_if", CONDITION=condition, BODY=[say("no")]), say("Hi")))
+    assert sentences(saved) == [("warning", "NAO is not connected, so if with battery will be skipped.")]
+    assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
+
+
+def test_a_script_of_an_absent_robot_does_not_start():
+    saved = workspace(stack(block("robot_nao_when_touched", ROBOT="NAO"), say("Hi")))
+    found = sentences(saved)
+    assert ("warning", "NAO is not connected, so touched will be skipped.") in found
+    assert compile_behaviour(saved, [robot()]).starts == 0
+
+
+def test_a_connected_robot_that_cannot_do_it():
+    saved = workspace(started(block("robot_pepper_do_say", ROBOT="NAO", TEXT=text("Hi"))))
+    assert sentences(saved, [robot(), nao()]) == [("warning", "NAO can't do this, so say will be skipped.")]
+
+
+@pytest.mark.parametrize(
+    ("it", "sentence"),
+    [
+        (block("control_wait"), "wait needs a number. Put one into the gap."),
+        (block("control_if"), "if needs a condition. Put one into the gap."),
+        (block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="left"),
+         "turn needs a number. Put one into the gap."),
+        (block("messages_publish", TOPIC="/x"), "publish needs a value. Put one into the gap."),
+        (write(block("values_not")), "not needs a condition. Put one into the gap."),
+    ],
+)  # fmt: skip
+def test_an_empty_gap_is_an_error_and_the_program_stops_there(it, sentence):
+    saved = workspace(started(say("before"), it, say("after")))
+    assert sentences(saved) == [("error", sentence)]
+    run = play(saved)
+    assert run.link.invoked == [("Pepper", "say", {"text": "before"})]
+    assert run.runtime.error is not None
+    assert run.runtime.error.sentence == sentence
+    assert run.runtime.error.block == compile_behaviour(saved, [robot()]).problems[0].block_id
+
+
+def test_what_the_robot_would_refuse_is_told_before_run():
+    turn = block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="left", ANGLE=number(900))
+    assert sentences(workspace(started(turn))) == [("error", "turn: angle must be between 0 and 360 °.")]
+    assert sentences(workspace(started(say("")))) == [("error", "say: text must not be empty.")]
+
+
+@pytest.mark.parametrize(
+    ("it", "end"),
+    [
+        (block("messages_publish", VALUE=text("x"), TOPIC="two words"), "needs a topic without spaces"),
+        (
+            block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="up", ANGLE=number(1)),
+            "has no choice “up”",
+        ),
+        (block("robot_pepper_do_light", ROBOT="Pepper", WHERE="eyes", COLOUR="blue"), "needs a colour"),
+        (write(number("three")), "needs a number"),
+        (block("variables_set", VALUE=number(1)), "needs a variable"),
+    ],
+)
+def test_a_field_that_holds_nonsense_skips_its_block(it, end):
+    (problem,) = compile_behaviour(workspace(started(it)), [robot()]).problems
+    assert problem.severity == "error"
+    assert end in problem.sentence
+
+
+def test_blocks_without_a_start():
+    saved = workspace(say("Hi"))
+    assert sentences(saved) == [
+        ("warning", "Nothing starts these blocks. Put “when started” above them."),
+        ("info", "say hangs under no start, so it does not run."),
+    ]
+    assert sentences(workspace()) == []
+    assert [severity for severity, _ in sentences(workspace(started(), say("Hi")))] == ["info"]
+
+
+def test_the_message_outside_of_its_script():
+    saved = workspace(started(write(block("messages_message"))))
+    assert sentences(saved) == [("warning", "message is known only under “when a message arrives”.")]
+    assert play(saved).lines == [""]
+
+
+def test_a_disabled_block_is_left_out_but_an_absence_mark_of_the_editor_is_not_believed():
+    off = say("off") | {"enabled": False}
+    manual = say("manual") | {"disabledReasons": ["MANUALLY_DISABLED"]}
+    absent = say("on") | {"disabledReasons": ["robot absent"]}
+    assert [each[2] for each in play(workspace(started(off, manual, absent))).link.invoked] == [
+        {"text": "on"}
+    ]
+
+
+def test_a_shadow_counts_until_a_block_is_in_its_place():
+    shadow = {"shadow": number(7)}
+    wait = block("control_wait") | {"inputs": {"SECONDS": shadow}}
+    assert "wait(7)" in compile_behaviour(workspace(started(wait)), []).source
+    both = block("control_wait") | {"inputs": {"SECONDS": shadow | {"block": number(8)}}}
+    assert "wait(8)" in compile_behaviour(workspace(started(both)), []).source
+
+
+def test_variables_keep_their_names_as_far_as_python_takes_them():
+    names = ("score", "my score", "class", "wait", "点数", "ﬁt", "fit", "2nd", "")
+    saved = workspace(
+        started(*(block("variables_set", VAR={"id": name or "x"}, VALUE=number(1)) for name in names)),
+        variables=names,
+    )
+    program = compile_behaviour(saved, [])
+    assigned = [node.id for node in ast.walk(ast.parse(program.source))
+                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]  # fmt: skip
+    assert len(set(assigned)) == len(names)
+    assert {"score", "my_score", "点数", "fit", "fit_2"} <= set(assigned)
+    assert not {"class", "wait"} & set(assigned)
+
+
+def test_scripts_share_their_variables():
+    run = play(
+        workspace(
+            started(
+                block("variables_set", VAR={"id": "score"}, VALUE=number(5)),
+                block("variables_change", VAR={"id": "score"}, BY=number(2)),
+                write(get("score")),
+            ),
+            variables=("score",),
+        )
+    )
+    assert run.lines == ["7"]
+
+
+def test_a_long_script_and_a_deep_one():
+    long_ = compile_behaviour(workspace(started(*(say(f"{n}") for n in range(3000)))), [robot()])
+    assert not long_.problems
+    assert long_.source.count("'say'") == 3000
+
+    deep = number(1)
+    for _ in range(200):
+        deep = block("values_not", A=deep)
+    (problem,) = compile_behaviour(workspace(started(write(deep))), []).problems
+    assert problem.severity == "error"
+    assert "nested too deep" in problem.sentence
+
+    allowed: dict[str, object] = number(1)
+    for _ in range(35):
+        allowed = block("values_round", HOW="up", NUMBER=allowed)
+    assert play(workspace(started(write(allowed)))).lines == ["1"]
+
+    loops: dict[str, object] = write(text("x"))
+    for _ in range(35):
+        loops = block("control_if", CONDITION=boolean(True), BODY=[loops])
+    assert play(workspace(started(loops))).lines == ["x"]
+
+
+def test_a_program_survives_the_way_to_its_process():
+    import json
+
+    program = compile_behaviour(picture(), [robot()], name="Greeting")
+    again = Program.from_json(json.loads(json.dumps(program.to_json())))
+    assert (again.runnable, again.robots, again.sensors, again.labels) == (
+        program.runnable, program.robots, program.sensors, program.labels,
+    )  # fmt: skip
+    with pytest.raises((KeyError, TypeError)):
+        Program.from_json({"name": "x"})
+
+
+def test_what_is_no_workspace_is_an_empty_program():
+    for nonsense in ({}, {"blocks": 3}, {"blocks": {"blocks": [1, {"type": 2}, None]}}, {"variables": "x"}):
+        program = compile_behaviour(nonsense, [robot()])
+        assert (program.starts, program.problems) == (0, ())

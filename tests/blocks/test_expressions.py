@@ -1,0 +1,153 @@
+"""Thousands of random expressions: compiled, run, and compared with a reference that knows no Python text."""
+
+from __future__ import annotations
+
+import math
+import operator
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from app.blocks.compiler import compile_behaviour
+from app.blocks.runtime import Runtime
+from app.blocks.values import text as as_text
+from tests.blocks.samples import block, boolean, number, text, workspace, write
+
+ARITHMETIC = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "%": operator.mod,
+    "**": operator.pow,
+}  # fmt: skip
+COMPARE = {
+    "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt,
+    ">=": operator.ge,
+}  # fmt: skip
+
+numbers_plain = st.integers(-9, 9) | st.floats(-20, 20, width=16)
+booleans_plain = st.booleans()
+texts_plain = st.text(max_size=6)
+
+
+class Wrong(Exception):
+    """The reference has no result."""
+
+
+def arithmetic(inner):
+    return st.tuples(st.just("arithmetic"), st.sampled_from(sorted(ARITHMETIC)), inner, inner)
+
+
+def rounding(inner):
+    return st.tuples(st.just("round"), st.sampled_from(["round", "up", "down"]), inner, st.none())
+
+
+number_trees = st.recursive(numbers_plain, lambda inner: arithmetic(inner) | rounding(inner), max_leaves=8)
+comparisons = st.tuples(st.just("compare"), st.sampled_from(sorted(COMPARE)), number_trees, number_trees)
+
+
+def logic(inner):
+    both = st.tuples(st.just("logic"), st.sampled_from(["and", "or"]), inner, inner)
+    return both | st.tuples(st.just("not"), st.none(), inner, st.none())
+
+
+boolean_trees = st.recursive(booleans_plain | comparisons, logic, max_leaves=6)
+joins = st.tuples(st.just("join"), st.none(), texts_plain | number_trees, texts_plain | boolean_trees)
+lengths = st.tuples(st.just("length"), st.none(), texts_plain | joins, st.none())
+trees = number_trees | boolean_trees | joins | lengths
+
+
+def reference(tree):
+    """What a tree is worth, worked out without any program."""
+    if not isinstance(tree, tuple):
+        # A field holds 2.0 as 2, as Blockly saves it.
+        return int(tree) if isinstance(tree, float) and tree.is_integer() else tree
+    kind, how, first, second = tree
+    if kind == "logic":
+        left = reference(first)
+        return (left and reference(second)) if how == "and" else (left or reference(second))
+    if kind == "not":
+        return not reference(first)
+    if kind == "join":
+        return as_text(reference(first)) + as_text(reference(second))
+    if kind == "length":
+        return len(reference(first))
+    left = reference(first)
+    if kind == "round":
+        return rounded(how, left)
+    right = reference(second)
+    table = ARITHMETIC if kind == "arithmetic" else COMPARE
+    try:
+        result = table[how](left, right)
+    except (ZeroDivisionError, OverflowError) as error:
+        raise Wrong from error
+    if isinstance(result, complex):
+        raise Wrong
+    return result
+
+
+def rounded(how, value):
+    if not math.isfinite(value):
+        raise Wrong
+    return {"round": lambda x: math.floor(x + 0.5), "up": math.ceil, "down": math.floor}[how](value)
+
+
+def blocks(tree):
+    """The tree as blocks."""
+    if isinstance(tree, bool):
+        return boolean(tree)
+    if isinstance(tree, str):
+        return text(tree)
+    if not isinstance(tree, tuple):
+        return number(tree)
+    kind, how, first, second = tree
+    if kind == "arithmetic":
+        return block("values_arithmetic", A=blocks(first), SIGN=how, B=blocks(second))
+    if kind == "compare":
+        return block("values_compare", A=blocks(first), RELATION=how, B=blocks(second))
+    if kind == "logic":
+        return block("values_logic", A=blocks(first), LOGIC=how, B=blocks(second))
+    if kind == "not":
+        return block("values_not", A=blocks(first))
+    if kind == "round":
+        return block("values_round", HOW=how, NUMBER=blocks(first))
+    if kind == "length":
+        return block("values_length", TEXT=blocks(first))
+    return block("values_join", A=blocks(first), B=blocks(second))
+
+
+def small(tree):
+    """Whether no power in it could keep a computer busy."""
+    if not isinstance(tree, tuple):
+        return True
+    if tree[1] == "**" and isinstance(tree[2], tuple) and isinstance(tree[3], tuple):
+        return False
+    return all(small(part) for part in tree[2:])
+
+
+@settings(
+    max_examples=3000,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+)
+@given(trees.filter(small))
+def test_a_compiled_expression_is_worth_what_the_reference_says(tree):
+    from tests.blocks.samples import started
+
+    program = compile_behaviour(workspace(started(write(blocks(tree)))), [])
+    assert not program.problems
+    written: list[object] = []
+    scripts: list = []
+    names = Runtime(lambda line: None, labels=program.labels).namespace()
+    names |= {"step": lambda id: None, "write": written.append, "on_start": scripts.append}
+    exec(compile(program.runnable, "", "exec"), names)
+    try:
+        expected = reference(tree)
+    except Wrong:
+        try:
+            scripts[0]()
+        except Exception as error:
+            assert type(error).__name__ == "BehaviourError"
+            assert error.block is not None
+            return
+        raise AssertionError(f"should have failed: {written}") from None
+    scripts[0]()
+    assert written == [expected] or (math.isnan(written[0]) and math.isnan(expected))
+    assert type(written[0]) is type(expected)

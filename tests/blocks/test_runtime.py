@@ -1,0 +1,349 @@
+from __future__ import annotations
+
+import pytest
+
+from app.blocks.compiler import compile_behaviour
+from tests.blocks.fakes import FakeLink, Play, play, until
+from tests.blocks.samples import (
+    block,
+    boolean,
+    get,
+    number,
+    robot,
+    say,
+    stack,
+    started,
+    text,
+    workspace,
+    write,
+)
+
+
+def begin(saved, link: FakeLink | None = None, *, paused: bool = False) -> Play:
+    pepper = robot()
+    return Play(compile_behaviour(saved, [pepper]), (pepper,), link).start(paused=paused)
+
+
+@pytest.fixture
+def running():
+    """Begins programs and ends them."""
+    begun: list[Play] = []
+
+    def start(saved, link: FakeLink | None = None, *, paused: bool = False) -> Play:
+        begun.append(begin(saved, link, paused=paused))
+        return begun[-1]
+
+    yield start
+    for run in begun:
+        run.stop()
+
+
+# ---- robots
+
+
+def test_a_block_waits_for_its_robot(running):
+    link = FakeLink()
+    link.held = {"turn"}
+    turn = block("robot_pepper_do_turn", "t", ROBOT="Pepper", DIRECTION="left", ANGLE=number(30))
+    run = running(workspace(started(turn, say("done"))), link)
+    until(lambda: bool(link.calls))
+    assert link.invoked == [("Pepper", "turn", {"direction": "left", "angle": 30})]
+    assert run.runtime.scheduler.snapshot().blocks == ("t",)
+    assert run.runtime.says("t") == "Pepper turns left by 30 °"
+    link.answer(link.calls[0], "succeeded")
+    run.end()
+    assert link.invoked[1] == ("Pepper", "say", {"text": "done"})
+
+
+def test_what_the_robot_says_appears_in_words(running):
+    link = FakeLink()
+    link.held = {"say"}
+    run = running(workspace(started(say(block("values_join", A=text("Touch my "), B=text("head."))))), link)
+    until(lambda: bool(link.calls))
+    assert run.runtime.says(None) == "Pepper says “Touch my head.”"
+    link.answer(link.calls[0], "succeeded")
+    run.end()
+
+
+def test_a_refused_action_is_an_error_on_its_block_with_the_robots_sentence():
+    link = FakeLink()
+    link.answers = {"say": ("failed", {}, "the speaker is off")}
+    run = play(workspace(started(say("Hi") | {"id": "x"}, write(text("never")))), link)
+    assert run.runtime.error is not None
+    assert (run.runtime.error.block, run.runtime.error.sentence) == ("x", "Pepper: the speaker is off.")
+    assert run.lines == []
+
+
+def test_a_canceled_action_is_no_error():
+    link = FakeLink()
+    link.answers = {"say": ("canceled", {}, "")}
+    run = play(workspace(started(say("Hi"), write(text("after")))), link)
+    assert (run.runtime.error, run.lines) == (None, ["after"])
+
+
+def test_a_robot_that_does_not_answer_is_named(monkeypatch):
+    monkeypatch.setattr("app.blocks.robot_handle.FIRST_ANSWER_S", 0.05)
+    link = FakeLink()
+    link.answers = {"say": ("sent", {}, "")}
+    run = play(workspace(started(say("Hi") | {"id": "x"})), link)
+    assert run.runtime.error is not None
+    assert run.runtime.error.block == "x"
+    assert run.runtime.error.sentence == "Pepper does not answer. Check that it is on and in the same Wi-Fi."
+
+
+def test_an_action_that_never_ends_is_canceled(monkeypatch):
+    monkeypatch.setattr("app.blocks.robot_handle.MARGIN_S", -29.95)
+    link = FakeLink()
+    link.held = {"say"}
+    run = play(workspace(started(say("Hi"))), link)
+    assert run.runtime.error is not None
+    assert run.runtime.error.sentence == "Pepper has not ended “say” within 30 s."
+    assert link.canceled == link.calls
+
+
+def test_values_become_what_the_parameter_wants():
+    score = block(
+        "variables_set", VAR={"id": "n"}, VALUE=block("values_arithmetic", A=number(1), SIGN="/", B=number(2))
+    )
+    listen = block("robot_pepper_do_listen", ROBOT="Pepper", WORDS=text("yes, no ,maybe"))
+    link = FakeLink()
+    link.answers = {"listen": ("succeeded", {"word": "no"}, "")}
+    run = play(
+        workspace(started(score, say(get("n")), say(boolean(True)), write(listen)), variables=("n",)), link
+    )
+    assert [given for _, _, given in link.invoked] == [
+        {"text": "0.5"}, {"text": "true"}, {"words": ["yes", "no", "maybe"]},
+    ]  # fmt: skip
+    assert run.lines == ["no"]
+
+
+def test_what_only_the_running_program_knows_is_checked_before_the_robot_is_asked():
+    far = block("values_arithmetic", A=number(400), SIGN="*", B=number(2))
+    link = FakeLink()
+    run = play(workspace(started(block("robot_pepper_do_turn", ROBOT="Pepper", ANGLE=far))), link)
+    assert run.runtime.error is not None
+    assert run.runtime.error.sentence == "Pepper can't do this: turn: angle must be between 0 and 360 °."
+    assert link.invoked == []
+
+
+def test_saying_what_is_not_known_yet_is_told():
+    run = play(workspace(started(say(block("messages_newest", FIELD="name", TOPIC="/faces")))))
+    assert run.runtime.error is not None
+    assert run.runtime.error.sentence == "“say” needs a value for “text” that is not known yet."
+
+
+def test_sensors(running):
+    link = FakeLink()
+    link.sensors = {("Pepper", "battery"): 84, ("Pepper", "pose"): {"x": 0.5, "y": 2.0}}
+    run = play(
+        workspace(
+            started(
+                write(block("robot_pepper_get_battery", ROBOT="Pepper")),
+                write(block("robot_pepper_get_pose", ROBOT="Pepper", FIELD="y")),
+            )
+        ),
+        link,
+    )
+    assert run.lines == ["84", "2"]
+
+
+def test_the_first_value_of_a_sensor_is_waited_for(running):
+    link = FakeLink()
+    run = running(workspace(started(write(block("robot_pepper_get_battery", ROBOT="Pepper")))), link)
+    until(lambda: run.runtime.scheduler.snapshot().blocks != ())
+    link.sensors["Pepper", "battery"] = 50
+    link.poke()
+    run.end()
+    assert run.lines == ["50"]
+
+
+def test_a_robot_that_is_stopped_by_somebody_else_ends_the_program(running):
+    link = FakeLink()
+    link.held = {"say"}
+    run = running(workspace(started(say("Hi"), say("again"))), link)
+    until(lambda: bool(link.calls))
+    link.stopped_outside("Pepper")
+    run.end()
+    assert run.runtime.error is not None
+    assert run.runtime.error.sentence == "Pepper was stopped by somebody else, so the behaviour ended."
+    assert len(link.calls) == 1
+
+
+# ---- what starts scripts
+
+
+def test_an_event_starts_its_script_each_time_it_fits(running):
+    hat = block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head")
+    run = running(workspace(stack(hat, write(text("ouch")))))
+    for data in ({"place": "head", "down": True}, {"place": "head", "down": False}, {"place": "left_hand"}):
+        run.link.happen(("Pepper", "touched"), data)
+    until(lambda: run.lines == ["ouch"])
+    run.link.happen(("Pepper", "touched"), {"place": "HEAD ", "down": True})
+    until(lambda: run.lines == ["ouch", "ouch"])
+    assert not run.runtime.finished.is_set()
+
+
+def test_messages_start_their_script_in_order_and_bring_themselves(running):
+    hat = block("events_message", TOPIC="/x")
+    name = block("messages_field", FIELD="name")
+    run = running(workspace(stack(hat, write(name), write(block("messages_message")))))
+    for who in ("Ada", "Bo"):
+        run.link.happen("/x", {"name": who})
+    until(lambda: len(run.lines) == 4)
+    assert run.lines == ["Ada", '{"name": "Ada"}', "Bo", '{"name": "Bo"}']
+
+
+def test_a_script_that_is_too_slow_for_its_messages_says_how_many_it_left_out(running):
+    link = FakeLink()
+    link.held = {"say"}
+    run = running(workspace(stack(block("events_message", TOPIC="/x"), say("Hi"))), link)
+    link.happen("/x", 0)
+    until(lambda: bool(link.calls))
+    for each in range(20):
+        link.happen("/x", each)
+    link.held.clear()
+    link.answer(link.calls[0], "succeeded")
+    link.poke()
+    until(lambda: len(link.calls) == 17)
+    until(lambda: run.lines == ["“when a message arrives on /x” was too slow: 4 of its events were left out"])
+
+
+def test_a_condition_starts_its_script_when_it_becomes_true_not_when_it_was_from_the_beginning(running):
+    low = block(
+        "values_compare",
+        A=block("messages_newest", FIELD="value", TOPIC="/level"),
+        RELATION="<",
+        B=number(20),
+    )
+    run = running(workspace(stack(block("events_becomes_true", CONDITION=low), write(text("low")))))
+    for value, lines in ((50, 0), (10, 1), (5, 1), (30, 1), (15, 2)):
+        run.link.topics["/level"] = value
+        until(lambda lines=lines: len(run.lines) == lines)
+        seen = len(run.lines)
+        # two more looks at the condition, and nothing more has happened
+        waited = [0]
+        run.runtime.scheduler.poke()
+        until(lambda waited=waited: waited.__setitem__(0, waited[0] + 1) or waited[0] > 25)
+        assert len(run.lines) == seen == lines
+
+
+def test_a_sensor_that_changes_and_one_that_passes_a_limit(running):
+    changes = block("robot_pepper_changes", ROBOT="Pepper", SENSOR="battery")
+    passes = block("robot_pepper_passes", ROBOT="Pepper", SENSOR="battery", SIDE="below", LIMIT=20)
+    run = running(workspace(stack(changes, write(text("new"))), stack(passes, write(text("low")))))
+    expected: list[str] = []
+    for value, more in (
+        (50, []),
+        (50, []),
+        (40, ["new"]),
+        (19, ["low", "new"]),
+        (18, ["new"]),
+        (30, ["new"]),
+    ):
+        run.link.happen(("Pepper", "battery"), value)
+        expected += more
+        until(lambda expected=tuple(expected): sorted(run.lines) == sorted(expected))
+
+
+def test_scripts_run_side_by_side(running):
+    link = FakeLink()
+    link.held = {"say"}
+    run = running(workspace(started(say("slow")), started(write(text("1")), write(text("2")))), link)
+    until(lambda: run.lines == ["1", "2"])
+    assert not run.runtime.finished.is_set()
+    until(lambda: bool(link.calls))
+    link.answer(link.calls[0], "succeeded")
+    run.end()
+
+
+def test_changing_a_variable_from_two_scripts_loses_nothing():
+    change = block("variables_change", VAR={"id": "n"}, BY=number(1))
+    loops = [started(block("control_repeat", TIMES=number(300), BODY=[dict(change)])) for _ in range(3)]
+    run = play(workspace(*loops, variables=("n",)))
+    assert run.runtime.error is None
+    assert run.names["n"] == 900
+
+
+# ---- control
+
+
+def test_repeat_while_if_else_and_stop():
+    count = block("variables_change", VAR={"id": "n"}, BY=number(1))
+    below = block("values_compare", A=get("n"), RELATION="<", B=number(3))
+    loop = block("control_while", MODE="while", CONDITION=below, BODY=[count])
+    choose = block(
+        "control_if_else", CONDITION=boolean(False), BODY=[write(text("no"))], OTHERWISE=[write(get("n"))]
+    )
+    run = play(workspace(started(loop, choose, block("control_stop_script")), variables=("n",)))
+    assert run.lines == ["3"]
+
+
+def test_stop_the_behaviour_ends_all_scripts():
+    forever = block("control_forever", BODY=[])
+    run = play(workspace(started(forever), started(block("control_stop_program"))))
+    assert run.runtime.error is None
+
+
+def test_an_endless_loop_of_nothing_can_be_stopped(running):
+    run = running(workspace(started(block("control_forever", "loop", BODY=[]))))
+    until(lambda: run.runtime.scheduler.snapshot().blocks == ("loop",))
+    run.stop()
+    run.end()
+
+
+def test_wait_until_takes_the_unknown_for_not_so(running):
+    value = block("messages_newest", FIELD="value", TOPIC="/level")
+    above = block("values_compare", A=value, RELATION=">", B=number(3))
+    run = running(workspace(started(block("control_wait_until", CONDITION=above), write(text("there")))))
+    until(lambda: run.runtime.scheduler.snapshot().blocks != ())
+    assert run.lines == []
+    run.link.topics["/level"] = {"value": 4}
+    run.end()
+    assert (run.lines, run.runtime.error) == (["there"], None)
+
+
+# ---- errors
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
+        (block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0)), "“÷” can't divide by 0."),
+        (block("values_compare", "v", A=text("a"), RELATION="<", B=number(0)),
+         "“is below” can't do this with a number and a text."),
+        (block("values_compare", "v", A=block("messages_newest", FIELD="x", TOPIC="/x"), RELATION="<", B=number(0)),
+         "“is below” needs a value that is not known yet."),
+        (block("values_arithmetic", "v", A=text("a"), SIGN="+", B=text("b")), "“+” needs numbers, not a text."),
+        (block("values_arithmetic", "v", A=number(-8), SIGN="**", B=number(0.5)),
+         "“to the power of” has no result for these numbers."),
+        (block("values_round", "v", HOW="round", NUMBER=text("x")), "“round” needs a number, not a text."),
+    ],
+)  # fmt: skip
+def test_an_error_inside_a_value_belongs_to_the_value(value, sentence):
+    outer = block("values_join", A=text("is "), B=value)
+    run = play(workspace(started(write(outer))))
+    assert run.runtime.error is not None
+    assert (run.runtime.error.block, run.runtime.error.sentence) == ("v", sentence)
+
+
+def test_an_error_in_a_statement_belongs_to_it():
+    wait = block("control_wait", "w", SECONDS=text("long"))
+    run = play(workspace(started(block("control_repeat", TIMES=number(1), BODY=[wait]))))
+    assert run.runtime.error is not None
+    assert (run.runtime.error.block, run.runtime.error.sentence) == (
+        "w",
+        "“wait” needs a number, not a text.",
+    )
+
+
+def test_a_pause_and_single_steps(running):
+    run = running(workspace(started(*(write(text(f"{n}")) | {"id": f"w{n}"} for n in range(3)))), paused=True)
+    scheduler = run.runtime.scheduler
+    for n in range(3):
+        until(lambda: scheduler.snapshot().paused)
+        assert scheduler.snapshot().next_block == f"w{n}"
+        assert run.lines == [f"{done}" for done in range(n)]
+        assert run.runtime.reading(f"w{n}") == f"write “{n}” to the console"
+        scheduler.step_once()
+    run.end()
+    assert run.lines == ["0", "1", "2"]

@@ -1,0 +1,239 @@
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from app.blocks.scheduler import Scheduler
+from tests.blocks.fakes import until
+
+
+class Stage:
+    """A scheduler and what its scripts did."""
+
+    def __init__(self) -> None:
+        self.scheduler = Scheduler()
+        self.did: list[str] = []
+        self.threads: list[threading.Thread] = []
+
+    def script(self, name: str, work) -> None:
+        def body() -> None:
+            self.scheduler.begin()
+            work(name)
+
+        self.threads.append(self.scheduler.start(name, body))
+
+    def steps(self, *blocks: str):
+        def work(_name: str) -> None:
+            for block in blocks:
+                self.scheduler.step(block)
+                self.did.append(block)
+
+        return work
+
+    def join(self) -> None:
+        for thread in self.threads:
+            thread.join(10)
+            assert not thread.is_alive()
+
+
+@pytest.fixture
+def stage():
+    made = Stage()
+    yield made
+    made.scheduler.stop()
+    made.join()
+
+
+def test_scripts_take_turns_block_by_block(stage):
+    stage.scheduler.pause()  # so that all are there before one begins
+    stage.script("a", stage.steps("a1", "a2", "a3"))
+    until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
+    stage.script("b", stage.steps("b1", "b2", "b3"))
+    until(lambda: stage.scheduler.snapshot().blocks == ("a1", "b1"))
+    stage.scheduler.go_on()
+    stage.join()
+    assert stage.did == ["a1", "b1", "a2", "b2", "a3", "b3"]
+
+
+def test_only_the_script_with_the_turn_runs(stage):
+    inside, most = [0], [0]
+
+    def work(_name: str) -> None:
+        for _ in range(200):
+            stage.scheduler.step("x")
+            inside[0] += 1
+            most[0] = max(most[0], inside[0])
+            sum(range(50))
+            inside[0] -= 1
+
+    for name in "abc":
+        stage.script(name, work)
+    stage.join()
+    assert most == [1]
+
+
+def test_a_pause_holds_each_script_before_its_next_block(stage):
+    stage.scheduler.pause()
+    stage.script("a", stage.steps("a1", "a2"))
+    until(lambda: stage.scheduler.snapshot().paused)
+    snapshot = stage.scheduler.snapshot()
+    assert (snapshot.next_block, snapshot.paused, stage.did) == ("a1", True, [])
+    stage.scheduler.step_once()
+    until(lambda: stage.scheduler.snapshot().paused and stage.did == ["a1"])
+    assert stage.scheduler.snapshot().next_block == "a2"
+    stage.scheduler.step_once()
+    stage.join()
+    assert stage.did == ["a1", "a2"]
+
+
+def test_a_step_runs_one_block_of_the_script_that_waited_longest(stage):
+    stage.scheduler.pause()
+    stage.script("a", stage.steps("a1", "a2"))
+    until(lambda: "a1" in stage.scheduler.snapshot().blocks and stage.scheduler.snapshot().paused)
+    stage.script("b", stage.steps("b1", "b2"))
+    until(lambda: len(stage.scheduler.snapshot().blocks) == 2 and stage.scheduler.snapshot().paused)
+    for expected in (["a1"], ["a1", "b1"], ["a1", "b1", "a2"]):
+        stage.scheduler.step_once()
+        until(lambda expected=expected: stage.did == expected and stage.scheduler.snapshot().paused)
+
+
+def test_the_clock_of_a_wait_stands_while_paused(stage):
+    def work(_name: str) -> None:
+        stage.scheduler.step("wait")
+        stage.scheduler.wait(0.05)
+        stage.did.append("waited")
+
+    stage.scheduler.pause()
+    stage.script("a", work)
+    until(lambda: stage.scheduler.snapshot().next_block == "wait" and stage.scheduler.snapshot().paused)
+    stage.scheduler.go_on()
+    stage.scheduler.pause()
+    threading.Event().wait(0.15)
+    assert stage.did == []
+    assert stage.scheduler.snapshot().paused
+    stage.scheduler.go_on()
+    stage.join()
+    assert stage.did == ["waited"]
+
+
+def test_a_step_lets_a_wait_go_to_its_end(stage):
+    def work(_name: str) -> None:
+        stage.scheduler.step("wait")
+        stage.scheduler.wait(0.03)
+        stage.did.append("waited")
+        stage.scheduler.step("next")
+        stage.did.append("next")
+
+    stage.scheduler.pause()
+    stage.script("a", work)
+    until(lambda: stage.scheduler.snapshot().paused)
+    stage.scheduler.step_once()
+    until(lambda: stage.scheduler.snapshot().next_block == "next" and stage.scheduler.snapshot().paused)
+    assert stage.did == ["waited"]
+
+
+def test_a_step_in_the_middle_of_a_wait_ends_the_wait(stage):
+    def work(_name: str) -> None:
+        stage.scheduler.step("wait")
+        stage.scheduler.wait(0.1)
+        stage.did.append("waited")
+        stage.scheduler.step("next")
+
+    stage.script("a", work)
+    until(lambda: stage.scheduler.snapshot().blocks == ("wait",))
+    stage.scheduler.pause()
+    until(lambda: stage.scheduler.snapshot().paused)
+    assert stage.scheduler.snapshot().next_block == "wait"
+    stage.scheduler.step_once()
+    until(lambda: stage.scheduler.snapshot().next_block == "next" and stage.scheduler.snapshot().paused)
+    assert stage.did == ["waited"]
+
+
+def test_others_run_while_one_waits(stage):
+    done = threading.Event()
+
+    def work(_name: str) -> None:
+        assert stage.scheduler.wait_until(done.is_set, None)
+        stage.did.append("waited")
+
+    stage.script("a", work)
+    stage.script("b", stage.steps("b1", "b2"))
+    until(lambda: stage.did == ["b1", "b2"])
+    done.set()
+    stage.join()
+    assert stage.did == ["b1", "b2", "waited"]
+
+
+def test_a_wait_with_a_limit_gives_up(stage):
+    found = []
+    stage.script("a", lambda _: found.append(stage.scheduler.wait_until(lambda: False, 0.03)))
+    stage.join()
+    assert found == [False]
+
+
+def test_another_thread_ends_a_wait_with_a_poke(stage):
+    arrived = []
+
+    def work(_name: str) -> None:
+        assert stage.scheduler.wait_for(lambda: bool(arrived), 10)
+        stage.did.append("got it")
+
+    stage.script("a", work)
+    until(lambda: not stage.scheduler.snapshot().paused)
+    arrived.append(1)
+    stage.scheduler.poke()
+    stage.join()
+    assert stage.did == ["got it"]
+
+
+def test_a_pause_is_not_reached_while_a_robot_still_moves(stage):
+    answered = []
+
+    def work(_name: str) -> None:
+        stage.scheduler.step("move")
+        stage.scheduler.wait_for(lambda: bool(answered), 10)
+        stage.scheduler.step("next")
+
+    stage.script("a", work)
+    until(lambda: stage.scheduler.snapshot().blocks == ("move",))
+    stage.scheduler.pause()
+    assert not stage.scheduler.snapshot().paused
+    answered.append(1)
+    stage.scheduler.poke()
+    until(lambda: stage.scheduler.snapshot().paused)
+    assert stage.scheduler.snapshot().next_block == "next"
+
+
+@pytest.mark.parametrize("where", ["step", "wait", "wait_until", "wait_for", "idle"])
+def test_stop_ends_a_script_wherever_it_is(stage, where):
+    def work(_name: str) -> None:
+        while True:
+            stage.did.append("here")
+            if where == "step":
+                stage.scheduler.step("x")
+            elif where == "wait":
+                stage.scheduler.wait(60)
+            elif where == "wait_until":
+                stage.scheduler.wait_until(lambda: False, None)
+            else:
+                stage.scheduler.wait_for(lambda: False, 60, idle=where == "idle")
+
+    stage.script("a", work)
+    until(lambda: bool(stage.did))
+    stage.scheduler.stop()
+    stage.join()
+
+
+def test_a_script_ends_in_a_pause_too(stage):
+    stage.scheduler.pause()
+    stage.script("a", stage.steps("a1"))
+    until(lambda: stage.scheduler.snapshot().paused)
+    stage.scheduler.stop()
+    stage.join()
+    assert stage.did == []
+
+
+def test_who_is_no_script_is_told(stage):
+    with pytest.raises(RuntimeError, match="only a script"):
+        stage.scheduler.step("x")
