@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPixmap
 
@@ -14,9 +16,9 @@ BUBBLE_LINES = 4
 
 # What a preview shows while no robot has told its state.
 PREVIEW = RobotState(
-    x=0.58,
+    x=0.05,
     arm_left_deg=124.0,
-    objects=(Thing("ball", 0.35, -1.65), Thing("table", -0.13, 1.95)),
+    objects=(Thing("ball", 0.1, -1.65), Thing("table", -0.85, 1.95)),
 )
 
 
@@ -39,11 +41,11 @@ class RobotDrawing:
         painter.translate(stage.origin)
         painter.scale(stage.scale, stage.scale)
         robot = stage.spot(state.x, state.y)
-        things = sorted(((stage.spot(t.x, t.y), t) for t in state.objects), key=lambda pair: pair[0].v)
+        things = _placed(stage, state)
         _paint_reach(painter, robot, state)
         for spot, thing in _in_order(things, robot):
             if thing is not None:
-                paint_thing(painter, thing, spot)
+                paint_thing(painter, thing, spot, self._font)
                 continue
             painter.save()
             painter.translate(robot.u, robot.v)
@@ -57,7 +59,7 @@ class RobotDrawing:
             painter.fillRect(area, QColor(0, 0, 12, 34))
 
     def part_at(self, point: QPointF, area: QRectF, state: RobotState) -> str | None:
-        """What is at a pixel: ``head``, ``left_hand``, ``right_hand``, the kind of an object, or None."""
+        """What is at a pixel: ``head``, ``left_hand``, ``right_hand``, an object's name, or None."""
         stage = Stage(area, state.room)
         unit = stage.unit(point)
         robot = stage.spot(state.x, state.y)
@@ -67,9 +69,9 @@ class RobotDrawing:
                 return f"{limb.side}_hand"
         if _near(own, HEAD, 36.0):
             return "head"
-        for thing in reversed(state.objects):
-            if thing_area(thing, stage.spot(thing.x, thing.y)).adjusted(-3, -3, 3, 3).contains(unit):
-                return thing.kind
+        for spot, thing in reversed(_placed(stage, state)):
+            if thing_area(thing, spot).adjusted(-3, -3, 3, 3).contains(unit):
+                return thing.name or thing.kind
         return None
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
@@ -84,9 +86,9 @@ class RobotDrawing:
         if part in own:
             unit = QPointF(robot.u, robot.v) + own[part] * robot.scale
             return stage.origin + unit * stage.scale
-        for thing in state.objects:
-            if thing.kind == part:
-                centre = thing_area(thing, stage.spot(thing.x, thing.y)).center()
+        for spot, thing in _placed(stage, state):
+            if part in {thing.name, thing.kind}:
+                centre = thing_area(thing, spot).center()
                 return stage.origin + centre * stage.scale
         return None
 
@@ -140,6 +142,16 @@ class RobotDrawing:
         for number, line in enumerate(lines):
             at = QRectF(box.left(), box.top() + 9 + number * line_height, width, line_height)
             painter.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
+
+
+def _placed(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
+    """All objects with their places, what is far first; people before the robot as marks on the floor."""
+    placed = []
+    for thing in state.objects:
+        before = thing.kind in {"person", "face"} and thing.x > state.x
+        shown = replace(thing, kind="place") if before else thing
+        placed.append((stage.spot(thing.x, thing.y), shown))
+    return sorted(placed, key=lambda pair: pair[0].v)
 
 
 def _in_order(things: list[tuple[Spot, Thing]], robot: Spot) -> list[tuple[Spot, Thing | None]]:

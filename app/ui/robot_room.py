@@ -9,14 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPath, QPen, QPolygonF
+from PySide6.QtGui import QBrush, QColor, QFont, QLinearGradient, QPainter, QPainterPath, QPen, QPolygonF
 
 from app.ui.robot_state import Room, Thing
 
 WIDTH, HEIGHT = 382.0, 286.0
 HORIZON, WALL_FOOT, FLOOR_TOP = 91.0, 157.0, 162.8
+BACK, FRONT = 178.0, 280.0  # where things stand at the far wall and nearest to the person
 START = 250.6 - HORIZON  # where the robot of the design stands: scale 1
-BALL_M, CARD_M = 0.11, 0.30
+BALL_M, CARD_M = 0.14, 0.30
 UNITS_PER_M = 150.0
 
 
@@ -62,27 +63,33 @@ class Stage:
         return (point - self.origin) / self.scale
 
     def spot(self, x: float, y: float) -> Spot:
-        """Where the floor point (m) is seen; points outside the room are drawn at its edge."""
+        """Where the floor point (m) is seen; points outside the room are drawn at its edge.
+
+        No camera sees like this: what is far is drawn nearer than it would be, so the robot stays large.
+        """
         room = self.room
-        t = _clamp((x - room.x_min) / (room.x_max - room.x_min), 0.0, 1.0)
-        v = 176.0 + 157.0 * t - 54.0 * t * t
+        depth = _clamp((x - room.x_min) / (room.x_max - room.x_min), 0.0, 1.0)
+        v = BACK + (FRONT - BACK) * depth**0.5
         scale = (v - HORIZON) / START
         side = 2 * _clamp((y - room.y_min) / (room.y_max - room.y_min), 0.0, 1.0) - 1
-        return Spot(WIDTH / 2 + side * (70.0 + 96.0 * scale), v, scale)
+        return Spot(WIDTH / 2 + side * _reach(scale), v, scale)
 
     def floor(self, point: QPointF) -> tuple[float, float]:
         """The floor point (m) seen at a pixel; always inside the room."""
         unit = self.unit(point)
         room = self.room
-        # The inverse of v(t) above: 54 t² - 157 t + (v - 176) = 0, the root that lies in [0, 1].
-        root = max(0.0, 157.0**2 - 4 * 54.0 * (unit.y() - 176.0))
-        t = _clamp((157.0 - root**0.5) / 108.0, 0.0, 1.0)
-        scale = (176.0 + 157.0 * t - 54.0 * t * t - HORIZON) / START
-        side = _clamp((unit.x() - WIDTH / 2) / (70.0 + 96.0 * scale), -1.0, 1.0)
+        share = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
+        scale = (BACK + (FRONT - BACK) * share - HORIZON) / START
+        side = _clamp((unit.x() - WIDTH / 2) / _reach(scale), -1.0, 1.0)
         return (
-            room.x_min + t * (room.x_max - room.x_min),
+            room.x_min + share**2 * (room.x_max - room.x_min),
             room.y_min + (side + 1) / 2 * (room.y_max - room.y_min),
         )
+
+
+def _reach(scale: float) -> float:
+    """How far from the middle the side walls are, in units, where things have this scale."""
+    return 70.0 + 96.0 * scale
 
 
 def _clamp(value: float, low: float, high: float) -> float:
@@ -176,8 +183,10 @@ def _table(p: QPainter, spot: Spot) -> None:
 
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
     """Where a thing is seen, in stage units."""
+    if thing.kind == "place":
+        return QRectF(spot.u - 30 * spot.scale, spot.v - 8 * spot.scale, 60 * spot.scale, 16 * spot.scale)
     if thing.kind == "ball":
-        r = max(4.0, (thing.size_m or BALL_M) * UNITS_PER_M * spot.scale)
+        r = max(4.0, (thing.size_m or BALL_M) * 110.0 * spot.scale)
         return QRectF(spot.u - r, spot.v - 2 * r + r * 0.08, 2 * r, 2 * r)
     if thing.kind == "table":
         share = spot.scale / TABLE.scale
@@ -186,8 +195,8 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
     return QRectF(spot.u - wide / 2, spot.v - 78 * spot.scale - wide * 0.6, wide, wide * 1.2)
 
 
-def paint_thing(p: QPainter, thing: Thing, spot: Spot) -> None:
-    """A ball, or a card on a stand (a face, a marker, anything else as a plain card)."""
+def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
+    """A ball, a table, a place with its name, or a card on a stand (a face, a marker, a shelf)."""
     area = thing_area(thing, spot)
     p.setPen(Qt.PenStyle.NoPen)
     if thing.kind == "table":
@@ -195,6 +204,9 @@ def paint_thing(p: QPainter, thing: Thing, spot: Spot) -> None:
         return
     if thing.kind == "ball":
         _ball(p, area, QColor(thing.colour or "#D8403F"))
+        return
+    if thing.kind == "place":
+        _place(p, area, thing.name, font)
         return
     p.setBrush(QColor(60, 40, 20, 70))
     p.drawEllipse(QPointF(spot.u, spot.v), area.width() * 0.34, area.width() * 0.08)
@@ -221,6 +233,19 @@ def _ball(p: QPainter, area: QRectF, colour: QColor) -> None:
     p.setPen(shine)
     inner = area.adjusted(r * 0.18, r * 0.18, -r * 0.18, -r * 0.18)
     p.drawArc(inner, 50 * 16, 92 * 16)
+
+
+def _place(p: QPainter, area: QRectF, name: str, font: QFont) -> None:
+    """Somebody who stands between the robot and the person at the screen: only a mark on the floor."""
+    p.setPen(QPen(QColor(63, 124, 179, 210), 1.4))
+    p.setBrush(QColor(63, 124, 179, 70))
+    p.drawEllipse(area)
+    words = QFont(font)
+    words.setPixelSize(10)
+    words.setWeight(QFont.Weight.DemiBold)
+    p.setFont(words)
+    p.setPen(QColor("#1F4468"))
+    p.drawText(area, int(Qt.AlignmentFlag.AlignCenter), name)
 
 
 def _face_card(p: QPainter, area: QRectF) -> None:

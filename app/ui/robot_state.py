@@ -121,6 +121,9 @@ def _thing(one: Mapping[str, object]) -> Thing:
 def _room(value: object) -> Room:
     if not isinstance(value, Mapping):
         return Room()
+    if "x_min" in value and "y_min" in value:
+        sides = [_number(value.get(side)) for side in ("x_min", "x_max", "y_min", "y_max")]
+        return Room(*sides) if sides[1] - sides[0] > 0.1 and sides[3] - sides[2] > 0.1 else Room()
     wide = _number(value.get("width"), 6.0)
     deep = _number(value.get("depth"), 5.0)
     return Room(-wide / 2, wide / 2, -deep / 2, deep / 2) if min(wide, deep) > 0.1 else Room()

@@ -1,6 +1,7 @@
-"""A virtual table made from `Column` descriptions: thousands of rows, one signal a refresh, no widgets in cells.
+"""A virtual table made from `Column` descriptions: one signal a refresh, no widgets in cells.
 
-Rows are filtered and sorted in Python lists, never by a proxy; figures are asked for only while they are seen.
+Rows are filtered and sorted in Python lists, never by a proxy; figures are asked for only while they
+are seen.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _ROOT = QModelIndex()
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one cell shows. ``role`` is the colour's role in the theme, ``chip`` a state word behind the text."""
+    """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text."""
 
     text: str = ""
     icon: str | None = None
@@ -35,8 +36,8 @@ class Cell:
 class Column(Generic[Row]):
     """One column: its head, its width, and what it shows of a row.
 
-    ``key`` gives what it is sorted by (None at the end, whatever the direction); without it the column can't be
-    sorted. ``stretch`` takes the width that is left. ``tip`` is the tooltip's sentence.
+    ``key`` gives what it is sorted by (None at the end, whatever the direction); without it the column
+    can't be sorted. ``stretch`` takes the width that is left. ``tip`` is the tooltip's sentence.
     """
 
     name: str

@@ -268,7 +268,7 @@ class TreeModel(QAbstractItemModel):
 
 
 def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tuple[str | int, ...]]:
-    """Where a key or a value has these words (any case), in the order of the tree; looks at ``limit`` values."""
+    """Where a key or a value has these words (any case), in the tree's order, among ``limit`` values."""
     wanted = words.casefold()
     waiting: list[tuple[tuple[str | int, ...], object]] = [((), value)]
     for _ in range(limit):

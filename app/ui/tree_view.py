@@ -1,4 +1,4 @@
-"""How the inspector's tree looks: key left, value right in mono, what changed with a bar and a tint that fade."""
+"""How the inspector's tree looks: key left, value right, what changed with a bar and a tint that fade."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class _Height(QStyledItemDelegate):
         super().__init__(view)
         self._view = view
 
-    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
+    def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
         return QSize(80, self._view.row_height)
 
 
@@ -78,7 +78,7 @@ class TreeView(QTreeView):
         changed = self._tree.changed_at_s
         return changed is not None and self._clock() - changed < 1.2
 
-    def drawBranches(self, painter: QPainter, rect: QRect, index: Index) -> None:
+    def drawBranches(self, _painter: QPainter, _rect: QRect, _index: Index) -> None:
         return
 
     def drawRow(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:

@@ -1,0 +1,115 @@
+"""Alerts: all present problems of the network and the robots, each with its next step."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
+
+from app.ui.icons import paint_icon
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.theme import Theme
+from app.ui.widgets import Button, Chip, EmptyState, label, paint
+from app.ui.words import grouped
+
+if TYPE_CHECKING:
+    from app.core.alerts import Alert
+
+BORDERS = {"error": "errorBorder", "warn": "warnBorder", "info": "borderStrong"}
+
+
+class AlertRow(QWidget):
+    """One alert: what is wrong in bold, what it means, since when, its next step."""
+
+    def __init__(self, theme: Theme, alert: Alert) -> None:
+        super().__init__()
+        self._theme, self.alert = theme, alert
+        title = label(alert.title, "title", wrap=True)
+        detail = label(alert.detail, "body", role="textSecondary", wrap=True)
+        detail.setVisible(bool(alert.detail))
+        clock = time.localtime(alert.since_s)
+        since = f"since {clock.tm_hour}:{clock.tm_min:02d}"
+        if alert.count > 1:
+            since += f", {grouped(alert.count)} times"
+        words = QVBoxLayout()
+        words.setSpacing(2)
+        for line in (title, detail, label(since, "small", role="textTertiary")):
+            words.addWidget(line)
+        self.button = Button(theme, alert.button or "", size="small")
+        self.button.setVisible(bool(alert.button))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(40, 10, 12, 10)
+        row.setSpacing(10)
+        row.addLayout(words, 1)
+        row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignVCenter)
+        self.setAccessibleName(f"{alert.severity}: {alert.title} {alert.detail}".strip())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        status = theme.status(self.alert.severity)
+        edge = theme.colour(BORDERS[self.alert.severity])
+        paint.box(
+            painter, QRectF(self.rect()), theme.radius("panel"), theme.colour(status.tint or "panel"), edge
+        )
+        paint_icon(painter, QRectF(12, 11, 18, 18), status.icon, theme.colour(status.colour))
+        painter.end()
+
+
+class AlertsPanel(PanelWidget):
+    """Everything that is wrong now, the worst first."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Alerts")
+        self._seen = -1
+        self.rows: list[AlertRow] = []
+        self.chip = Chip(self.theme)
+        self.chips = [self.chip]
+        inside = QWidget()
+        inside.setProperty("bare", "true")
+        self._column = QVBoxLayout(inside)
+        self._column.setContentsMargins(8, 8, 8, 8)
+        self._column.setSpacing(6)
+        self._column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(inside)
+        self.empty = EmptyState(
+            self.theme, "circle-check", "All is well", "What goes wrong appears here, with its next step."
+        )
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(scroll)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+
+    def refresh(self) -> None:
+        alerts = self.session.alerts
+        if alerts.revision == self._seen:
+            return
+        self._seen = alerts.revision
+        active = list(alerts.active)
+        if active != [row.alert for row in self.rows]:
+            self._show(active)
+
+    def _show(self, active: list[Alert]) -> None:
+        for row in self.rows:
+            self._column.removeWidget(row)
+            row.deleteLater()
+        self.rows = [AlertRow(self.theme, alert) for alert in active]
+        for place, row in enumerate(self.rows):
+            if row.alert.action is not None:
+                row.button.clicked.connect(
+                    lambda _on=False, action=row.alert.action: self.context.run(action)
+                )
+            self._column.insertWidget(place, row)
+        self.pages.setCurrentIndex(1 if active else 0)
+        self.chip.set(str(len(active)) if active else "", active[0].severity if active else "ok")
+
+
+PANEL = Panel("alerts", "Alerts", "bell", (), AlertsPanel)

@@ -1,0 +1,90 @@
+"""Camera: what the robot sees, with boxes around what it recognises."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
+
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.picture_view import PictureView, rate_sentence
+from app.ui.robot_boxes import boxes_on, camera_of
+from app.ui.widgets import EmptyAction, EmptyState, label
+
+if TYPE_CHECKING:
+    from app.core.images import ImageStream
+    from app.core.robot_link import RobotLink
+    from app.core.watches import Watch
+
+
+class CameraPanel(PanelWidget):
+    """The camera of the first robot that has one."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Camera")
+        self._robot = ""
+        self._topic = ""
+        self._stream: ImageStream | None = None
+        self._watch: Watch | None = None
+        self._revision = -1
+        self.rate = label("", "body", role="textSecondary")
+        self.header = [self.rate]
+        self.view = PictureView(self.theme, fill=True, labelled=False)
+        self.view.setAccessibleName("What the robot sees")
+        self.empty = EmptyState(
+            self.theme,
+            "camera",
+            "No pictures yet",
+            "Pictures appear here as soon as a robot with a camera is there.",
+        )
+        self.empty.set_actions(
+            [EmptyAction("Use the virtual robot", lambda: context.run("robots.virtual"), "bot")]
+        )
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(self.view)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+
+    def refresh(self) -> None:
+        fleet = self.session.fleet
+        if fleet.revision != self._revision:
+            self._revision = fleet.revision
+            self._choose(next((link for link in fleet.connected if camera_of(link) is not None), None))
+        link = fleet.link(self._robot) if self._robot else None
+        if self._stream is None or link is None:
+            return
+        self.view.take(self._stream, boxes_on(link, self._topic))
+        silent = self._stream.silent_s
+        sentence = rate_sentence(self._stream.shown_hz, self._stream.arriving_hz)
+        self.rate.setText("" if silent is not None and silent > 2 else sentence)
+        if self._stream.picture is not None:
+            self.pages.setCurrentWidget(self.view)
+
+    def _choose(self, link: RobotLink | None) -> None:
+        camera = camera_of(link) if link is not None else None
+        if link is None or camera is None:
+            return  # the last picture of a robot that has gone stays, grey
+        if (link.name, camera.topic) == (self._robot, self._topic) and self._stream is not None:
+            return
+        self.shut()
+        self._robot, self._topic = link.name, camera.topic
+        self._stream = self.session.images.stream(camera.topic)
+        self._watch = self.session.fleet.look_at(link.name)
+        self.view.clear()
+        self.set_title("Camera", camera.topic)
+        self.empty.say("No pictures yet", f"The next picture of {link.name} appears here.")
+        self.empty.set_actions([])
+        self.pages.setCurrentWidget(self.empty)
+
+    def shut(self) -> None:
+        if self._stream is not None:
+            self._stream.close()
+        if self._watch is not None:
+            self._watch.close()
+        self._stream = self._watch = None
+        self._revision = -1
+
+
+PANEL = Panel("camera", "Camera", "camera", (), CameraPanel)

@@ -1,0 +1,177 @@
+"""Problems: what a person should mend in the behaviour before Run; checked while it is built."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QScrollArea,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.ui.action_card import Tile
+from app.ui.icons import paint_icon
+from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.rich_line import BoldInLine, is_pressed_key
+from app.ui.theme import Theme
+from app.ui.widgets import Button, Chip, label, paint
+
+if TYPE_CHECKING:
+    from app.blocks import Problem
+
+STATUS = {"error": "error", "warning": "warn", "info": "info"}
+NOTHING = "Nothing to mend.\nProblems appear here while you build."
+
+
+class StatusIcon(QWidget):
+    """The icon of a status, with its word for those who can't see it."""
+
+    def __init__(self, theme: Theme, status: str) -> None:
+        super().__init__()
+        self._theme, self._status = theme, status
+        self.setFixedSize(18, 18)
+        self.setAccessibleName({"warn": "warning"}.get(status, status))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        status = self._theme.status(self._status)
+        role = "text" if self._status == "info" else status.colour
+        painter = QPainter(self)
+        paint_icon(painter, QRectF(self.rect()), status.icon, self._theme.colour(role))
+        painter.end()
+
+
+class ProblemRow(QWidget):
+    """Icon, the block's tile, the sentence with its subject in bold, and what mends it."""
+
+    pressed = Signal(str)
+    mend = Signal(str)
+
+    def __init__(self, theme: Theme, problem: Problem, *, large: bool) -> None:
+        super().__init__()
+        self._theme, self.problem, self._large = theme, problem, large
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(f"{problem.severity}: {problem.sentence}")
+        self.setProperty("focusRadius", theme.radius("small"))
+        if problem.block_id:
+            self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+            self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(14, 0, 8, 0)
+        row.setSpacing(10)
+        row.addWidget(StatusIcon(theme, STATUS[problem.severity]))
+        category = problem.category or "values"
+        icon = problem.icon or theme.block_icon(category)
+        if problem.category:
+            row.addWidget(Tile(theme, icon, category, 22))
+        kind = "bodyLarge" if large else "body"
+        row.addWidget(BoldInLine(theme, problem.sentence, problem.subject, kind), 1)
+        self.button = Button(theme, problem.mend or "", size="small")
+        self.button.setVisible(bool(problem.mend))
+        self.button.clicked.connect(lambda: self.mend.emit(problem.mend_action or ""))
+        row.addWidget(self.button)
+
+    def sizeHint(self) -> QSize:
+        size = "comfortable" if self._large else "compact"
+        return QSize(300, max(round(self._theme.scaled(self._theme.size("row", size))), 30))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and self.rect().contains(event.position().toPoint()):
+            self._press()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if is_pressed_key(event.key()):
+            self._press()
+        else:
+            super().keyPressEvent(event)
+
+    def _press(self) -> None:
+        if self.problem.block_id:
+            self.pressed.emit(self.problem.block_id)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self.problem.block_id and self.underMouse():
+            painter = QPainter(self)
+            rect = QRectF(self.rect()).adjusted(4, 1, -4, -1)
+            paint.box(painter, rect, self._theme.radius("small"), self._theme.colour("hover"))
+            painter.end()
+
+
+class ProblemsPanel(PanelWidget):
+    """The problems of the behaviour that is open, and how many they are."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Problems")
+        self._seen: tuple[object, ...] = ()
+        self._found: tuple[Problem, ...] | None = None
+        self.rows: list[ProblemRow] = []
+        self.chip = Chip(self.theme)
+        self.chips = [self.chip]
+        self.checked = label("Checked while you build", "body", role="textSecondary")
+        self.header = [self.checked]
+        inside = QWidget()
+        inside.setProperty("bare", "true")
+        self._column = QVBoxLayout(inside)
+        self._column.setContentsMargins(0, 4, 0, 4)
+        self._column.setSpacing(0)
+        self._column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(inside)
+        self.nothing = label(NOTHING, "bodyLarge", role="textSecondary", wrap=True)
+        self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.nothing)
+        self.pages.addWidget(scroll)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+
+    def refresh(self) -> None:
+        document = self.session.document
+        now = (document.revision, document.edits, document.definitions_revision)
+        if now == self._seen:
+            return
+        self._seen = now
+        found = document.problems()
+        if found != self._found:
+            self._found = found
+            self._show(found)
+
+    def _show(self, found: tuple[Problem, ...]) -> None:
+        for row in self.rows:
+            self._column.removeWidget(row)
+            row.deleteLater()
+        self.rows = []
+        for place, problem in enumerate(found):
+            row = ProblemRow(self.theme, problem, large=self.density == "comfortable")
+            row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
+            row.mend.connect(self.context.run)
+            self.rows.append(row)
+            self._column.insertWidget(place, row)
+        self.pages.setCurrentIndex(1 if found else 0)
+        worst = next(
+            (kind for kind in ("error", "warning") if any(p.severity == kind for p in found)), "info"
+        )
+        if found:
+            self.chip.set(str(len(found)), STATUS[worst])
+            self.chip.setAccessibleName(f"{len(found)} problems")
+        else:
+            self.chip.set("none", "ok")
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        if self._found is not None:
+            self._show(self._found)
+
+
+PANEL = Panel("problems", "Problems", "triangle-alert", (), ProblemsPanel)

@@ -1,0 +1,195 @@
+"""Robot: a virtual robot in its room, drawn from its state; touch it, drag the ball."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.robot_drawing import RobotDrawing
+from app.ui.robot_state import RobotState
+from app.ui.theme import Theme
+from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
+
+if TYPE_CHECKING:
+    from app.core.robot_link import RobotLink
+    from app.core.watches import Watch
+
+TOUCHABLE = ("head", "left_hand", "right_hand")
+STATUS = {"ready": "ok", "busy": "running", "silent": "warn", "away": "off"}
+KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
+
+
+class RoomView(QWidget):
+    """The drawing. A press on head or hands touches them; the ball and people can be dragged."""
+
+    touched = Signal(str, bool)  # part, down
+    moved = Signal(str, float, float)  # what, x, y in m
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._drawing = RobotDrawing(theme.font("label"))
+        self._data: Mapping[str, object] | None = None
+        self.state = RobotState()
+        self._pressed: str | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(160, 120)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setToolTip("Press its head or a hand to touch it; drag the ball")
+        theme.changed.connect(self.update)
+
+    def show_state(self, data: Mapping[str, object]) -> None:
+        """Draw this state; the same one again costs nothing."""
+        if data is self._data:
+            return
+        self._data = data
+        state = RobotState.parse(data)
+        if state != self.state:
+            self.state = state
+            self.setAccessibleDescription(state.speech or "")
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(382, 286)
+
+    def place_of(self, part: str) -> QPointF | None:
+        """Where a part is in the view; for tests and tools."""
+        return self._drawing.place_of(part, QRectF(self.rect()), self.state)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        self._drawing.paint(painter, QRectF(self.rect()), self.state, dark=self._theme.dark)
+        painter.end()
+
+    def _at(self, position: QPointF) -> str | None:
+        return self._drawing.part_at(position, QRectF(self.rect()), self.state)
+
+    def _movable(self, part: str | None) -> bool:
+        return any(
+            part in {thing.name, thing.kind} and thing.kind in {"ball", "person"}
+            for thing in self.state.objects
+        )
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._pressed = self._at(event.position()) if event.button() == Qt.MouseButton.LeftButton else None
+        if self._pressed in TOUCHABLE:
+            self.touched.emit(self._pressed, True)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._pressed is not None and self._movable(self._pressed):
+            x, y = self._drawing.floor_at(event.position(), QRectF(self.rect()), self.state)
+            self.moved.emit(self._pressed, x, y)
+        elif self._pressed is None:
+            part = self._at(event.position())
+            hand = Qt.CursorShape.PointingHandCursor if part in TOUCHABLE else Qt.CursorShape.OpenHandCursor
+            self.setCursor(hand if part in TOUCHABLE or self._movable(part) else Qt.CursorShape.ArrowCursor)
+
+    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
+        if self._pressed in TOUCHABLE:
+            self.touched.emit(self._pressed, False)
+        self._pressed = None
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        self._key(event, down=True)
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        self._key(event, down=False)
+
+    def _key(self, event: QKeyEvent, *, down: bool) -> None:
+        part = KEYS.get(Qt.Key(event.key())) if event.modifiers() == Qt.KeyboardModifier.NoModifier else None
+        if part is None:
+            event.ignore()
+        elif not event.isAutoRepeat():
+            self.touched.emit(part, down)
+
+
+class RobotPanel(PanelWidget):
+    """The first virtual robot; its name is the title."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Robot")
+        self._robot = ""
+        self._revision = -1
+        self._watch: Watch | None = None
+        self.chip = Chip(self.theme)
+        self.reset = IconButton(self.theme, "rotate-cw", "Put the robot and its room back", size=30)
+        self.reset.clicked.connect(lambda: self._change({"reset": True}))
+        self.reset.setVisible(False)
+        self.chips = [self.chip]
+        self.header = [self.reset]
+        self.view = RoomView(self.theme)
+        self.view.setAccessibleName("The robot in its room")
+        self.view.touched.connect(lambda part, down: self._change({"touch": part, "down": down}))
+        self.view.moved.connect(
+            lambda what, x, y: self._change({"move": what, "x": round(x, 3), "y": round(y, 3)})
+        )
+        self.empty = EmptyState(theme=self.theme, icon="bot", title="", text="")
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(self.view)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+        self._say_nothing(None)
+
+    def refresh(self) -> None:
+        fleet = self.session.fleet
+        if fleet.revision != self._revision:
+            self._revision = fleet.revision
+            there = list(fleet.connected)
+            first = next((link for link in there if link.virtual), there[0] if there else None)
+            self._choose(first if first is not None else fleet.link(self._robot))
+        link = fleet.link(self._robot) if self._robot else None
+        if link is None:
+            return
+        self.chip.set(link.chip, STATUS.get(link.state, "ok"))
+        if link.drawing is not None:
+            self.view.show_state(link.drawing)
+            self.pages.setCurrentWidget(self.view)
+
+    def _choose(self, link: RobotLink | None) -> None:
+        if link is None or link.name == self._robot:
+            return
+        self.shut()
+        self._robot, self._revision = link.name, self.session.fleet.revision
+        self._watch = self.session.fleet.look_at(link.name)
+        self.set_title(link.name)
+        self.reset.setVisible(link.virtual)
+        self._say_nothing(link)
+
+    def _say_nothing(self, link: RobotLink | None) -> None:
+        self.pages.setCurrentWidget(self.empty)
+        if link is None:
+            self.empty.say(
+                "No robot is connected", "With the virtual robot you can try everything at once.", "bot"
+            )
+            start = EmptyAction(
+                "Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot", primary=True
+            )
+            self.empty.set_actions([start])
+        elif link.virtual:
+            self.empty.say(f"{link.name} is coming", "It is drawn as soon as it tells where it is.")
+            self.empty.set_actions([])
+        else:
+            self.empty.say(link.name, "Its camera and its sensors show how it is.")
+            show = EmptyAction("Show its actions", lambda: self.context.run("panel.robots"), "bot")
+            self.empty.set_actions([show])
+
+    def _change(self, change: Mapping[str, object]) -> None:
+        if self._robot:
+            self.session.fleet.world(self._robot, change)
+
+    def shut(self) -> None:
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
+
+
+PANEL = Panel("robot", "Robot", "bot", (), RobotPanel)

@@ -1,0 +1,318 @@
+"""Robots: what each robot can do, as forms that can be tried at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QFrame,
+    QHBoxLayout,
+    QScrollArea,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.errors import AppError, RobotInputError
+from app.ui.action_card import ActionCard
+from app.ui.icons import paint_icon
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.theme import Theme
+from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Line, SearchField, label, paint
+from app.ui.words import plural
+
+if TYPE_CHECKING:
+    from app.core.robot_link import RobotLink
+    from app.core.watches import Watch
+
+STATUS = {"ready": "ok", "busy": "running", "silent": "warn", "away": "off"}
+UNFOLDED = 4
+LIST_FROM_WIDTH, LIST_WIDTH = 760, 300
+
+
+class RobotItem(QAbstractButton):
+    """One robot in the list at the left."""
+
+    def __init__(self, theme: Theme, link: RobotLink) -> None:
+        super().__init__()
+        self._theme = theme
+        self.name = link.name
+        self.setCheckable(True)
+        self.setAutoExclusive(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", theme.radius("panel"))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.chip = Chip(theme)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 0, 12, 0)
+        row.addStretch(1)
+        row.addWidget(self.chip)
+        self.show_link(link)
+
+    def show_link(self, link: RobotLink) -> None:
+        """Its state now."""
+        self.chip.set(link.state, STATUS.get(link.state, "ok"))
+        self._where = "virtual, this computer" if link.virtual else link.robot.title
+        self.setAccessibleName(f"{link.name}, {self._where}, {link.state}")
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(LIST_WIDTH - 16, round(self._theme.scaled(56)))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect())
+        if self.isChecked() or self.underMouse():
+            fill = "selected" if self.isChecked() else "hover"
+            paint.box(painter, rect, theme.radius("panel"), theme.colour(fill))
+        tile = QRectF(12, rect.center().y() - 18, 36, 36)
+        paint.box(painter, tile, theme.radius("panel"), theme.colour("sunken"))
+        paint_icon(painter, tile.adjusted(9, 9, -9, -9), "bot", theme.colour("textSecondary"))
+        bold = theme.font("bodyLarge")
+        bold.setWeight(bold.Weight.DemiBold)
+        ink = theme.colour("selectedText" if self.isChecked() else "text")
+        half = rect.height() / 2
+        words = QRectF(60, half - 19, rect.width() - 66 - self.chip.width() - 12, 19)
+        paint.words(painter, words, self.name, bold, ink)
+        where = theme.colour("textSecondary")
+        paint.words(painter, words.translated(0, 19), self._where, theme.font("small"), where)
+        painter.end()
+
+
+class RobotsPanel(PanelWidget):
+    """The list of robots, and the actions of the chosen one."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Robots")
+        self._robot = ""
+        self._revision = -1
+        self._watch: Watch | None = None
+        self.cards: dict[str, ActionCard] = {}
+        self.items: dict[str, RobotItem] = {}
+        self._seen: dict[str, tuple[object, ...]] = {}
+        self._lay_out()
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._focus_moved)
+
+    # -- its parts ----------------------------------------------------------------------------------------
+
+    def _lay_out(self) -> None:
+        theme = self.theme
+        self.empty = EmptyState(
+            theme,
+            "bot",
+            "No robot is connected",
+            "What a robot can do appears here as soon as it is there.",
+            [
+                EmptyAction(
+                    "Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot", primary=True
+                )
+            ],
+        )
+        self.list = QWidget()
+        self.list.setFixedWidth(LIST_WIDTH)
+        self._list_column = QVBoxLayout(self.list)
+        self._list_column.setContentsMargins(8, 8, 8, 8)
+        self._list_column.setSpacing(2)
+        self._list_column.addStretch(1)
+        self._list_line = Line(theme, upright=True)
+        right = QVBoxLayout()
+        right.setSpacing(0)
+        right.addWidget(self._make_head())
+        right.addWidget(Line(theme))
+        right.addWidget(self._make_cards(), 1)
+        whole = QWidget()
+        row = QHBoxLayout(whole)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.list)
+        row.addWidget(self._list_line)
+        row.addLayout(right, 1)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(whole)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+
+    def _make_head(self) -> QWidget:
+        theme = self.theme
+        self.name = label("", "heading")
+        self.chip = Chip(theme)
+        self.about = label("", "body", role="textSecondary")
+        self.finder = SearchField(theme, "Find an action")
+        self.finder.setFixedWidth(180)
+        self.finder.setMinimumHeight(theme.size("control", "form"))
+        self.finder.textChanged.connect(self._filter)
+        self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
+        self.stop.fill_icon = True
+        self.stop.clicked.connect(lambda: self.context.run("run.stop"))
+        head = QWidget()
+        row = QHBoxLayout(head)
+        row.setContentsMargins(16, 7, 16, 8)
+        row.setSpacing(10)
+        for widget in (self.name, self.chip, self.about):
+            row.addWidget(widget)
+        row.addStretch(1)
+        row.addWidget(self.finder)
+        row.addWidget(self.stop)
+        return head
+
+    def _make_cards(self) -> QWidget:
+        inside = QWidget()
+        inside.setProperty("bare", "true")
+        self._card_column = QVBoxLayout(inside)
+        self._card_column.setContentsMargins(16, 14, 16, 14)
+        self._card_column.setSpacing(12)
+        self.none = label("No action has these words.", "bodyLarge", role="textSecondary")
+        self.none.hide()
+        self._card_column.addWidget(self.none)
+        self._card_column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(inside)
+        return scroll
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        fleet = self.session.fleet
+        if fleet.revision != self._revision:
+            self._revision = fleet.revision
+            self._show_robots(list(fleet.links))
+        for link in fleet.links:
+            if link.name in self.items and self._new(link.name, link.state):
+                self.items[link.name].show_link(link)
+        chosen = fleet.link(self._robot) if self._robot else None
+        if chosen is not None:
+            self._show_link(chosen)
+
+    def _new(self, what: str, *now: object) -> bool:
+        """Whether this differs from what was shown."""
+        changed = self._seen.get(what) != now
+        self._seen[what] = now
+        return changed
+
+    def _show_robots(self, links: Sequence[RobotLink]) -> None:
+        self.pages.setCurrentIndex(1 if links else 0)
+        for link in links:
+            if link.name not in self.items:
+                item = RobotItem(self.theme, link)
+                item.clicked.connect(lambda _on=False, name=link.name: self.choose(name))
+                self.items[link.name] = item
+                self._list_column.insertWidget(self._list_column.count() - 1, item)
+        if links and self._robot not in {link.name for link in links}:
+            first = next((link for link in links if link.state != "away"), links[0])
+            self.choose(first.name)
+        elif self._robot:
+            self._make_forms()
+
+    def choose(self, name: str) -> None:
+        """Show the actions of another robot."""
+        self.shut()
+        self._robot, self._revision = name, self.session.fleet.revision
+        self._watch = self.session.fleet.look_at(name)
+        self._seen.pop("cards", None)
+        if name in self.items:
+            self.items[name].setChecked(True)
+        self._make_forms()
+
+    def _make_forms(self) -> None:
+        link = self.session.fleet.link(self._robot)
+        if link is None or not self._new("cards", link.name, link.robot):
+            return
+        for card in self.cards.values():
+            self._card_column.removeWidget(card)
+            card.deleteLater()
+        actions = [action for action in link.robot.actions if action.name != link.robot.safe_stop.action]
+        self.cards = {}
+        for place, action in enumerate(actions):
+            card = ActionCard(self.theme, action, self._options, folded=place >= UNFOLDED)
+            card.tried.connect(lambda given, name=action.name: self.attempt(name, given))
+            card.cancelled.connect(lambda name=action.name: self.session.fleet.cancel(self._robot, name))
+            self.cards[action.name] = card
+            self._card_column.insertWidget(place, card)
+        self._set_first(next(iter(self.cards.values()), None))
+        self.name.setText(link.name)
+        self.stop.set_word("Stop")
+        kind = "virtual, " if link.virtual else ""
+        self.about.setText(f"{kind}{plural(len(actions), 'action')}")
+        self._filter()
+
+    def _show_link(self, link: RobotLink) -> None:
+        if self._new("head", link.state):
+            self.chip.set(link.state, STATUS.get(link.state, "ok"))
+        for name, card in self.cards.items():
+            made = link.invocations.get(name)
+            now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()
+            if self._new(f"card {name}", *now):
+                card.show_invocation(made)
+
+    def _options(self, name: str) -> Sequence[str]:
+        """What a property of the robot offers to choose from now."""
+        link = self.session.fleet.link(self._robot)
+        value = link.values.get(name) if link is not None else None
+        return [str(item) for item in value] if isinstance(value, (list, tuple)) else []
+
+    def _filter(self) -> None:
+        words = self.finder.text().casefold().split()
+        shown = 0
+        for name, card in self.cards.items():
+            text = f"{name} {card.action.title} {card.action.category}".casefold()
+            fits = all(word in text for word in words)
+            card.setVisible(fits)
+            shown += fits
+        self.none.setVisible(bool(self.cards) and not shown)
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def attempt(self, action: str, given: Mapping[str, object]) -> None:
+        """Ask the robot to do it; what is wrong with the values stands below them."""
+        card = self.cards[action]
+        try:
+            self.session.fleet.invoke(self._robot, action, given)
+        except RobotInputError as error:
+            card.show_problems(error.sentences)
+        except AppError as error:
+            card.show_problems((str(error),))
+        else:
+            card.show_problems(())
+
+    def _focus_moved(self, _old: QWidget | None, new: QWidget | None) -> None:
+        if new is not None and self.isAncestorOf(new):
+            for card in self.cards.values():
+                if card.isAncestorOf(new):
+                    self._set_first(card)
+
+    def _set_first(self, first: ActionCard | None) -> None:
+        for card in self.cards.values():
+            card.set_first(card is first)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        wide = event.size().width() >= LIST_FROM_WIDTH or len(self.items) > 1
+        self.list.setVisible(wide)
+        self._list_line.setVisible(wide)
+        self.finder.setVisible(event.size().width() >= 560)
+
+    def focus_filter(self) -> bool:
+        self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        return True
+
+    def shut(self) -> None:
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
+
+
+PANEL = Panel("robots", "Robots", "bot", (), RobotsPanel)

@@ -1,0 +1,167 @@
+"""Sensors now: what the robot feels and sees, one row for each sensor."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.robots.description import Sensor
+from app.ui.icons import paint_icon
+from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.sensor_words import Reading, reading_of
+from app.ui.theme import Theme
+from app.ui.widgets import EmptyState, paint
+from app.ui.words import age_words
+
+if TYPE_CHECKING:
+    from app.core.robot_link import RobotLink
+    from app.core.watches import Watch
+
+ROW = {"compact": 26, "comfortable": 28}
+TITLE_WIDTH, VALUE_WIDTH = 100, 96
+ICON = 18
+
+
+class SensorRow(QWidget):
+    """Icon, title, a bar or a few words, and the value in bold."""
+
+    def __init__(self, theme: Theme, sensor: Sensor) -> None:
+        super().__init__()
+        self._theme, self.sensor = theme, sensor
+        self.title = sensor.title[:1].upper() + sensor.title[1:]
+        self.reading = Reading()
+        self.large = True
+        self._yes_s: float | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(self.title)
+
+    def show_value(self, value: object, now: float) -> None:
+        """Show the newest value; nothing is painted when it says the same."""
+        reading = reading_of(self.sensor, value)
+        if value is True:
+            self._yes_s = now
+        elif value is False and self._yes_s is not None:
+            reading = Reading(reading.value, f"{age_words(max(1.0, float(int(now - self._yes_s))))} ago")
+        if reading != self.reading:
+            self.reading = reading
+            self.setAccessibleDescription(" ".join(part for part in (reading.value, reading.beside) if part))
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        least = ROW["comfortable" if self.large else "compact"]
+        return QSize(260, max(least, round(self._theme.scaled(least))))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect()).adjusted(16, 0, -16, 0)
+        middle = rect.center().y()
+        font = theme.font("bodyLarge" if self.large else "body")
+        bold = theme.font("bodyLarge" if self.large else "body")
+        bold.setWeight(bold.Weight.Bold)
+        icon = QRectF(rect.left(), middle - ICON / 2, ICON, ICON)
+        paint_icon(painter, icon, self.sensor.icon, theme.colour("textSecondary"))
+        title_width = max(theme.scaled(TITLE_WIDTH), paint.width_of(font, self.title) + 4)
+        title = QRectF(rect.left() + 26, rect.top(), title_width, rect.height())
+        paint.words(painter, title, self.title, font, theme.colour("text"))
+        value_width = max(paint.width_of(bold, self.reading.value), theme.scaled(54))
+        value = QRectF(rect.right() - value_width, rect.top(), value_width, rect.height())
+        paint.words(painter, value, self.reading.value, bold, theme.colour("text"), paint.RIGHT)
+        between = QRectF(title.right(), rect.top(), value.left() - title.right() - 10, rect.height())
+        if self.reading.share is not None and between.width() > 30:
+            self._paint_bar(painter, between, self.reading.share)
+        elif self.reading.beside and between.width() > 20:
+            paint.words(painter, between, self.reading.beside, font, theme.colour("textSecondary"))
+        painter.end()
+
+    def _paint_bar(self, painter: QPainter, between: QRectF, share: float) -> None:
+        track = QRectF(between.left(), between.center().y() - 3, between.width(), 6)
+        paint.box(painter, track, 3, self._theme.colour("sunken"))
+        if share > 0:
+            track.setWidth(max(6.0, track.width() * share))
+            paint.box(painter, track, 3, self._theme.colour("accent"))
+
+
+class SensorsPanel(PanelWidget):
+    """The sensors of the first robot that has any."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Sensors now")
+        self._robot = ""
+        self._watch: Watch | None = None
+        self._revision = -1
+        self.rows: list[SensorRow] = []
+        self._list = QWidget()
+        self._list.setProperty("bare", "true")
+        self._column = QVBoxLayout(self._list)
+        self._column.setContentsMargins(0, 6, 0, 6)
+        self._column.setSpacing(0)
+        self._column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(self._list)
+        self.empty = EmptyState(
+            self.theme, "eye", "No robot, no sensors", "Connect a robot to see what it feels and sees."
+        )
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(scroll)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+
+    def refresh(self) -> None:
+        fleet = self.session.fleet
+        if fleet.revision != self._revision:
+            self._revision = fleet.revision
+            self._choose(next((link for link in fleet.connected if _shown(link)), fleet.link(self._robot)))
+        link = fleet.link(self._robot) if self._robot else None
+        if link is not None:
+            now = time.monotonic()
+            for row in self.rows:
+                row.show_value(link.values.get(row.sensor.name), now)
+
+    def _choose(self, link: RobotLink | None) -> None:
+        if link is None:
+            return
+        sensors = _shown(link)
+        if link.name == self._robot and sensors == [row.sensor for row in self.rows]:
+            return
+        self.shut()
+        self._robot, self._revision = link.name, self.session.fleet.revision
+        self._watch = self.session.fleet.look_at(link.name)
+        for row in self.rows:
+            self._column.removeWidget(row)
+            row.deleteLater()
+        self.rows = [SensorRow(self.theme, sensor) for sensor in sensors]
+        for place, row in enumerate(self.rows):
+            row.large = self.density == "comfortable"
+            self._column.insertWidget(place, row)
+        self.pages.setCurrentIndex(1 if self.rows else 0)
+        if not self.rows:
+            self.empty.say(f"{link.name} has no sensors", "Its description names none.")
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        for row in self.rows:
+            row.large = density == "comfortable"
+            row.updateGeometry()
+
+    def shut(self) -> None:
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
+        self._revision = -1
+
+
+def _shown(link: RobotLink) -> list[Sensor]:
+    """Everything that fits a row: no pictures."""
+    return [sensor for sensor in link.robot.sensors if not sensor.is_image]
+
+
+PANEL = Panel("sensors", "Sensors now", "eye", (), SensorsPanel)

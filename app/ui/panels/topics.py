@@ -1,0 +1,248 @@
+"""Topics: everything that is on the network, with its figures as the publishers tell them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
+
+from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.table import Cell, Column, TableModel
+from app.ui.table_view import TableView
+from app.ui.widgets import EmptyAction, EmptyState, Line, SearchField, label
+from app.ui.words import age_words, bandwidth_words, plural, rate_words
+
+if TYPE_CHECKING:
+    from app.core.topics import Topic
+
+FOOT = "Rates come from the publishers; nothing is subscribed but what you look at"
+FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second
+SORT_EVERY = 30
+ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
+LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
+
+
+def _ink(topic: Topic, role: str) -> str:
+    return role if topic.gone_s is None else "textDisabled"
+
+
+def name_cell(topic: Topic) -> Cell:
+    """The name: bold with a chip while new, struck through when it has vanished."""
+    gone = topic.gone_s is not None
+    chip = "new" if topic.new and not gone else None
+    return Cell(topic.name, role=_ink(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip)
+
+
+def type_cell(topic: Topic) -> Cell:
+    """The type's icon and word."""
+    return Cell(topic.msg_type, ICONS.get(topic.codec, "box"), _ink(topic, "textTertiary"))
+
+
+def publishers_cell(topic: Topic) -> Cell:
+    """How many programs publish it."""
+    return Cell(str(topic.publishers), role=_ink(topic, "text"))
+
+
+def rate_cell(topic: Topic) -> Cell:
+    """Messages a second."""
+    return Cell(rate_words(topic.rate_hz), role=_ink(topic, "text"))
+
+
+def bandwidth_cell(topic: Topic) -> Cell:
+    """Bytes a second."""
+    return Cell(bandwidth_words(topic.bandwidth_Bps), role=_ink(topic, "text"))
+
+
+def age_cell(topic: Topic) -> Cell:
+    """How old the newest message is, or since when the topic is gone."""
+    if topic.gone_s is not None:
+        return Cell(f"gone {int(topic.gone_s)} s", role="textDisabled")
+    return Cell(age_words(topic.age_s))
+
+
+def loss_cell(topic: Topic) -> Cell:
+    """What was lost, with a warning when it is not nothing; blank when nobody knows."""
+    if topic.lost is None or topic.gone_s is not None:
+        return Cell()
+    if topic.lost == 0:
+        return Cell("0")
+    share = topic.loss_ratio
+    return Cell(
+        f"{share:.1%}".replace("%", " %") if share is not None else str(topic.lost), "triangle-alert", "warn"
+    )
+
+
+def _publishers_tip(topic: Topic) -> str:
+    return (
+        "Published by " + ", ".join(topic.publisher_nodes) if topic.publisher_nodes else "Nobody publishes it"
+    )
+
+
+def _loss_tip(topic: Topic) -> str:
+    return (
+        f"{plural(topic.lost, 'message')} lost"
+        if topic.lost is not None
+        else "No subscriber tells what is lost"
+    )
+
+
+COLUMNS: tuple[Column[Topic], ...] = (
+    Column("topic", "Topic", 150, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
+    Column("type", "Type", 88, type_cell, lambda t: t.msg_type),
+    Column(
+        "publishers",
+        "Publishers",
+        78,
+        publishers_cell,
+        lambda t: t.publishers,
+        figures=True,
+        tip=_publishers_tip,
+    ),
+    Column("rate", "Rate /s", 66, rate_cell, lambda t: t.rate_hz, figures=True),
+    Column("bandwidth", "Bandwidth", 80, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True),
+    Column("age", "Age", 66, age_cell, lambda t: t.age_s, figures=True),
+    Column("loss", "Loss", 76, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip),
+)
+
+
+class TopicsPanel(PanelWidget):
+    """The table of topics, a filter in the title, a line about the figures below."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Topics")
+        theme = self.theme
+        self.filter = _Filter(self)
+        self.filter.textChanged.connect(self._rebuild)
+        self.count = label("", "small", role="textSecondary")
+        self.header = [self.count, self.filter]
+        self.model: TableModel[Topic] = TableModel(COLUMNS, lambda topic: topic.name)
+        self.table: TableView[Topic] = TableView(theme, self.model)
+        self.table.setAccessibleName("Topics")
+        self.table.opened.connect(self._open)
+        self.table.filter_wanted.connect(self.focus_filter)
+        self.table.order_changed.connect(self._rebuild)
+        self.foot = label(FOOT, "small", role="textTertiary")
+        self.foot.setContentsMargins(12, 5, 12, 6)
+        self.foot.setMinimumWidth(0)
+        self.empty = EmptyState(theme, "radio-tower", "", "")
+        self._stack = QStackedWidget()
+        self._stack.addWidget(self.table)
+        self._stack.addWidget(self.empty)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self._stack, 1)
+        self._line = Line(theme)
+        column.addWidget(self._line)
+        column.addWidget(self.foot)
+        self._seen = (-1, -1, "")
+        self._ticks = 0
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        topics = self.session.topics
+        facts = (topics.revision, len(topics), self.session.master.kind)
+        order = self.table.order.column
+        lively = order is not None and order.name in LIVELY
+        if facts != self._seen or (lively and self._ticks % SORT_EVERY == 0):
+            self._rebuild()
+        if self._ticks % FIGURES_EVERY == 0 and self.model.rowCount():
+            self.table.tell_visible_changed()
+
+    def _rebuild(self) -> None:
+        topics = self.session.topics
+        self._seen = (topics.revision, len(topics), self.session.master.kind)
+        words = self.filter.text().casefold().split()
+        rows = [topic for topic in topics if all(word in _haystack(topic) for word in words)]
+        self.model.set_rows(self.table.order.sort(rows))
+        self._say_counts(len(topics), len(rows) if words else None)
+        self._show_empty(bool(rows), bool(words))
+
+    def _say_counts(self, known: int, found: int | None) -> None:
+        graph = self.session.graph
+        words = plural(known, "topic") if found is None else f"{found} of {plural(known, 'topic')}"
+        if graph is not None and graph.nodes:
+            words += f", {plural(len(graph.nodes), 'node')}"
+        self.count.setText(words if known else "")
+
+    def _show_empty(self, any_rows: bool, filtered: bool) -> None:
+        self._stack.setCurrentIndex(0 if any_rows else 1)
+        self.foot.setVisible(any_rows)
+        self._line.setVisible(any_rows)
+        if any_rows:
+            return
+        kind = self.session.master.kind
+        if filtered:
+            self.empty.say("No topic has these words", "Clear the filter to see all topics.", "search")
+            self.empty.set_actions([EmptyAction("Clear the filter", self.filter.clear, "x")])
+        elif kind == "none":
+            self.empty.say("No master is running", "A master lets programs find each other.", "radio-tower")
+            start = self.session.companions.ensure_master
+            self.empty.set_actions([EmptyAction("Start a master here", start, "play", primary=True)])
+        elif kind == "searching":
+            self.empty.say("Looking for a master", f"At {self.session.master.address}.", "radio-tower")
+            self.empty.set_actions([])
+        else:
+            self.empty.say("No topics yet", "They appear as soon as a program publishes.", "list")
+            self.empty.set_actions(
+                [EmptyAction("Use the virtual robot", self._use_virtual, "bot", primary=True)]
+            )
+
+    def _use_virtual(self) -> None:
+        self.context.run("robots.virtual")
+
+    def _open(self, name: str) -> None:
+        self.session.topics.mark_seen(name)
+        self.context.open_topic(name)
+
+    def show_topic(self, name: str) -> None:
+        self.table.choose(name)
+
+    def focus_filter(self) -> bool:
+        self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.filter.selectAll()
+        return True
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        self.table.set_row_height(self.row_height(), large=density == "comfortable")
+
+    def theme_changed(self) -> None:
+        self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
+
+    def save_state(self) -> dict[str, object]:
+        order = self.table.order
+        return {"sort": order.column.name if order.column else "", "falling": order.falling}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self.table.order.column = next((c for c in COLUMNS if c.name == state.get("sort")), None)
+        self.table.order.falling = state.get("falling") is True
+        self._rebuild()
+
+
+class _Filter(SearchField):
+    """The filter: Down goes into the table, Esc clears."""
+
+    def __init__(self, panel: TopicsPanel) -> None:
+        super().__init__(panel.theme, "Filter", "/")
+        self._panel = panel
+        self.setAccessibleName("Filter topics")
+        self.setFixedWidth(190)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape and self.text():
+            self.clear()
+        elif event.key() in {Qt.Key.Key_Down, Qt.Key.Key_Return}:
+            self._panel.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        else:
+            super().keyPressEvent(event)
+
+
+def _haystack(topic: Topic) -> str:
+    return f"{topic.name} {topic.msg_type} {' '.join(topic.publisher_nodes)}".casefold()
+
+
+PANEL = Panel("topics", "Topics", "list", (), TopicsPanel)

@@ -1,0 +1,97 @@
+"""A robot's sensor as a row says it: its value in words, what stands beside it, its share of its range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from app.robots.description import Field, Sensor
+
+MINUS = "\u2212"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """``value`` in bold at the right, ``beside`` in the middle, ``share`` (0 to 1) as a bar; None: no bar."""
+
+    value: str = ""
+    beside: str = ""
+    share: float | None = None
+
+
+def reading_of(sensor: Sensor, value: object) -> Reading:
+    """How to say a sensor's newest value; nothing when there is none yet."""
+    if value is None:
+        return Reading()
+    if sensor.kind == "boolean" or isinstance(value, bool):
+        return Reading("yes" if value else "no")
+    if sensor.kind == "detections" and isinstance(value, Mapping):
+        return _detections(value)
+    if isinstance(value, Mapping):
+        return _object(sensor, value)
+    if isinstance(value, (int, float)):
+        return Reading(number_words(value, sensor.unit), share=_share(sensor, value))
+    if isinstance(value, str):
+        title = next((choice.title for choice in sensor.choices if choice.value == value), value)
+        return Reading(title if sensor.kind == "choice" else f"“{title}”" if title else "")
+    if isinstance(value, Sequence):
+        return Reading(str(len(value)), ", ".join(_name(item) for item in value))
+    return Reading(str(value))
+
+
+def number_words(value: float, unit: str | None) -> str:
+    """0.82 m, 84 %, 31°: as many decimals as matter."""
+    if isinstance(value, int) or float(value).is_integer():
+        words = f"{value:.0f}"
+    elif abs(value) < 10:
+        words = f"{value:.2f}"
+    else:
+        words = f"{value:.1f}" if abs(value) < 100 else f"{value:.0f}"
+    words = words.replace("-", MINUS)
+    if not unit:
+        return words
+    return f"{words}{unit}" if unit.startswith("°") else f"{words} {unit}"
+
+
+def _share(sensor: Sensor, value: float) -> float | None:
+    low, high = sensor.minimum, sensor.maximum
+    if low is None or high is None or high <= low:
+        return None
+    return min(1.0, max(0.0, (value - low) / (high - low)))
+
+
+def _detections(value: Mapping[str, object]) -> Reading:
+    items = value.get("items")
+    found = [item for item in items if isinstance(item, Mapping)] if isinstance(items, list) else []
+    count = value.get("count")
+    name = value.get("name")
+    names = str(name) if name else ", ".join(str(item.get("name", "")) for item in found)
+    return Reading(str(count if isinstance(count, int) else len(found)), names)
+
+
+def _object(sensor: Sensor, value: Mapping[str, object]) -> Reading:
+    """Fields of one unit are said together ("1.3, 0.3 m"), the others beside ("facing 31°")."""
+    fields = sensor.fields or tuple(Field(str(name), str(name), "number") for name in value)
+    known = [(field, value.get(field.name)) for field in fields]
+    numbers = [(field, number) for field, number in known if _is_number(number)]
+    if not numbers:
+        return Reading("", ", ".join(f"{field.title} {words}" for field, words in known if words is not None))
+    unit = numbers[0][0].unit
+    together = [f"{number:.1f}".replace("-", MINUS) for field, number in numbers if field.unit == unit]
+    others = [(field, number) for field, number in numbers if field.unit != unit]
+    beside = ", ".join(
+        f"{field.title} {number_words(_round(number), field.unit)}" for field, number in others
+    )
+    return Reading(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _round(number: object) -> float:
+    return round(number) if isinstance(number, (int, float)) else 0.0
+
+
+def _name(item: object) -> str:
+    return str(item.get("name", item)) if isinstance(item, Mapping) else str(item)

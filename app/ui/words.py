@@ -1,0 +1,66 @@
+"""Figures as people read them: a number with its unit, blank when it is not known."""
+
+from __future__ import annotations
+
+THIN = "\u2009"  # a thin space between thousands
+
+
+def rate_words(rate_hz: float | None) -> str:
+    """Messages a second: 30.0, 0.4, 1 204; blank when not known."""
+    if rate_hz is None:
+        return ""
+    return f"{rate_hz:.1f}" if rate_hz < 1000 else grouped(round(rate_hz))
+
+
+def bandwidth_words(bytes_per_s: float | None) -> str:
+    """92 B/s, 1.6 kB/s, 46 kB/s, 5.1 MB/s; blank when not known."""
+    return "" if bytes_per_s is None else f"{size_words(bytes_per_s)}/s"
+
+
+def size_words(size_bytes: float) -> str:
+    """412 B, 1.6 kB, 46 kB, 5.1 MB."""
+    if size_bytes < 1000:
+        return f"{round(size_bytes)} B"
+    value, unit = size_bytes / 1000, "kB"
+    for larger in ("MB", "GB", "TB"):
+        if value < 999.5:
+            break
+        value, unit = value / 1000, larger
+    return f"{value:.1f} {unit}" if value < 9.95 else f"{round(value)} {unit}"
+
+
+def age_words(age_s: float | None) -> str:
+    """12 ms, 0.4 s, 6 s, 2 min, 3 h; blank when not known."""
+    if age_s is None:
+        return ""
+    if age_s < 0.0995:
+        return f"{round(age_s * 1000)} ms"
+    if age_s < 2.95:
+        return f"{age_s:.1f} s"
+    if age_s < 60:
+        return f"{round(age_s)} s"
+    return f"{round(age_s / 60)} min" if age_s < 3600 else f"{round(age_s / 3600)} h"
+
+
+def latency_words(latency_s: float) -> str:
+    """0.6 ms, 41 ms, 1.2 s."""
+    if latency_s < 0.00995:
+        return f"{latency_s * 1000:.1f} ms"
+    return f"{round(latency_s * 1000)} ms" if latency_s < 0.9995 else f"{latency_s:.1f} s"
+
+
+def grouped(number: int) -> str:
+    """18 204: thousands apart."""
+    return f"{number:,}".replace(",", THIN)
+
+
+def plural(count: int | None, word: str) -> str:
+    """1 topic, 13 topics."""
+    return f"{grouped(count or 0)} {word}{'' if count == 1 else 's'}"
+
+
+def seconds_words(value_s: float) -> str:
+    """0.4 s, 14 s, 2 min: how long something took."""
+    if value_s < 10:
+        return f"{value_s:.1f} s"
+    return f"{round(value_s)} s" if value_s < 120 else f"{round(value_s / 60)} min"

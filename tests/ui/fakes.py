@@ -1,0 +1,566 @@
+"""A session in memory, for tests and for looking at panels alone: the interface of `app.core.session.Session`.
+
+`Session.full()` has a master, thirteen topics, the virtual Pepper and a behaviour; `Session()` has nothing.
+`tick()` makes the figures move; what panels ask for is written down in `calls`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+
+from app.blocks.program import Problem
+from app.core.alerts import Alerts
+from app.core.console import Console
+from app.robots.inputs import Choice, Parameter
+from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
+from app.robots.parts import Topics as RobotTopics
+from nep.message import Message
+
+
+@dataclass(eq=False)
+class Topic:
+    name: str
+    msg_type: str = "json"
+    codec: str = "json"
+    publishers: int = 1
+    publisher_nodes: tuple[str, ...] = ("pepper_driver",)
+    subscribers: int = 0
+    rate_hz: float | None = None
+    bandwidth_Bps: float | None = None  # noqa: N815
+    age_s: float | None = None
+    lost: int | None = 0
+    loss_ratio: float | None = 0.0
+    new: bool = False
+    gone_s: float | None = None
+    rates: list[float] = field(default_factory=list)
+    newest: Message | None = None
+    previous: Message | None = None
+    received: int = 0
+    decode_error: str | None = None
+    watched: bool = False
+
+
+class Topics:
+    def __init__(self) -> None:
+        self._topics: dict[str, Topic] = {}
+        self.revision = 0
+        self.values_revision = 0
+
+    def __iter__(self) -> Iterator[Topic]:
+        return iter(self._topics.values())
+
+    def __len__(self) -> int:
+        return len(self._topics)
+
+    def __getitem__(self, name: str) -> Topic:
+        return self._topics[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._topics
+
+    def get(self, name: str) -> Topic | None:
+        return self._topics.get(name)
+
+    def put(self, topic: Topic) -> Topic:
+        self._topics[topic.name] = topic
+        self.revision += 1
+        self.values_revision += 1
+        return topic
+
+    def remove(self, name: str) -> None:
+        del self._topics[name]
+        self.revision += 1
+
+    def live(self) -> list[Topic]:
+        return [topic for topic in self if topic.gone_s is None]
+
+    def of_type(self, *msg_types: str) -> list[Topic]:
+        return [topic for topic in self.live() if topic.msg_type in msg_types]
+
+    def mark_seen(self, name: str) -> None:
+        if name in self and self[name].new:
+            self[name].new = False
+            self.revision += 1
+
+    def check(self, topic: Topic) -> bool:
+        if topic.newest is None:
+            return True
+        try:
+            _ = topic.newest.payload
+        except Exception as error:  # noqa: BLE001
+            topic.decode_error = str(error)
+            return False
+        topic.decode_error = None
+        return True
+
+
+class Watch:
+    def __init__(self, close: Callable[[], None]) -> None:
+        self._close: Callable[[], None] | None = close
+        self.open = True
+
+    def close(self) -> None:
+        if self._close is not None:
+            self._close()
+        self._close, self.open = None, False
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    bgra: np.ndarray
+    width: int
+    height: int
+    seq: int | None
+    stamp_ns: int | None
+    received_s: float
+
+
+class ImageStream:
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.picture: Picture | None = None
+        self.arriving_hz: float | None = None
+        self.shown_hz: float | None = None
+        self.silent_s: float | None = None
+        self.error: str | None = None
+        self.painted: list[Picture] = []
+        self.closed = False
+
+    def shown(self) -> None:
+        assert self.picture is not None
+        self.painted.append(self.picture)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Images:
+    def __init__(self) -> None:
+        self.streams: list[ImageStream] = []
+        self.source: Callable[[str], Picture | None] = lambda _topic: None
+
+    def stream(self, topic: str) -> ImageStream:
+        stream = ImageStream(topic)
+        stream.picture = self.source(topic)
+        if stream.picture is not None:
+            stream.arriving_hz, stream.shown_hz, stream.silent_s = 15.0, 15.0, 0.02
+        self.streams.append(stream)
+        return stream
+
+
+@dataclass(eq=False)
+class Invocation:
+    id: str
+    action: str
+    state: str = "running"
+    feedback: Mapping[str, object] = field(default_factory=dict)
+    output: Mapping[str, object] = field(default_factory=dict)
+    error: str | None = None
+    elapsed_s: float = 0.0
+
+    @property
+    def running(self) -> bool:
+        return self.state not in {"succeeded", "failed", "canceled"}
+
+
+@dataclass(eq=False)
+class RobotLink:
+    name: str
+    robot: Robot
+    virtual: bool = True
+    state: str = "ready"
+    chip: str = "virtual, ready"
+    can_confirm_stop: bool = True
+    connected: bool = True
+    values: dict[str, object] = field(default_factory=dict)
+    drawing: Mapping[str, object] | None = None
+    invocations: dict[str, Invocation] = field(default_factory=dict)
+    last_stop: str | None = "answered in 41 ms, at 8:40"
+
+
+class Fleet:
+    def __init__(self, calls: list[tuple[object, ...]]) -> None:
+        self.calls = calls
+        self.revision = 0
+        self.links: list[RobotLink] = []
+        self.looked_at: list[str] = []
+        self.refuse: tuple[str, ...] = ()
+
+    @property
+    def connected(self) -> list[RobotLink]:
+        return [link for link in self.links if link.connected]
+
+    def join(self, link: RobotLink) -> RobotLink:
+        self.links.append(link)
+        self.revision += 1
+        return link
+
+    def link(self, name: str) -> RobotLink | None:
+        return next((link for link in self.links if link.name == name), None)
+
+    def look_at(self, name: str) -> Watch:
+        self.looked_at.append(name)
+        return Watch(lambda: self.looked_at.remove(name))
+
+    def invoke(self, name: str, action: str, input: Mapping[str, object]) -> Invocation:
+        from app.errors import RobotInputError
+
+        self.calls.append(("invoke", name, action, dict(input)))
+        link = self.link(name)
+        assert link is not None
+        described = link.robot.action(action)
+        assert described is not None
+        wrong = described.check(input)
+        if wrong:
+            raise RobotInputError(wrong)
+        made = link.invocations[action] = Invocation(f"{len(self.calls)}", action)
+        return made
+
+    def cancel(self, name: str, action: str) -> None:
+        self.calls.append(("cancel", name, action))
+
+    def world(self, name: str, change: Mapping[str, object]) -> None:
+        self.calls.append(("world", name, dict(change)))
+
+    def stop(self, name: str | None = None) -> None:
+        self.calls.append(("stop", name))
+
+
+PROGRAM = """import studio
+
+robots = studio.robots("Pepper")
+
+
+@studio.when_started
+def when_started():
+    # Say hello, then wait for somebody.
+    robots.Pepper.light(where="eyes", colour="#33b8ff")
+    robots.Pepper.say("Hello! I am Pepper.")
+    studio.wait_until(lambda: robots.Pepper.sees_face)
+    for _ in range(3):
+        robots.Pepper.turn(direction="left", angle=30)
+        robots.Pepper.say("Touch my head.")
+        studio.wait(2)
+    robots.Pepper.emotion("happy", seconds=4)
+"""
+
+
+class Document:
+    def __init__(self, calls: list[tuple[object, ...]]) -> None:
+        self.calls = calls
+        self.path = None
+        self.name = "New behaviour"
+        self.workspace: Mapping[str, object] = {}
+        self.robots: dict[str, Mapping[str, object]] = {}
+        self.dirty = False
+        self.saved_at: float | None = None
+        self.revision = 0
+        self.edits = 0
+        self.definitions_revision = 0
+        self.found: tuple[Problem, ...] = ()
+        self.source = ""
+        self.compiled = 0
+
+    def edited(self, workspace: Mapping[str, object]) -> None:
+        self.calls.append(("edited", workspace))
+        self.workspace, self.edits, self.dirty = workspace, self.edits + 1, True
+
+    def program(self) -> SimpleNamespace:
+        self.compiled += 1
+        return SimpleNamespace(source=self.source, problems=self.found)
+
+    def problems(self) -> tuple[Problem, ...]:
+        return self.found
+
+    def definitions(self) -> Mapping[str, object]:
+        return {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
+
+    def mend(self, action: str, block_id: str | None) -> None:
+        self.calls.append(("mend", action, block_id))
+
+
+class Session:
+    """Has nothing: no master, no topic, no robot, an empty behaviour."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[object, ...]] = []
+        self.settings = SimpleNamespace(get=lambda _key, default: default, set=lambda _key, _value: None)
+        self.topics = Topics()
+        self.alerts = Alerts()
+        self.console = Console()
+        self.fleet = Fleet(self.calls)
+        self.images = Images()
+        self.document = Document(self.calls)
+        self.runs = SimpleNamespace(
+            running_blocks=(), stopped_blocks=(), block_errors={}, blocks_revision=0, active=False
+        )
+        self.companions = SimpleNamespace(
+            ensure_master=lambda: self.calls.append(("ensure_master",)),
+            start_virtual_robot=lambda name="Pepper": self.calls.append(("start_virtual_robot", name)),
+            virtual_robots=(),
+        )
+        self.graph: SimpleNamespace | None = None
+        self.master = SimpleNamespace(kind="none", address="127.0.0.1:7780", sentence="")
+        self.messages_per_s: float | None = None
+        self.lost_30s = 0
+        self.tick_ms = 0.0
+        self.watched: list[str] = []
+        self.ticks = 0
+
+    def watch(self, topic: str) -> Watch:
+        self.watched.append(topic)
+        if topic in self.topics:
+            self.topics[topic].watched = True
+        return Watch(lambda: self._unwatch(topic))
+
+    def _unwatch(self, topic: str) -> None:
+        self.watched.remove(topic)
+        if topic in self.topics and topic not in self.watched:
+            self.topics[topic].watched = False
+            self.topics[topic].newest = None
+
+    def frozen(self) -> bool:
+        return False
+
+    def send(self, topic: str, payload: object) -> Message:
+        """A message arrives on a topic, as it would for a watched one."""
+        known = self.topics[topic]
+        if isinstance(payload, bytes):
+            data = payload
+        else:
+            data = json.dumps(payload).encode()
+        seq = (known.newest.seq or 0) + 1 if known.newest is not None else 18204
+        message = Message(
+            topic, data, known.codec, known.msg_type, stamp_ns=time.time_ns() - 600_000, seq=seq, publisher=1
+        )
+        known.previous, known.newest = known.newest, message
+        known.received += 1
+        self.topics.values_revision += 1
+        return message
+
+    @classmethod
+    def full(cls) -> Session:
+        """A session as in the design's pictures."""
+        session = cls()
+        session.master = SimpleNamespace(kind="connected", address="127.0.0.1:7780", sentence="")
+        nodes = {str(number): None for number in range(7)}
+        session.graph = SimpleNamespace(nodes=nodes, topics={})
+        for topic in topics():
+            session.topics.put(topic)
+        link = session.fleet.join(RobotLink("Pepper", pepper()))
+        link.values.update(
+            head_touched=False, distance=0.82, battery=84, sees_face=True, sound=34.0, heard_word="hello",
+            pose={"x": 1.284, "y": -0.307, "theta": 31.5},
+            faces={"count": 1, "name": "Aiko", "width": 320, "height": 240,
+                   "items": [{"name": "face", "confidence": 0.97, "box": [118, 36, 71, 77]}]},
+        )  # fmt: skip
+        link.drawing = drawing()
+        session.images.source = lambda _topic: picture()
+        session.document.name = "Greeting"
+        session.document.source = PROGRAM
+        session.document.workspace = {"blocks": {"blocks": [{"type": "events_started"}]}}
+        session.document.found = (
+            Problem("warning", "b8", "robot", "wave", "NAO is not connected, so wave will be skipped.",
+                    "Connect NAO", "connect:NAO", icon="hand"),
+            Problem("info", "b3", "control", "wait until", "wait until may wait for ever if nobody comes.",
+                    "Add a time limit", "add_time_limit", icon="hourglass"),
+        )  # fmt: skip
+        now = time.time()
+        for ago, level, origin, text in LOG:
+            session.console._records.append(
+                SimpleNamespace(stamp_s=now - ago, level=level, origin=origin, text=text)
+            )
+        session.console.revision = len(LOG)
+        session.alerts.put(
+            "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
+            "1 204 messages could not be read.", button="Look at the raw bytes", action="topic.open:/faces",
+        )  # fmt: skip
+        return session
+
+    def tick(self) -> None:
+        """A thirtieth of a second goes by."""
+        self.ticks += 1
+        for topic in self.topics:
+            if topic.rate_hz is not None:
+                topic.age_s = (self.ticks * 0.033) % (1 / topic.rate_hz)
+        if "/blackboard" in self.watched and self.ticks % 3 == 0:
+            self.send("/blackboard", blackboard(self.ticks / 30))
+
+
+LOG = (
+    (40, "info", "gateway", "RIZE joined (original NEP, port 50000)"),
+    (12, "info", "master", "/speech/words is new, 2 publishers"),
+    (8, "error", "lidar_driver", "left without saying goodbye"),
+    (5, "warn", "/cmd_vel", "lost 12 of 571 messages in 30 s"),
+    (1, "info", "greeting", "turn left by 30° succeeded (1.84 s)"),
+    (0, "info", "greeting", "say “Touch my head.” started"),
+)
+
+
+def topics() -> list[Topic]:
+    """The thirteen of picture 04."""
+    image, string, raw = ("image", "image"), ("string", "string"), ("bytes", "bytes")
+    rows: list[tuple[str, tuple[str, str], int, float, float, float]] = [
+        ("/robot/camera", image, 1, 30.0, 1.2e6, 0.012),
+        ("/robot/depth", image, 1, 60.0, 5.1e6, 0.021),
+        ("/blackboard", ("json", "json"), 1, 10.0, 18e3, 0.064),
+        ("/odom", ("json", "json"), 1, 50.0, 11e3, 0.008),
+        ("/joint_states", ("json", "json"), 1, 50.0, 46e3, 0.009),
+        ("robot_action", ("json", "json"), 1, 0.4, 92.0, 2.1),
+        ("action_state", ("json", "json"), 1, 0.8, 180.0, 1.7),
+        ("/faces", ("json", "json"), 1, 14.9, 4.1e3, 0.041),
+        ("/touch", ("json", "json"), 1, 2.0, 160.0, 0.4),
+        ("/distance", ("json", "json"), 1, 20.0, 1.6e3, 0.031),
+        ("/speech/words", string, 2, 0.2, 14.0, 6.0),
+        ("/cmd_vel", ("json", "json"), 1, 20.0, 2.0e3, 0.038),
+        ("/lidar/scan", raw, 0, 0.0, 0.0, 0.0),
+    ]
+    made = [
+        Topic(name, kind[0], kind[1], publishers, rate_hz=rate, bandwidth_Bps=bandwidth, age_s=age)
+        for name, kind, publishers, rate, bandwidth, age in rows
+    ]
+    made[1].lost, made[1].loss_ratio = 7, 0.004
+    made[11].lost, made[11].loss_ratio = 12, 0.021
+    made[10].new = True
+    gone = made[12]
+    gone.gone_s, gone.rate_hz, gone.bandwidth_Bps, gone.age_s, gone.lost, gone.loss_ratio = 4.2, *[None] * 5
+    return made
+
+
+def blackboard(t: float = 0.0) -> dict[str, object]:
+    """The message of picture 04, moving with ``t`` seconds."""
+    return {
+        "stamp": round(1795164093.412 + t, 3),
+        "robots": {
+            "Pepper": {
+                "battery": 84,
+                "emotion": "happy" if int(t) % 2 == 0 else "surprised",
+                "pose": {
+                    "x": round(1.284 + 0.01 * math.sin(t), 3),
+                    "y": round(-0.307 + 0.01 * math.cos(t), 3),
+                    "theta": round(31.5 + t, 1),
+                },
+                "touched": False,
+                "speaking": int(t * 2) % 2 == 0,
+                "joints": [0.0] * 20,
+                "language": "en",
+            }
+        },
+        "people": [
+            {"name": "Aiko", "distance": round(0.82 + 0.01 * math.sin(2 * t), 3),
+             "face": {"x": 1, "y": 2, "width": 70, "height": 77}, "age_s": round(t % 0.1, 3), "looking": True}
+        ],
+        "objects": [{"kind": "ball"}, {"kind": "marker"}],
+        "words": [],
+        "note": None,
+    }  # fmt: skip
+
+
+def drawing(**changes: object) -> dict[str, object]:
+    """The virtual robot's state of picture 02."""
+    state: dict[str, object] = {
+        "x": 0.05, "y": 0.0, "theta_deg": 0.0, "head_yaw_deg": 0.0, "head_pitch_deg": 0.0,
+        "speech": "Touch my head.", "eyes": "#35b0fa", "shoulders": "#3ab5ff", "emotion": "neutral",
+        "arm_left_deg": 124.0, "arm_right_deg": 0.0, "moving": False, "touched": [],
+        "objects": [
+            {"kind": "ball", "name": "ball", "x": 0.1, "y": -1.65, "z": 0.11, "radius": 0.11, "colour": "#d8403f"},
+            {"kind": "table", "x": -0.85, "y": 1.95, "width": 1.0, "depth": 0.6, "height": 0.7, "theta_deg": 0},
+        ],
+        "room": {"width": 6.0, "depth": 5.0, "height": 2.6, "openings": []},
+    }  # fmt: skip
+    return {**state, **changes}
+
+
+def picture(width: int = 320, height: int = 240) -> Picture:
+    """A camera picture: a wall, a floor, a red ball."""
+    bgra = np.empty((height, width, 4), np.uint8)
+    bgra[:] = (190, 198, 196, 255)
+    bgra[height // 2 :] = (96, 128, 152, 255)
+    rows, columns = np.ogrid[:height, :width]
+    bgra[(rows - 150) ** 2 + (columns - 250) ** 2 < 22**2] = (58, 62, 210, 255)
+    return Picture(bgra, width, height, 7, time.time_ns(), time.monotonic())
+
+
+def _action(name: str, title: str, icon: str, parameters: Sequence[Parameter], **more: object) -> Action:
+    return Action(
+        name, title, icon, str(more.pop("category", "Movement")), tuple(parameters), f"%robot {title}", None,
+        "/Pepper/command", "/Pepper/answer", **more,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def _choices(*pairs: tuple[str, str]) -> tuple[Choice, ...]:
+    return tuple(Choice(value, title) for value, title in pairs)
+
+
+ACTIONS = (
+    _action("say", "say", "message-circle", [
+        Parameter("text", "text", "text", default="Nice to meet you, Aiko.", required=True, min_length=1, max_length=300),
+        Parameter("volume", "volume", "integer", 0, 100, 5, "%", 60),
+        Parameter("language", "language", "choice", default="en",
+                  choices=_choices(("en", "English"), ("fr", "French"), ("ja", "Japanese"))),
+    ], category="Speech", cancellable=True),
+    _action("turn", "turn", "rotate-ccw", [
+        Parameter("angle", "angle", "angle", -180, 180, 5, "°", 30, required=True),
+        Parameter("speed", "speed", "number", 10, 90, 1, "°/s", 40, advanced=False),
+    ], cancellable=True),
+    _action("light", "light", "lightbulb", [
+        Parameter("where", "where", "choice", default="eyes",
+                  choices=_choices(("eyes", "Eyes"), ("shoulders", "Shoulders"), ("both", "Both"))),
+        Parameter("colour", "colour", "colour", default="#3ab7ff", required=True),
+    ], category="Face and lights"),
+    _action("walk", "walk", "footprints", [
+        Parameter("distance", "distance", "number", -1, 1, 0.05, "m", 0.5, required=True),
+    ], risk="moves", cancellable=True),
+    _action("emotion", "show emotion", "smile", [
+        Parameter("emotion", "emotion", "choice", default="happy", choices=_choices(
+            ("neutral", "neutral"), ("happy", "happy"), ("sad", "sad"), ("surprised", "surprised"), ("angry", "angry"))),
+        Parameter("seconds", "for", "number", 0, 60, 0.5, "s", 2, advanced=True),
+        Parameter("gestures", "gestures", "boolean", default=True),
+    ], category="Face and lights"),
+    _action("listen", "listen for", "ear", [
+        Parameter("words", "words", "list", default=["yes", "no"]),
+        Parameter("picture", "picture", "image"),
+        Parameter("count", "count", "integer", default=1),
+    ], category="Speech"),
+    _action("stop", "stop everything", "square", [], synchronous=True),
+)  # fmt: skip
+
+SENSORS = (
+    Sensor("head_touched", "head touch", "boolean", "/Pepper/head_touched", icon="hand"),
+    Sensor("distance", "distance", "number", "/Pepper/distance", "m", 0, 2, icon="ruler"),
+    Sensor("battery", "battery", "integer", "/Pepper/battery", "%", 0, 100, icon="battery-medium"),
+    Sensor("sees_face", "sees a face", "boolean", "/Pepper/sees_face", icon="scan-face"),
+    Sensor("faces", "faces", "detections", "/Pepper/faces", icon="scan-face", camera="camera"),
+    Sensor("sound", "sound", "number", "/Pepper/sound", "dB", 0, 150, icon="volume-2"),
+    Sensor("heard_word", "heard word", "text", "/Pepper/heard_word", icon="ear"),
+    Sensor("pose", "position", "object", "/Pepper/pose", icon="navigation", fields=(
+        Field("x", "x", "number", "m"), Field("y", "y", "number", "m"), Field("theta", "facing", "number", "°"))),
+    Sensor("camera", "camera", "image", "/Pepper/camera", rate_hz=15, icon="camera"),
+)  # fmt: skip
+
+
+def pepper(name: str = "Pepper") -> Robot:
+    """The virtual robot's description, with one parameter of every kind."""
+    touched = Event(
+        "touched",
+        "touched",
+        "hand",
+        "Sensors",
+        (),
+        ("place",),
+        "when %robot %place is touched",
+        "/Pepper/touched",
+    )
+    return Robot(
+        name, "virtual-pepper", "Virtual Pepper", True, "native", ACTIONS, SENSORS, (touched,),
+        SafeStop("stop", 1.0, 0.2, True, True, True), ("base",),
+        RobotTopics("/Pepper/description", "/Pepper/command", "/Pepper/answer", "/Pepper/state", "/Pepper/world"),
+        {"title": name},
+    )  # fmt: skip

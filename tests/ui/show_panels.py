@@ -1,0 +1,106 @@
+"""Paints every panel alone, at its size in the design, light and dark, into a folder of pictures.
+
+python -m tests.ui.show_panels DIR [panel ...]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtWidgets import QApplication
+
+from app.ui import fonts
+from app.ui.docks import Dock
+from app.ui.panels import (
+    alerts,
+    behaviour,
+    camera,
+    console,
+    image,
+    inspector,
+    problems,
+    robot,
+    robots,
+    sensors,
+    topics,
+)
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.theme import Theme
+from tests.ui.fakes import Session
+
+SIZES: dict[str, tuple[Panel, int, int, str]] = {
+    "topics": (topics.PANEL, 640, 461, "compact"),
+    "inspector": (inspector.PANEL, 330, 782, "compact"),
+    "image": (image.PANEL, 220, 220, "compact"),
+    "console": (console.PANEL, 446, 222, "compact"),
+    "alerts": (alerts.PANEL, 446, 222, "compact"),
+    "robot": (robot.PANEL, 384, 327, "comfortable"),
+    "camera": (camera.PANEL, 384, 275, "comfortable"),
+    "sensors": (sensors.PANEL, 384, 250, "comfortable"),
+    "problems": (problems.PANEL, 1032, 124, "comfortable"),
+    "robots": (robots.PANEL, 1032, 818, "comfortable"),
+    "behaviour": (behaviour.PANEL, 1032, 626, "comfortable"),
+}
+
+
+def wait(milliseconds: int) -> None:
+    """Let Qt work for a while."""
+    loop = QEventLoop()
+    QTimer.singleShot(milliseconds, loop.quit)
+    loop.exec()
+
+
+def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -> None:
+    """Paint one panel in its dock."""
+    panel, width, height, density = SIZES[name]
+    context = PanelContext(session, theme, lambda _name: None, lambda _words: None, lambda _name: None)  # type: ignore[arg-type]
+    widget = panel.make(context)
+    dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
+    dock.resize(width, height)
+    dock.show()
+    dock.front = True
+    prepare(name, widget)
+    for _ in range(8):
+        session.tick()
+        dock.refresh()
+        wait(1500 if name == "behaviour" and _ == 4 else 10)
+    dock.grab().save(str(folder / f"{name}-{suffix}.png"))
+    widget.shut()
+    dock.close()
+    dock.deleteLater()
+
+
+def prepare(name: str, widget: PanelWidget) -> None:
+    """Choose what the design's picture has chosen."""
+    if name == "inspector" and isinstance(widget, inspector.InspectorPanel) and "/blackboard" in widget.session.topics:
+        widget.show_topic("/blackboard")
+        widget.session.send("/blackboard", {**__import__("tests.ui.fakes").ui.fakes.blackboard(0.0)})  # type: ignore[attr-defined]
+        widget.refresh()
+        widget.tree.setCurrentIndex(widget.model.reveal(("robots", "Pepper", "pose", "y")))
+    if name == "topics" and isinstance(widget, topics.TopicsPanel):
+        widget.refresh()
+        widget.show_topic("/blackboard")
+
+
+def main() -> int:
+    """Paint what was asked for."""
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    application = QApplication(sys.argv[:1])
+    fonts.load()
+    theme = Theme("light")
+    names = sys.argv[2:] or [name for name in SIZES if name != "behaviour"]
+    for mode in ("light", "dark"):
+        theme.set_mode(mode)  # type: ignore[arg-type]
+        for name in names:
+            show(name, Session.full(), theme, folder, mode)
+            if mode == "light":
+                show(name, Session(), theme, folder, "empty")
+    del application
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
