@@ -48,7 +48,8 @@ class Node:
 
     `transport` names a back end: "zeromq" (also "ZMQ"), "memory" (nodes of this process only). `master` is
     the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`: how long `new_pub` and
-    `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for ever. Raises `UnknownBackendError`.
+    `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for ever. Raises
+    `UnknownBackendError`.
     """
 
     def __init__(
@@ -82,10 +83,15 @@ class Node:
 
     # ---- how to connect
 
-    def hybrid(self, master_ip: str = "127.0.0.1", mode: str = "many2many", transport: str = "") -> Hybrid:  # noqa: ARG002
+    def hybrid(
+        self,
+        master_ip: str = "127.0.0.1",
+        mode: str = "many2many",
+        transport: str = "",  # noqa: ARG002 - the node's transport is used, as in the original
+    ) -> Hybrid:
         """Connected through a master; any number of publishers and subscribers, whatever the mode says.
 
-        "127.0.0.1" means the node's own master. The transport is the node's.
+        "127.0.0.1" means the node's own master.
         """
         is_own = master_ip == "127.0.0.1" or self._backend.name == "memory"
         return Hybrid(self._master if is_own else master_address(master_ip), checked_mode(mode))

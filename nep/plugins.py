@@ -28,7 +28,7 @@ T = TypeVar("T", bound=Named)
 
 
 def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """Name → plug-in: what the modules of `package` bind as `attribute`, and entry points of group `package`.
+    """Name → plug-in: what the modules of `package` bind as `attribute`, and entry points of that group.
 
     Modules that do not bind it are no plug-ins. A third party's entry point that fails is logged and left
     out; it cannot replace one of ours. Raises `PluginsMissingError` when the package has none (a frozen build

@@ -98,7 +98,7 @@ class Publisher:
 
 
 class Subscriber:
-    """Receives from one topic, in order. Iterating yields `Message`s until it is closed; a context manager."""
+    """Receives from one topic, in order. Iterating yields `Message`s until it is closed."""
 
     def __init__(self, carrier: Carrier, inlet: Inlet, spec: SubscriberSpec) -> None:
         self._carrier = carrier

@@ -1,0 +1,1 @@
+"""The native wire over ZeroMQ: the node's thread, its link to the master, its sockets."""

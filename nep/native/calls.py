@@ -1,0 +1,171 @@
+"""Calls: requests to a master and its answers, over one DEALER socket that any thread may use."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import zmq
+
+from nep.addresses import endpoint_of, is_loopback
+from nep.bodies import decode_answer, encode_request
+from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
+from nep.native.sockets import Socket, wait_until
+from nep.requests import Push, Refused, Reply, Request
+
+__all__ = ["Answer", "Calls", "Then"]
+
+_logger = logging.getLogger("nep")
+
+_AGAIN_S = 0.5
+"""A request without an answer is sent again after this: it may have gone to a master that ended just then."""
+
+Then = Callable[[Reply], None]
+
+
+@dataclass
+class _Call:
+    body: bytes
+    is_waited: bool
+    then: Then | None = None
+    reply: Reply | None = None
+    is_sent: bool = False
+
+
+class Answer(NamedTuple):
+    """What came from the master, and what to do with it if it answers a request that said so."""
+
+    what: Reply | Push
+    then: Then | None
+
+
+class Calls:
+    """`after_use` is called when the socket may have input that its descriptor no longer tells of."""
+
+    def __init__(self, socket: Socket, node_id: str, address: str, after_use: Callable[[], None]) -> None:
+        self.address = address
+        self._socket = socket
+        self._after_use = after_use
+        self._calls: dict[int, _Call] = {}
+        self._numbers = itertools.count(1)
+        self._is_closed = False
+        self._changed = threading.Condition(threading.Lock())
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.setsockopt(zmq.ROUTING_ID, node_id.encode())
+        socket.setsockopt(zmq.IMMEDIATE, 1)  # nothing is queued for a master that is not there
+        socket.setsockopt(zmq.RECONNECT_IVL, 50)
+        socket.setsockopt(zmq.RECONNECT_IVL_MAX, 400)
+        if not is_loopback(address):  # a computer that vanishes does not close its connections
+            socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
+            socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
+        socket.connect(endpoint_of(address))
+        self.fd = int(socket.getsockopt(zmq.FD))
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a master is there, as far as the connection knows."""
+        with self._changed:
+            return bool(self._events() & zmq.POLLOUT)
+
+    def ask(self, request: Request, timeout_s: float | None) -> Reply:
+        """The reply; `timeout_s` None waits for ever.
+
+        Raises `MasterUnreachable` in the end, `RequestRefusedError`, and `ClosedError` when closed meanwhile.
+        """
+        call = self._send(request, is_waited=True, then=None)
+        started = time.monotonic()
+        with self._changed:
+            while not wait_until(
+                self._changed,
+                lambda: call.reply is not None or self._is_closed,
+                _left(started, timeout_s),
+            ):
+                if timeout_s is not None and time.monotonic() - started >= timeout_s:
+                    self._calls = {number: each for number, each in self._calls.items() if each is not call}
+                    raise MasterUnreachable(self.address, timeout_s)
+                call.is_sent = False  # asking twice does no harm
+                self._flush()
+        if call.reply is None:
+            raise ClosedError("the node")
+        if isinstance(call.reply, Refused):
+            raise RequestRefusedError(call.reply.reason)
+        return call.reply
+
+    def tell(self, request: Request, then: Then | None = None) -> None:
+        """Send and do not wait; `then` gets the reply, in the node's thread. Lost when there is no master."""
+        self._send(request, is_waited=False, then=then)
+
+    def read(self) -> list[Answer]:
+        """All that came; also sends what is still to be sent. For the node's thread."""
+        answers: list[Answer] = []
+        with self._changed:
+            while self._events() & zmq.POLLIN:
+                answer = self._read_one()
+                if answer is not None:
+                    answers.append(answer)
+            self._flush()
+        return answers
+
+    def stop(self) -> None:
+        """Whoever waits gets `ClosedError`; nothing is sent any more."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+
+    def release(self) -> None:
+        """Close the socket; nobody polls it any more."""
+        with self._changed:
+            self._is_closed = True
+            self._socket.close(0)
+
+    def _send(self, request: Request, *, is_waited: bool, then: Then | None) -> _Call:
+        with self._changed:
+            number = next(self._numbers)
+            call = _Call(encode_request(request, number), is_waited, then)
+            if self._is_closed:
+                return call
+            self._calls[number] = call
+            self._flush()
+            is_input = self._events() & zmq.POLLIN
+        if is_input:
+            self._after_use()
+        return call
+
+    def _flush(self) -> None:
+        """With the lock held: send what is not sent; what nobody waits for is not kept for later."""
+        for number, call in list(self._calls.items()):
+            if call.is_sent or self._is_closed:
+                continue
+            try:
+                self._socket.send(call.body, zmq.DONTWAIT)
+                call.is_sent = True
+            except zmq.Again:
+                if not call.is_waited:
+                    del self._calls[number]
+
+    def _read_one(self) -> Answer | None:
+        try:
+            number, answer = decode_answer(self._socket.recv_multipart(zmq.DONTWAIT)[-1])
+        except WireError as error:
+            _logger.warning("the master at '%s' says what nobody understands: %s", self.address, error)
+            return None
+        call = self._calls.pop(number, None)
+        if call is None or isinstance(answer, Push):
+            return Answer(answer, None)
+        call.reply = answer
+        self._changed.notify_all()
+        return Answer(answer, call.then)
+
+    def _events(self) -> int:
+        return 0 if self._socket.closed else int(self._socket.getsockopt(zmq.EVENTS))
+
+
+def _left(started: float, timeout_s: float | None) -> float:
+    if timeout_s is None:
+        return _AGAIN_S
+    return max(0.0, min(_AGAIN_S, started + timeout_s - time.monotonic()))

@@ -1,0 +1,174 @@
+"""Direct connections: no master, one address that one side binds; the frames of the original NEP."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import zmq
+
+from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.codecs import codec_for
+from nep.configuration import Direct
+from nep.encoded import Encoded
+from nep.errors import ClosedError, WireError
+from nep.message import Message
+from nep.native.framing import from_frame, to_frame
+from nep.native.io import Rest
+from nep.native.reading import SocketInlet
+from nep.native.sockets import Budget, Socket, bind, connect, wait_until
+
+__all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach"]
+
+_QUEUE_BYTES = 256 * 2**20
+_QUEUE_MESSAGES = 10_000
+
+
+def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
+    """Bind or connect as the mode says; the endpoint. Raises `AddressInUseError`."""
+    if direct.mode == "many2many":
+        # Both connect, to the two ports of a proxy of the original NEP.
+        return connect(socket, f"{direct.ip}:{direct.port + (0 if is_publisher else 1)}")
+    binds = is_publisher == (direct.mode == "one2many")
+    address = f"{direct.ip}:{direct.port}"
+    return bind(socket, address) if binds else connect(socket, address)
+
+
+class OriginalOutlet:
+    """Owns `socket`, an XPUB that looks to the originals like their PUB."""
+
+    def __init__(
+        self,
+        socket: Socket,
+        spec: PublisherSpec,
+        direct: Direct,
+        on_close: Callable[[OriginalOutlet, float], None],
+    ) -> None:
+        self.spec = spec
+        self.count = 0
+        self._on_close = on_close
+        self.missing: tuple[str, ...] = ()
+        self._socket = socket
+        self._generation = direct.generation
+        self._filters = 0
+        self._is_closed = False
+        self._linger_ms = 0
+        self._budget = Budget(zmq.SNDHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=8)
+        self._budget.begin(socket)
+        self._changed = threading.Condition(threading.Lock())
+        socket.setsockopt(zmq.XPUB_VERBOSER, 1)  # so that filters can be counted: one a subscriber
+        self.fd = int(socket.getsockopt(zmq.FD))
+
+    @property
+    def subscribers(self) -> int:
+        """How many filters there are now; a proxy in between counts as one."""
+        return self._filters
+
+    def wait_for_any(self, timeout_s: float) -> None:
+        """Wait until somebody listens."""
+        with self._changed:
+            wait_until(self._changed, lambda: self._filters > 0, timeout_s)
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._changed:
+            self.count += 1
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish one frame."""
+        frame = to_frame(
+            self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
+        )
+        with self._changed:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count += 1
+            self._budget.note(self._socket, len(frame))
+            self._socket.send(frame, zmq.DONTWAIT, copy=len(frame) < 65_536)
+            self._read_filters()
+
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - it has nothing to do later
+        """Read filters."""
+        with self._changed:
+            self._read_filters()
+        return Rest()
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, deliver what is on its way, and close the socket. Once; called by its publisher."""
+        self._on_close(self, timeout_s)
+
+    def say_bye(self) -> None:
+        """Nothing is published any more."""
+        with self._changed:
+            self._is_closed = True
+
+    def finish(self, deadline: float) -> None:
+        """The original wire has no way to ask: closing lingers until `deadline`, see `release`."""
+        self._linger_ms = max(0, int((deadline - time.monotonic()) * 1000))
+
+    def release(self) -> None:
+        """Close the socket; libzmq goes on sending while the context is closed."""
+        with self._changed:
+            self._is_closed = True
+            self._socket.close(self._linger_ms)
+
+    def _read_filters(self) -> None:
+        while not self._socket.closed and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
+            event = self._socket.recv_multipart(zmq.DONTWAIT)[0]
+            self._filters += {b"\x01": 1, b"\x00": -1}.get(event[:1], 0)
+            self._changed.notify_all()
+
+
+class OriginalSub:
+    """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
+
+    def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
+        self.fd = int(socket.getsockopt(zmq.FD))
+        self.problem = ""
+        self.received = 0
+        self.lost: int | None = None
+        self._socket = socket
+        self._spec = spec
+        self._codec = codec_for(spec.msg_type)
+        self._budget = Budget(zmq.RCVHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=8)
+        self._budget.begin(socket)
+        socket.setsockopt(zmq.SUBSCRIBE, b"")
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read."""
+        return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+
+    def read(self) -> Message | None:
+        """The next message of this topic."""
+        while True:
+            try:
+                parts = self._socket.recv_multipart(zmq.DONTWAIT)
+            except zmq.Again:
+                return None
+            if len(parts) != 1:
+                self.problem = f"a message of the original NEP has one part, this one has {len(parts)}"
+                continue
+            self._budget.note(self._socket, len(parts[0]))
+            try:
+                data = from_frame(self._spec.topic, self._spec.msg_type, self._codec.name, parts[0])
+            except WireError as error:
+                self.problem = error.reason
+                continue
+            if data is not None:
+                self.problem = ""
+                self.received += 1
+                return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
+
+    def dropped(self, count: int) -> None:
+        """Dropped here for lack of room: the only losses that can be known."""
+        self.received -= count
+        self.lost = (self.lost or 0) + count
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close(0)
+
+
+OriginalInlet = SocketInlet[OriginalSub]

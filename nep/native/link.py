@@ -1,0 +1,232 @@
+"""MasterLink: what a node has registered with one master: renews it every second, hears of publishers.
+
+It keeps everything that is registered, so that a master that was started again learns all of it at once.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterable
+
+from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError
+from nep.native.calls import Calls
+from nep.native.inlet import NativeInlet
+from nep.native.io import IoThread, Rest
+from nep.native.outlet import NativeOutlet
+from nep.native.sockets import Socket
+from nep.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
+from nep.requests import (
+    Added,
+    AddPublisher,
+    AddSubscriber,
+    Found,
+    Join,
+    Leave,
+    Look,
+    PublisherCame,
+    PublisherGone,
+    Push,
+    RemovePublisher,
+    RemoveSubscriber,
+    Renew,
+    Renewed,
+    Reply,
+    ReportMissing,
+    Seen,
+)
+from nep.views import GraphView
+
+__all__ = ["RENEW_S", "MasterLink"]
+
+_logger = logging.getLogger("nep")
+
+RENEW_S = 1.0
+_JOIN_AGAIN_S = 0.5
+
+
+class MasterLink:
+    """The link of `node` to the master at `address`, over `socket` (a DEALER). `io` serves it."""
+
+    def __init__(self, socket: Socket, io: IoThread, node: NodeRecord, address: str) -> None:
+        self.address = address
+        self._node = node
+        self._io = io
+        self._calls = Calls(socket, node.id, address, after_use=lambda: io.serve_soon(self))
+        self._lock = threading.Lock()
+        self._publishers: dict[int, tuple[PublisherRecord, NativeOutlet]] = {}
+        self._subscribers: dict[int, tuple[SubscriberRecord, NativeInlet]] = {}
+        self._confirmed: set[int] = set()
+        self._epoch = 0
+        self._revision = 0
+        self._join_again_at = 0.0
+        self._renew_at = 0.0
+        self._was_connected = False
+        self._is_closed = False
+        self.fd = self._calls.fd
+
+    # ---- for the carrier, in any thread
+
+    def add_publisher(self, record: PublisherRecord, outlet: NativeOutlet, wait_s: float | None) -> Added:
+        """Register; the subscribers to expect. Raises as `Calls.ask` does."""
+        with self._lock:
+            self._publishers[record.id] = (record, outlet)
+        try:
+            reply = self._calls.ask(AddPublisher(self._node, record), wait_s)
+        except BaseException:
+            self.remove_publisher(record.id, 0)
+            raise
+        with self._lock:
+            self._confirmed.add(record.id)
+        return reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
+
+    def add_subscriber(self, record: SubscriberRecord, inlet: NativeInlet, wait_s: float | None) -> Found:
+        """Register; the publishers to connect to. Raises as `Calls.ask` does."""
+        with self._lock:
+            self._subscribers[record.id] = (record, inlet)
+        try:
+            reply = self._calls.ask(AddSubscriber(self._node, record), wait_s)
+        except BaseException:
+            self.remove_subscriber(record.id)
+            raise
+        with self._lock:
+            self._confirmed.add(record.id)
+        return reply if isinstance(reply, Found) else Found(reply.epoch, reply.revision)
+
+    def remove_publisher(self, publisher: int, last_seq: int) -> None:
+        """Unregister; does not wait."""
+        with self._lock:
+            known = self._publishers.pop(publisher, None)
+            self._confirmed.discard(publisher)
+        if known is not None:
+            self._calls.tell(RemovePublisher(self._node.id, publisher, last_seq))
+
+    def remove_subscriber(self, subscriber: int) -> None:
+        """Unregister; does not wait."""
+        with self._lock:
+            known = self._subscribers.pop(subscriber, None)
+            self._confirmed.discard(subscriber)
+        if known is not None:
+            self._calls.tell(RemoveSubscriber(self._node.id, subscriber))
+
+    def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
+        """Tell the master who did not answer."""
+        self._calls.tell(ReportMissing(self._node.id, publisher, tuple(subscribers)))
+
+    def look(self, timeout_s: float) -> GraphView:
+        """The graph. Raises as `Calls.ask` does."""
+        reply = self._calls.ask(Look(), timeout_s)
+        if not isinstance(reply, Seen):
+            raise RequestRefusedError(f"the master at '{self.address}' shows no graph")
+        return reply.view
+
+    def leave(self, timeout_s: float) -> None:
+        """Unregister the node with all that it has, if there is a master."""
+        with self._lock:
+            self._publishers.clear()
+            self._subscribers.clear()
+            self._confirmed.clear()
+            is_known = self._epoch != 0
+            self._is_closed = True
+        if is_known and self._calls.is_connected:
+            try:
+                self._calls.ask(Leave(self._node.id), timeout_s)
+            except (MasterUnreachable, RequestRefusedError, ClosedError):
+                _logger.debug("the master at '%s' did not hear that a node leaves", self.address)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._calls.stop()
+        self._io.remove(self)
+        self._calls.release()
+
+    # ---- in the node's thread
+
+    def serve(self, now: float) -> Rest:
+        """Read answers; renew when it is time, and at once when a master has come back."""
+        for answer in self._calls.read():
+            self._obey(answer.what, now)
+            if answer.then is not None and not isinstance(answer.what, Push):
+                answer.then(answer.what)
+        if self._is_closed:
+            return Rest()
+        is_connected = self._calls.is_connected
+        if is_connected and not self._was_connected:
+            self._renew_at = now
+        self._was_connected = is_connected
+        if now >= self._renew_at:
+            self._renew_at = now + RENEW_S
+            self._renew()
+        return Rest(due=self._renew_at)
+
+    def _obey(self, answer: Reply | Push, now: float) -> None:
+        if isinstance(answer, PublisherCame):
+            for inlet in self._inlets(answer.publisher.publisher.topic):
+                inlet.connect((answer.publisher,))
+        elif isinstance(answer, PublisherGone):
+            for inlet in self._inlets(answer.topic):
+                inlet.gone(answer.id, answer.last_seq, is_closed=answer.is_closed)
+        elif isinstance(answer, Renewed):
+            self._renewed(answer, now)
+        elif isinstance(answer, Added | Found) and self._epoch == 0:
+            self._epoch = answer.epoch
+        if self._epoch not in {0, answer.epoch}:
+            self._join(now)
+
+    def _renew(self) -> None:
+        if self._epoch == 0:
+            return
+        with self._lock:
+            outlets = [outlet for each, (_, outlet) in self._publishers.items() if each in self._confirmed]
+            inlets = [inlet for each, (_, inlet) in self._subscribers.items() if each in self._confirmed]
+            request = Renew(
+                self._node.id,
+                self._epoch,
+                self._revision,
+                tuple(outlet.counts() for outlet in outlets),
+                tuple(inlet.counts() for inlet in inlets),
+            )
+            self._calls.tell(request)
+
+    def _renewed(self, answer: Renewed, now: float) -> None:
+        if answer.again:
+            self._join(now)
+            return
+        self._revision = answer.revision
+        for topic in answer.topics:
+            for inlet in self._inlets(topic.topic):
+                inlet.reconcile(topic.publishers)
+        for _record, inlet in self._all_inlets():
+            inlet.tick(now, answer.last_seqs.items())
+
+    def _join(self, now: float) -> None:
+        """Register everything again, once at a time."""
+        if now < self._join_again_at or self._is_closed:
+            return
+        self._join_again_at = now + _JOIN_AGAIN_S
+        with self._lock:
+            publishers = tuple(record for record, _ in self._publishers.values())
+            subscribers = tuple(record for record, _ in self._subscribers.values())
+            request = Join(self._node, self._epoch, publishers, subscribers)
+            items = {record.id for record in publishers} | {record.id for record in subscribers}
+            self._calls.tell(request, then=lambda reply: self._joined(reply, items))
+
+    def _joined(self, reply: Reply, items: set[int]) -> None:
+        if not isinstance(reply, Found):
+            return
+        self._epoch, self._revision = reply.epoch, reply.revision
+        self._join_again_at = 0.0
+        with self._lock:
+            self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())
+        by_topic: dict[str, list[RemotePublisher]] = {}
+        for remote in reply.publishers:
+            by_topic.setdefault(remote.publisher.topic, []).append(remote)
+        for record, inlet in self._all_inlets():
+            inlet.reconcile(by_topic.get(record.topic, ()))
+
+    def _inlets(self, topic: str) -> list[NativeInlet]:
+        return [inlet for record, inlet in self._all_inlets() if record.topic == topic]
+
+    def _all_inlets(self) -> list[tuple[SubscriberRecord, NativeInlet]]:
+        with self._lock:
+            return list(self._subscribers.values())

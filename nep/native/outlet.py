@@ -1,0 +1,203 @@
+"""NativeOutlet: a publisher's XPUB socket.
+
+Sends happen in the publisher's thread; subscriptions are read by whoever uses the socket next, the publisher
+or the node's thread. A subscriber counts as connected when its hello has been read: see `docs/wire.md`.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable
+
+import zmq
+
+from nep.backends.base import PublisherSpec
+from nep.encoded import Encoded
+from nep.errors import ClosedError
+from nep.native.io import Rest
+from nep.native.sockets import Budget, Socket, wait_until
+from nep.records import Expected, PublisherCount
+from nep.wire import BYE, LATCHED, Header, extension_part, hello_part, parse_hello, topic_part
+from nep.wire import EXTENSION as EXTENSION_FLAG
+
+__all__ = ["NativeOutlet"]
+
+_logger = logging.getLogger("nep")
+
+_QUEUE_BYTES = 256 * 2**20
+_QUEUE_MESSAGES = 50_000
+_NO_COPY_BYTES = 65_536
+_BYE_AGAIN_S = 0.05
+
+
+class NativeOutlet:
+    """Owns `socket`, an XPUB that is bound or connected already."""
+
+    def __init__(
+        self, socket: Socket, spec: PublisherSpec, on_close: Callable[[NativeOutlet, float], None]
+    ) -> None:
+        self.spec = spec
+        self.count = 0
+        self._on_close = on_close
+        self._socket = socket
+        self._bytes = 0
+        self._last_stamp_ns: int | None = None
+        self._seen: dict[int, int] = {}
+        self._names: dict[int, str] = {}
+        self._waited: set[int] = set()
+        self._latched: tuple[bytes | memoryview, ...] | None = None
+        self._topic = topic_part(spec.topic)
+        self._budget = Budget(zmq.SNDHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=8)
+        self._budget.begin(socket)
+        self._changed = threading.Condition(threading.Lock())
+        self._is_closed = False
+        self.fd = int(socket.getsockopt(zmq.FD))
+
+    # ---- who listens
+
+    @property
+    def subscribers(self) -> int:
+        """How many subscribers said hello and have not gone."""
+        return len(self._seen)
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes that were expected and have not said hello."""
+        with self._changed:
+            return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
+
+    def expect(self, expected: Iterable[Expected]) -> None:
+        """These subscribers are registered and will connect."""
+        with self._changed:
+            for each in expected:
+                self._waited.add(each.id)
+                self._names[each.id] = each.node_name
+
+    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
+        """Wait until these have said hello; the ids of those that did not in time."""
+        wanted = {each.id for each in expected}
+        with self._changed:
+            wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
+            return tuple(wanted - self._seen.keys())
+
+    def wait_for_any(self, timeout_s: float) -> None:
+        """Wait until somebody has said hello."""
+        with self._changed:
+            wait_until(self._changed, lambda: bool(self._seen), timeout_s)
+
+    def counts(self) -> PublisherCount:
+        """The statistics for a renewal."""
+        with self._changed:
+            return PublisherCount(self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns)
+
+    # ---- sending
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._changed:
+            self.count += 1
+            self._last_stamp_ns = time.time_ns()
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed."""
+        data = encoded.data
+        if isinstance(data, memoryview):
+            data = data.cast("B") if data.readonly and data.c_contiguous else bytes(data)
+        extension = extension_part(encoded.extension) if encoded.extension else None
+        flags = (EXTENSION_FLAG if extension else 0) | (LATCHED if self.spec.is_latched else 0)
+        with self._changed:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count += 1
+            self._bytes += len(data)
+            self._last_stamp_ns = stamp_ns = time.time_ns()
+            header = Header(self.spec.codec.number, flags, self.count, stamp_ns, self.spec.id).pack()
+            tail = (header, data) if extension is None else (header, data, extension)
+            if self.spec.is_latched:
+                self._latched = tail
+            self._budget.note(self._socket, len(data))
+            self._send_parts(self._topic, tail)
+            self._read_subscriptions()
+
+    def _send_parts(self, first: bytes, tail: tuple[bytes | memoryview, ...]) -> None:
+        """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
+        send = self._socket.send
+        send(first, zmq.SNDMORE)
+        for part in tail[:-1]:
+            send(part, zmq.SNDMORE, len(part) < _NO_COPY_BYTES)
+        send(tail[-1], 0, len(tail[-1]) < _NO_COPY_BYTES)
+
+    # ---- subscriptions
+
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - it has nothing to do later
+        """Read subscriptions."""
+        with self._changed:
+            if not self._is_closed or self._seen:
+                self._read_subscriptions()
+        return Rest()
+
+    def _read_subscriptions(self) -> None:
+        """With the lock held: until the socket has nothing more."""
+        while not self._socket.closed and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
+            event = self._socket.recv(zmq.DONTWAIT)
+            hello = parse_hello(event[1:])
+            if hello is None or hello[1] != self.spec.topic:
+                continue  # a topic filter, or a subscriber of whoever had this port before
+            if event[0] == 1:
+                self._greet(hello[0])
+            else:
+                self._seen.pop(hello[0], None)
+            self._changed.notify_all()
+
+    def _greet(self, subscriber: int) -> None:
+        """What was latched, then the echo: from here on the subscriber counts."""
+        own = hello_part(subscriber, self.spec.topic)
+        if self._latched is not None:
+            self._send_parts(own, self._latched)
+        self._send_parts(own, (self._notice(0),))
+        self._seen[subscriber] = self.count
+
+    def _notice(self, flags: int) -> bytes:
+        return Header(self.spec.codec.number, flags, self.count, time.time_ns(), self.spec.id).pack()
+
+    # ---- closing
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, deliver what is on its way, and close the socket. Once; called by its publisher."""
+        self._on_close(self, timeout_s)
+
+    def say_bye(self) -> None:
+        """Nothing is published any more; every subscriber disconnects when it has read everything."""
+        with self._changed:
+            self._is_closed = True
+            self._bye()
+
+    def finish(self, deadline: float) -> None:
+        """Wait until all have disconnected; log what was not delivered at `deadline`, and to how many."""
+        with self._changed:
+            while self._seen and (left := deadline - time.monotonic()) > 0.0:
+                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
+                    self._bye()  # a full queue drops it like anything else
+            if self._seen:
+                most = self.count - min(self._seen.values())
+                _logger.warning(
+                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    self.spec.topic,
+                    len(self._seen),
+                    most,
+                )
+                self._seen.clear()
+
+    def release(self) -> None:
+        """Close the socket; the node's thread has let go of it."""
+        with self._changed:
+            self._is_closed = True
+            self._socket.close(0)
+
+    def _bye(self) -> None:
+        if not self._socket.closed:
+            for subscriber in self._seen:
+                self._send_parts(hello_part(subscriber, self.spec.topic), (self._notice(BYE),))
+            self._read_subscriptions()

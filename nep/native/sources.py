@@ -1,0 +1,124 @@
+"""Sources: the publishers that a subscriber hears, and how many of their messages were lost. No sockets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nep.records import RemotePublisher
+
+__all__ = ["Source", "Sources"]
+
+FAREWELL_S = 3.0
+"""So long after a publisher has unregistered its last messages may still come."""
+
+
+@dataclass
+class Source:
+    """One publisher. `last` is the newest message heard of it, None before the first."""
+
+    remote: RemotePublisher | None = None
+    endpoint: str = ""
+    last: int | None = None
+    has_echoed: bool = False
+    is_lapsed: bool = False
+    ends_at: float | None = None
+    final: int = 0
+    promised: int = 0
+    written_off: int = 0
+
+
+class Sources:
+    """Counts `received` and `lost`, from sequence numbers without gaps."""
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.lost = 0
+        self._all: dict[int, Source] = {}
+
+    def get(self, publisher: int) -> Source:
+        """The source of this id, made when it is new."""
+        source = self._all.get(publisher)
+        if source is None:
+            source = self._all[publisher] = Source()
+        return source
+
+    def find(self, publisher: int) -> Source | None:
+        """The source of this id, if there is one."""
+        return self._all.get(publisher)
+
+    def pop(self, publisher: int) -> Source | None:
+        """Forget a source."""
+        return self._all.pop(publisher, None)
+
+    def items(self) -> list[tuple[int, Source]]:
+        """All of them, by id."""
+        return list(self._all.items())
+
+    def arrived(self, publisher: int, seq: int, *, is_resent: bool) -> bool:
+        """A message arrived; False when it is one that was heard already and only sent again (latched)."""
+        source = self.get(publisher)
+        last = source.last
+        if last is None or seq > last:
+            if last is not None and not is_resent:
+                self.lost += seq - last - 1
+            source.last = seq
+        elif source.written_off:  # it was only late
+            source.written_off -= 1
+            self.lost -= 1
+        elif is_resent:
+            return False
+        self.received += 1
+        return True
+
+    def reached(self, publisher: int, seq: int) -> None:
+        """An echo or a bye: messages up to `seq` were sent before it, on the same connection."""
+        source = self.get(publisher)
+        if source.last is not None and seq > source.last:
+            self.lost += seq - source.last
+        if source.last is None or seq > source.last:
+            source.last = seq
+
+    def promised(self, publisher: int, seq: int) -> None:
+        """The master says that `seq` was sent. Nothing waits in the socket.
+
+        What was promised one renewal ago and has not come since is lost. Should it come after all, it is
+        taken off again.
+        """
+        source = self._all.get(publisher)
+        if source is None or source.last is None or not source.has_echoed:
+            return
+        if source.promised > source.last:
+            missing = source.promised - source.last
+            self.lost += missing
+            source.written_off += missing
+            source.last = source.promised
+        source.promised = seq
+
+    def dropped(self, count: int) -> None:
+        """So many messages that had been received were dropped for lack of room."""
+        self.received -= count
+        self.lost += count
+
+    def closing(self, publisher: int, final: int, now: float) -> None:
+        """A publisher has unregistered; its last message was `final`."""
+        source = self._all.get(publisher)
+        if source is not None and source.ends_at is None:
+            source.ends_at = now + FAREWELL_S
+            source.final = final
+
+    def ended(self, now: float) -> list[int]:
+        """Publishers that unregistered long ago and whose bye has not come."""
+        return [
+            each for each, source in self._all.items() if source.ends_at is not None and now >= source.ends_at
+        ]
+
+    def replaced_by(self, remote: RemotePublisher) -> list[int]:
+        """Silent publishers whose program has been started again, as `remote`."""
+        return [
+            each
+            for each, source in self._all.items()
+            if source.is_lapsed
+            and source.remote is not None
+            and each != remote.publisher.id
+            and source.remote.node_name == remote.node_name
+        ]

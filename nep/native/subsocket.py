@@ -1,0 +1,154 @@
+"""SubSocket: a SUB socket with its publishers: reads parts, tells messages from notices, counts losses.
+
+It has no lock: it lives under its inlet's.
+"""
+
+from __future__ import annotations
+
+import errno
+
+import zmq
+
+from nep.backends.base import SubscriberSpec
+from nep.codecs import codec_numbered
+from nep.errors import WireError
+from nep.message import Message
+from nep.native.sockets import Budget, Socket
+from nep.native.sources import Sources
+from nep.records import RemotePublisher
+from nep.wire import BYE, EXTENSION, LATCHED, Header, hello_part, read_extension, read_header, topic_part
+
+__all__ = ["SubSocket"]
+
+_QUEUE_BYTES = 64 * 2**20
+_QUEUE_MESSAGES = 10_000
+_NO_COPY_BYTES = 65_536
+
+
+class SubSocket:
+    """Sets the filters at once, before anything is connected or bound: the hello must follow the topic."""
+
+    def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
+        self.sources = Sources()
+        self.problem = ""
+        self.fd = int(socket.getsockopt(zmq.FD))
+        self._socket = socket
+        self._spec = spec
+        self._topic = topic_part(spec.topic)
+        self._hello = hello_part(spec.id, spec.topic)
+        self._budget = Budget(zmq.RCVHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=4)
+        self._budget.begin(socket)
+        socket.setsockopt(zmq.SNDHWM, 0)  # libzmq silently drops filters beyond 1000 otherwise
+        socket.setsockopt(zmq.SUBSCRIBE, self._topic)
+        socket.setsockopt(zmq.SUBSCRIBE, self._hello)
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self.sources.received
+
+    @property
+    def lost(self) -> int:
+        """Messages that did not."""
+        return self.sources.lost
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read. Also takes note of connections that came and went."""
+        return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+
+    def connect(self, remote: RemotePublisher) -> None:
+        """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
+        for old in self.sources.replaced_by(remote):
+            self.leave(old)
+        source = self.sources.get(remote.publisher.id)
+        source.remote = remote
+        source.is_lapsed = False
+        source.ends_at = None
+        if not source.endpoint and remote.publisher.endpoints:
+            source.endpoint = remote.publisher.endpoints[0]
+            self._socket.connect(source.endpoint)
+
+    def leave(self, publisher: int) -> None:
+        """Disconnect from a publisher and forget it."""
+        source = self.sources.pop(publisher)
+        if source is not None and source.endpoint:
+            try:
+                self._socket.disconnect(source.endpoint)
+            except zmq.ZMQError as error:
+                if error.errno != errno.ENOENT:  # it was not connected any more
+                    raise
+
+    def read(self) -> Message | None:
+        """The next message; None when there is nothing more. Notices are dealt with on the way."""
+        while True:
+            try:
+                frame = self._socket.recv(zmq.DONTWAIT, copy=False)
+            except zmq.Again:
+                return None
+            first = frame.bytes
+            rest = self._socket.recv_multipart(zmq.DONTWAIT, copy=False) if frame.more else []
+            if first not in {self._topic, self._hello}:
+                continue  # whoever had this port before, or a topic that begins with this one's bytes
+            try:
+                message = self._understand(rest, is_resent=first == self._hello)
+            except WireError as error:
+                self.problem = error.reason
+                continue
+            if message is not None:
+                return message
+
+    def dropped(self, count: int) -> None:
+        """So many messages that had been received were dropped for lack of room."""
+        self.sources.dropped(count)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close(0)
+
+    def _understand(self, rest: list[zmq.Frame], *, is_resent: bool) -> Message | None:
+        if not rest:
+            raise WireError("a message has 3 or 4 parts, this one has 1")
+        header = read_header(rest[0].bytes)
+        if is_resent and len(rest) == 1:
+            self._notice(header)
+            return None
+        if len(rest) != (3 if header.flags & EXTENSION else 2):
+            raise WireError(f"a message has 3 or 4 parts, this one has {len(rest) + 1}")
+        return self._message(header, rest, is_resent=is_resent)
+
+    def _notice(self, header: Header) -> None:
+        """An echo, or the last word of a publisher that closes."""
+        self.sources.reached(header.publisher, header.seq)
+        if header.flags & BYE:
+            self.leave(header.publisher)
+        else:
+            self.sources.get(header.publisher).has_echoed = True
+
+    def _message(self, header: Header, rest: list[zmq.Frame], *, is_resent: bool) -> Message | None:
+        codec = codec_numbered(header.codec)
+        if codec is None:
+            raise WireError(
+                f"its codec has the number {header.codec}, which this nep does not know; update nep"
+            )
+        extension = read_extension(rest[2].buffer) if header.flags & EXTENSION else None
+        if not self.sources.arrived(header.publisher, header.seq, is_resent=is_resent):
+            return None
+        payload = rest[1]
+        size = len(payload)
+        self._budget.note(self._socket, size)
+        source = self.sources.get(header.publisher)
+        message = Message(
+            self._spec.topic,
+            # A small view must not keep a large receive buffer alive.
+            payload.buffer if size >= _NO_COPY_BYTES else payload.bytes,
+            codec.name,
+            self._spec.msg_type if source.remote is None else source.remote.publisher.msg_type,
+            stamp_ns=header.stamp_ns,
+            seq=header.seq,
+            publisher=header.publisher,
+            extension=extension or {},
+        )
+        message.is_latched = bool(header.flags & LATCHED)
+        self.problem = ""
+        return message
