@@ -89,10 +89,8 @@ class Lines:
 
     def __call__(self, message: Message) -> None:
         """Show one message."""
-        head, body = _head(message), _body(message)
-        room = self._console.width - len(head) - 2
-        if len(body) > room and message.codec in {"json", "msgpack"}:
-            body = "\n" + textwrap.indent(_dump(message.payload, indent=True), "  ")
+        head = _head(message)
+        body = _body(message, self._console.width - len(head) - 2)
         if self._paint is None:
             print(f"{head}  {body}", flush=True)
         else:
@@ -111,7 +109,8 @@ def _head(message: Message) -> str:
     return f"{stamp}{seq}"
 
 
-def _body(message: Message) -> str:
+def _body(message: Message, room: int) -> str:
+    """What a message says: on one line if `room` letters are enough or nothing can be laid out."""
     if message.codec == "image":
         return _picture(message)
     try:
@@ -124,7 +123,8 @@ def _body(message: Message) -> str:
         return payload
     if isinstance(payload, bytes):
         return f"{size(len(payload))}: {_hexadecimal(payload)}"
-    return _dump(payload)
+    line = _dump(payload)
+    return line if len(line) <= room else "\n" + textwrap.indent(_dump(payload, indent=True), "  ")
 
 
 def _hexadecimal(data: bytes | memoryview) -> str:

@@ -38,13 +38,13 @@ class Room:
         for kind, publisher in self.publishers.items():
             for number in range(-1, -50, -1):
                 publisher.tell(make(kind, number))
-                if all([each.hears(make(kind, number), 0.3) for each in self.subscribers.values()]):
+                if all(each.hears(make(kind, number), 0.3) for each in self.subscribers.values()):
                     break
             else:
                 pytest.fail(f"{kind} is not heard by everybody")
 
     def publish(self, make, first=0, count=MESSAGES):
-        """All publish in turn, each message after the one before was heard: originals keep the newest only."""
+        """All publish in turn, each message when the one before was heard: originals keep the newest only."""
         for number in range(first, first + count):
             for kind, publisher in self.publishers.items():
                 publisher.tell(make(kind, number))

@@ -44,6 +44,16 @@ def test_asking_twice_is_one_registration_and_another_program_another():
     assert known.registrations == (registration(),)
 
 
+def test_after_the_computer_was_started_again_no_program_is_remembered(tmp_path):
+    before = PortMap(tmp_path / "map.json", boot=1000.0)
+    before.give(JSON_A, 9000)
+    before.add(registration())
+    before.save()
+    after = PortMap(tmp_path / "map.json", boot=5000.0)
+    assert after.port_of(JSON_A) == 9000
+    assert not after.registrations
+
+
 def test_ports_are_given_from_9000_up_in_even_steps():
     known = PortMap(None)
     assert next(known.candidates(lambda line: True)) == FIRST_PORT == 9000

@@ -1,7 +1,7 @@
 """A program of the original NEP (any Python version of it), driven by a test over its pipes.
 
-`publisher TOPIC TYPE MODE`: publishes each line of JSON that comes in. `subscriber TOPIC TYPE MODE`: writes each
-message that arrives as a line of JSON. `client TOPIC`, `server TOPIC`: one request per line; a server answers it.
+Arguments: ROLE TOPIC TYPE MODE NAME. A publisher publishes each line of JSON that comes in; a subscriber
+writes each message as a line of JSON; a client asks what comes in and writes the answer; a server answers.
 """
 
 import json

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from nep.cli.screen import (
+    UNKNOWN,
+    Column,
+    duration,
+    rate,
+    say_error,
+    show_alerts,
+    show_json,
+    show_table,
+    size,
+)
+from nep.graph import Alert
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, UNKNOWN), (0.0, "0.0 /s"), (29.97, "30.0 /s"), (123.4, "123 /s"), (45_000.0, "45000 /s")],
+)
+def test_rates(value, text):
+    assert rate(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, UNKNOWN),
+        (0, "0 B"),
+        (999, "999 B"),
+        (1500, "1.5 kB"),
+        (250_000, "250 kB"),
+        (8_300_000, "8.3 MB"),
+        (2e10, "20.0 GB"),
+    ],
+)
+def test_sizes(value, text):
+    assert size(value) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(-1, "0 s"), (59, "59 s"), (300, "5 min"), (7200, "2.0 h"), (200_000, "2.3 d")]
+)
+def test_durations(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_a_table_has_a_head_and_a_row_for_each(capsys):
+    show_table(
+        [Column("topic"), Column("rate", "right")], [("/camera", "30.0 /s"), ("[red]odd[/red]", UNKNOWN)]
+    )
+    lines = capsys.readouterr().out.splitlines()
+    assert "topic" in lines[0]
+    assert any("/camera" in line and "30.0 /s" in line for line in lines)
+    assert any("[red]odd[/red]" in line for line in lines)
+
+
+def test_alerts_go_beside_the_results_with_what_to_do(capsys):
+    show_alerts([Alert("port:7000", "Port 7000 is taken", "Close that program.")])
+    captured = capsys.readouterr()
+    assert not captured.out
+    assert "Port 7000 is taken" in captured.err
+    assert "Close that program." in captured.err
+
+
+def test_an_error_is_one_sentence_on_the_error_stream(capsys):
+    say_error("no master answers")
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", "nep: no master answers\n")
+
+
+def test_json_is_one_line_also_with_bytes_number_keys_and_nan(capfdbinary):
+    show_json({1: b"\x00\xff", "a": float("nan"), "text": "Grüße\n日本"})
+    line = capfdbinary.readouterr().out
+    assert line.count(b"\n") == 1
+    assert json.loads(line) == {"1": "00ff", "a": None, "text": "Grüße\n日本"}

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from nep.cli.echo import Lines, show_record
+from nep.cli.publish import value_of
+from nep.errors import EncodeError
+from nep.message import Message
+
+
+def message(data, codec="json", **more):
+    return Message("t", data, codec, codec, stamp_ns=1_700_000_000_123_000_000, seq=7, publisher=9, **more)
+
+
+def record_of(given, capfdbinary):
+    show_record(given)
+    return json.loads(capfdbinary.readouterr().out)
+
+
+def test_a_record_has_all_that_a_message_has(capfdbinary):
+    assert record_of(message('{"a":"Grüße"}'.encode()), capfdbinary) == {
+        "topic": "t",
+        "msg_type": "json",
+        "codec": "json",
+        "stamp_ns": 1_700_000_000_123_000_000,
+        "seq": 7,
+        "publisher": 9,
+        "size_bytes": 15,
+        "payload": {"a": "Grüße"},
+    }
+
+
+def test_a_picture_is_told_by_its_shape_and_not_decoded(capfdbinary):
+    given = message(
+        b"\xff\xd8\xff no picture", "image", extension={"shape": [240, 320, 3], "encoding": "jpeg"}
+    )
+    assert record_of(given, capfdbinary)["payload"] == {"shape": [240, 320, 3], "encoding": "jpeg"}
+
+
+def test_what_cannot_be_decoded_is_told_as_bytes_with_the_reason(capfdbinary):
+    record = record_of(message(b"{oops"), capfdbinary)
+    assert record["bytes"] == b"{oops".hex()
+    assert "cannot decode" in record["error"]
+    assert "payload" not in record
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        (message(b'{"a":1}'), '{"a":1}'),
+        (message("Grüße  日本".encode(), "string"), "Grüße  日本"),
+        (message(b"\x00\x01", "bytes"), "2 B: 00 01"),
+        (
+            message(b"x" * 9000, "image", extension={"shape": [240, 320, 3], "encoding": "jpeg"}),
+            "jpeg 320 x 240, 9.0 kB",
+        ),
+        (message(b"{oops"), "5 B, no json: 7b 6f 6f 70 73"),
+    ],
+)
+def test_people_see_one_line_a_message(given, shown, capsys):
+    Lines()(given)
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1
+    assert "#7" in out
+    assert shown in out
+
+
+def test_what_is_longer_than_the_screen_is_laid_out(capsys):
+    Lines()(message(json.dumps({"words": ["message"] * 40}).encode()))
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 40
+    assert "  {" in lines[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "msg_type", "value"),
+    [
+        ('{"a": [1, null]}', "json", {"a": [1, None]}),
+        ('{"id": "1"}', "robot/command", {"id": "1"}),
+        ("2.5", "msgpack", 2.5),
+        ("hello world", "string", "hello world"),
+        ("Grüße", "bytes", "Grüße".encode()),
+    ],
+)
+def test_the_type_decides_what_a_text_stands_for(text, msg_type, value):
+    assert value_of(text, msg_type) == value
+
+
+def test_text_that_is_no_json_says_what_to_do():
+    with pytest.raises(EncodeError, match="--type string"):
+        value_of("hello", "json")
+
+
+def test_a_file_can_be_published(tmp_path):
+    file = tmp_path / "data"
+    file.write_bytes(b'{"a": 1}')
+    assert value_of(f"@{file}", "json") == {"a": 1}
+    assert value_of(f"@{file}", "bytes") == b'{"a": 1}'
+    with pytest.raises(EncodeError, match="cannot be read"):
+        value_of("@/nowhere/at/all", "bytes")
+    with pytest.raises(EncodeError, match=r"@picture\.jpg"):
+        value_of("hello", "image")

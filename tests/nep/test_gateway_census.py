@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from nep.gateway.census import Census, Link
+from nep.gateway.pair import ends_of
+from nep.gateway.portmap import Line, PortMap, Registration
+
+LINE = Line("t", "prefixed", "json", "many2many")
+
+
+class FakeProcesses:
+    def __init__(self):
+        self.running = {}
+        self.joined = set()
+        self.is_secret = False
+
+    def started(self, pid):
+        return self.running.get(pid)
+
+    def language(self, pid):
+        return "python"
+
+    def is_joined(self, pid, port, *, binds):
+        return None if self.is_secret else (pid, port) in self.joined
+
+
+@pytest.fixture
+def scene():
+    known, processes = PortMap(None), FakeProcesses()
+    known.give(LINE, 9000)
+    pair = SimpleNamespace(ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0})
+    census = Census(known, processes, lambda line: pair if line == LINE else None)
+    return SimpleNamespace(known=known, processes=processes, pair=pair, census=census)
+
+
+def register(scene, pid=7, socket="publisher", node="n", started=100.0):
+    if pid is not None:
+        scene.processes.running[pid] = 100.0
+    registration = Registration(LINE, node, socket, "json", "A", "python", pid, started)
+    scene.known.add(registration)
+    return registration
+
+
+def roles(scene):
+    scene.census.look()
+    return [link.role for program in scene.census.programs() for link in program.links]
+
+
+def test_a_program_has_no_role_before_it_is_connected(scene):
+    register(scene)
+    assert roles(scene) == []
+    assert [program.name for program in scene.census.programs()] == ["n"]
+
+
+def test_who_asked_as_publisher_and_connects_as_subscriber_is_a_subscriber(scene):
+    register(scene, socket="publisher")
+    scene.pair.connections["subscriber"] = 1
+    scene.processes.joined = {(7, 9001)}
+    assert roles(scene) == ["subscriber"]
+    assert scene.census.programs()[0].links == (Link("t", "json", "json", "subscriber"),)
+
+
+def test_where_the_system_does_not_tell_the_request_is_believed(scene):
+    register(scene, socket="publisher")
+    scene.processes.is_secret = True
+    scene.pair.connections.update(publisher=1, subscriber=1)
+    assert roles(scene) == ["publisher"]
+
+
+def test_a_program_is_gone_with_its_process(scene):
+    register(scene)
+    assert not scene.census.forget_the_gone()
+    del scene.processes.running[7]
+    assert scene.census.forget_the_gone()
+    assert not scene.census.programs()
+
+
+def test_a_number_that_another_process_has_now_is_not_the_program(scene):
+    register(scene)
+    scene.processes.running[7] = 5000.0
+    assert scene.census.forget_the_gone()
+
+
+def test_a_program_is_gone_when_its_connections_are(scene):
+    register(scene)
+    scene.pair.connections["publisher"] = 1
+    scene.processes.joined = {(7, 9000)}
+    assert roles(scene) == ["publisher"]
+    assert not scene.census.forget_the_gone()
+    scene.processes.joined = set()
+    scene.census.look()
+    assert scene.census.forget_the_gone()
+
+
+def test_a_program_without_a_process_number_lives_as_long_as_its_connection(scene):
+    register(scene, pid=None, started=None, socket="subscriber")
+    assert not scene.census.forget_the_gone()
+    scene.pair.connections["subscriber"] = 1
+    assert roles(scene) == ["subscriber"]
+    scene.pair.connections["subscriber"] = 0
+    scene.census.look()
+    assert scene.census.forget_the_gone()
+
+
+def test_one_program_that_publishes_and_subscribes_is_one_node_with_two_links(scene):
+    register(scene, socket="publisher")
+    register(scene, socket="subscriber")
+    scene.pair.connections.update(publisher=1, subscriber=1)
+    scene.processes.joined = {(7, 9000), (7, 9001)}
+    assert sorted(roles(scene)) == ["publisher", "subscriber"]
+    assert len(scene.census.programs()) == 1
+
+
+def test_a_line_is_used_while_somebody_asked_for_it_or_is_connected(scene):
+    assert not scene.census.is_used(LINE)
+    scene.pair.connections["publisher"] = 1
+    assert scene.census.is_used(LINE)
+    scene.pair.connections["publisher"] = 0
+    register(scene)
+    assert scene.census.is_used(LINE)
+
+
+def test_the_broadcast_is_told_who_asked_for_what(scene):
+    register(scene)
+    (member,) = scene.census.members()
+    assert (member.topic, member.node, member.port, member.socket, member.pid) == (
+        "t",
+        "n",
+        9000,
+        "publisher",
+        7,
+    )
+    assert scene.census.languages() == {LINE: frozenset({"python"})}

@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import select
+import threading
+
+import pytest
+
+from nep.gateway.inbox import Inbox
+from nep.message import Message
+
+
+@pytest.fixture
+def inbox():
+    made = Inbox(max_messages=3, max_bytes=100)
+    yield made
+    made.close()
+
+
+def message(data=b"1"):
+    return Message("t", data, "json", "json")
+
+
+def test_what_is_posted_is_taken_in_order_and_wakes_the_reader(inbox):
+    assert not select.select([inbox], [], [], 0)[0]
+    first, second = message(), message()
+    poster = threading.Thread(target=lambda: (inbox.post(first), inbox.post(second)))
+    poster.start()
+    assert select.select([inbox], [], [], 5)[0]
+    poster.join()
+    assert inbox.take() == [first, second]
+    assert not select.select([inbox], [], [], 0)[0]
+    assert inbox.take() == []
+
+
+def test_it_is_bounded_in_messages_and_in_bytes_and_counts_what_it_refuses(inbox):
+    for _ in range(5):
+        inbox.post(message())
+    assert (len(inbox.take()), inbox.dropped) == (3, 2)
+    inbox.post(message(b"x" * 90))
+    inbox.post(message(b"x" * 20))
+    assert (len(inbox.take()), inbox.dropped) == (1, 3)
+    inbox.post(message(b"x" * 90))
+    assert len(inbox.take()) == 1
+
+
+def test_a_wake_after_the_end_harms_nobody(inbox):
+    inbox.close()
+    inbox.wake()

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from nep.gateway.census import Link, Program
+from nep.gateway.listing import Listing
+from nep.graph import Graph
+from nep.requests import Look
+
+EPOCH = 77
+
+
+class Desk:
+    """A graph that is asked without a master around it."""
+
+    def __init__(self):
+        self.now = 100.0
+        self.graph = Graph(EPOCH, self.now, learn_s=0.0)
+        self._calls = itertools.count(-1, -1)
+        self.replies = []
+
+    def submit(self, request):
+        out = self.graph.apply(request, next(self._calls), self.now, "")
+        self.replies.append(out[-1].answer)
+        return self.replies[-1]
+
+    def view(self):
+        return self.submit(Look()).view
+
+
+@pytest.fixture
+def desk():
+    return Desk()
+
+
+@pytest.fixture
+def listing(desk):
+    return Listing(desk.submit, EPOCH)
+
+
+def program(name, *links, pid=1, language="python"):
+    return Program(f"original:A:{name}:{pid}", name, pid, "A", language, links)
+
+
+def publishes(topic, codec="json", msg_type="json"):
+    return Link(topic, msg_type, codec, "publisher")
+
+
+def test_originals_are_nodes_with_their_language_and_wire(desk, listing):
+    listing.show(
+        (
+            program("a", publishes("t")),
+            program("b", Link("t", "json", "json", "subscriber"), language="javascript"),
+        )
+    )
+    view = desk.view()
+    assert {(node.name, node.language, node.generation) for node in view.nodes.values()} == {
+        ("a", "Python", "A"),
+        ("b", "JavaScript", "A"),
+    }
+    topic = view.topics["t"]
+    assert (topic.msg_type, len(topic.publishers), len(topic.subscribers)) == ("json", 1, 1)
+    assert topic.publishers[0].endpoints == ()
+
+
+def test_who_left_is_taken_out(desk, listing):
+    listing.show((program("a", publishes("t")),))
+    listing.show((program("a"),))
+    assert not desk.view().topics
+    listing.show(())
+    assert not desk.view().nodes
+
+
+def test_what_did_not_change_is_not_told_again(desk, listing):
+    listing.show((program("a", publishes("t")),))
+    told = len(desk.replies)
+    listing.show((program("a", publishes("t")),))
+    assert len(desk.replies) == told
+
+
+def test_rates_are_those_of_the_topic_and_counted_once(desk, listing):
+    listing.show((program("a", publishes("t")), program("b", publishes("t"), pid=2)))
+    for _ in range(5):
+        listing.renew()
+        desk.now += 1.0
+        for _ in range(30):
+            listing.count(("t", "json"), 100)
+    listing.renew()
+    topic = desk.view().topics["t"]
+    assert topic.rate_hz == pytest.approx(30, rel=0.2)
+    assert topic.bandwidth_Bps == pytest.approx(3000, rel=0.2)
+    assert not any(getattr(reply, "again", False) for reply in desk.replies)
+
+
+def test_the_names_of_one_datum_are_no_conflict_of_types(desk, listing):
+    listing.show((program("a", publishes("t")), program("b", publishes("t", msg_type="dictionary"), pid=2)))
+    assert not desk.view().alerts
+
+
+def test_a_name_that_is_no_native_topic_is_left_out_of_the_graph(desk, listing):
+    listing.show((program("a", publishes("not a topic"), publishes("t")),))
+    assert set(desk.view().topics) == {"t"}

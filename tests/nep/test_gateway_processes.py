@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+
+from nep.gateway.processes import SystemProcesses
+
+PROCESSES = SystemProcesses()
+
+
+def test_a_process_has_a_beginning_and_an_end():
+    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    try:
+        assert PROCESSES.started(child.pid) is not None
+        assert PROCESSES.language(child.pid) == "python"
+    finally:
+        child.communicate(b"\n")
+    assert PROCESSES.started(child.pid) is None
+    assert PROCESSES.language(child.pid) is None
+    assert PROCESSES.is_joined(child.pid, 1, binds=False) is False
+
+
+def test_it_is_known_which_port_a_process_is_connected_to():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        assert not PROCESSES.is_joined(os.getpid(), port, binds=False)
+        with socket.create_connection(("127.0.0.1", port)) as connection:
+            assert PROCESSES.is_joined(os.getpid(), port, binds=False)
+            assert not PROCESSES.is_joined(os.getpid(), connection.getsockname()[1] + 1, binds=False)
+            accepted, _ = server.accept()
+            with accepted:
+                assert PROCESSES.is_joined(os.getpid(), port, binds=True)
