@@ -34,7 +34,7 @@ def editor_definitions(
 
 
 def _toolbox(catalogue: Catalogue) -> dict[str, object]:
-    contents: list[Mapping[str, object]] = [{"kind": "heading", "name": "Blocks"}]
+    contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": "Blocks"}]
     contents += [_category(category) for category in categories() if category.blocks]
     known = (*catalogue.connected.values(), *catalogue.absent.values())
     for robot in catalogue.connected.values():

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from app.robots import rize
 from app.robots.description import Robot
 from nep.errors import NepError
 from nep.message import Message
@@ -212,12 +213,11 @@ class RobotStopper:
     def _tell(self, line: _Line, id: str) -> str:
         """Send a stop; the sentence about what went wrong, or nothing."""
         robot = line.robot
-        command: dict[str, object] = {
-            "id": id, "op": "stop", "from": self._sender, "action": robot.safe_stop.action, "input": {},
-        }  # fmt: skip
+        stop = robot.safe_stop.action
         if robot.dialect == RIZE:
-            # The only word for it in that world (PROTOCOL §6.5): drivers of the older class honour it.
-            command = {"node": "cancel", "robots": robot.name, "state": "idle", "id": id}
+            command = rize.to_command(robot, stop, {}, id)
+        else:
+            command = {"id": id, "op": "stop", "from": self._sender, "action": stop, "input": {}}
         try:
             line.publisher.publish(command)
         except NepError as error:

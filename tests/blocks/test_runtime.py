@@ -272,7 +272,7 @@ def test_repeat_while_if_else_and_stop():
     below = block("values_compare", A=get("n"), RELATION="<", B=number(3))
     loop = block("control_while", MODE="while", CONDITION=below, BODY=[count])
     choose = block(
-        "control_if_else", CONDITION=boolean(False), BODY=[write(text("no"))], OTHERWISE=[write(get("n"))]
+        "control_if_else", CONDITION=boolean(False), BODY=[write(text("no"))], ELSE=[write(get("n"))]
     )
     run = play(workspace(started(loop, choose, block("control_stop_script")), variables=("n",)))
     assert run.lines == ["3"]

@@ -92,13 +92,13 @@ CATEGORY = Category(
         ),
         Block(
             type="control_if_else",
-            text="if %CONDITION %BODY else %OTHERWISE",
+            text="if %CONDITION %BODY else %ELSE",
             shape="statement",
             style="control",
             icon="split",
             tooltip="Runs the first blocks if this is so, the others if not.",
-            python="if %CONDITION:\n    %BODY\nelse:\n    %OTHERWISE",
-            arguments=(_CONDITION, _BODY, StatementInput("OTHERWISE")),
+            python="if %CONDITION:\n    %BODY\nelse:\n    %ELSE",
+            arguments=(_CONDITION, _BODY, StatementInput("ELSE")),
         ),
         Block(
             type="control_stop_script",

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app import resources
+from app.blocks import compile_behaviour, editor_definitions
+from app.robots.description import parse
+from tests.blocks.fakes import FakeLink, Play, until
+
+EXAMPLES = sorted(resources.path("examples").glob("*.nepb"))
+
+
+def read(path):
+    saved = json.loads(path.read_text("utf-8"))
+    return saved, parse(saved["robots"]["Pepper"])
+
+
+def test_there_are_the_three_of_the_start_page():
+    named = [(read(path)[0]["name"], read(path)[0]["description"]) for path in EXAMPLES]
+    assert named == [
+        ("Greeting", "Says hello when it sees a face"),
+        ("Reaction to touch", "Laughs when its head is touched"),
+        ("Tour guide", "Walks, stops and explains"),
+    ]
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_compiles_without_problems_and_the_editor_knows_its_blocks(path):
+    saved, pepper = read(path)
+    assert (saved["format"], saved["version"]) == ("nep-behaviour", 1)
+    program = compile_behaviour(saved["workspace"], [pepper], name=saved["name"])
+    assert program.problems == ()
+    assert program.starts > 0
+    known = {definition["type"] for definition in editor_definitions([pepper])["blocks"]}
+    assert set(types(saved["workspace"]["blocks"]["blocks"])) <= known
+
+
+def types(saved):
+    if isinstance(saved, dict):
+        if "type" in saved:
+            yield saved["type"]
+        for inner in saved.values():
+            yield from types(inner)
+    elif isinstance(saved, list):
+        for inner in saved:
+            yield from types(inner)
+
+
+def run(number: int) -> tuple[Play, FakeLink]:
+    saved, pepper = read(EXAMPLES[number])
+    link = FakeLink()
+    link.sensors = {("Pepper", "sees_face"): True, ("Pepper", "distance"): 2.0}
+    return Play(
+        compile_behaviour(saved["workspace"], [pepper], name=saved["name"]), (pepper,), link
+    ).start(), link
+
+
+def said(link: FakeLink) -> list[object]:
+    return [given["text"] for _, action, given in link.invoked if action == "say"]
+
+
+def test_greeting():
+    play, link = run(0)
+    play.end()
+    assert play.runtime.error is None
+    assert said(link) == ["Hello! I am Pepper.", "Nice to see you."]
+    assert [action for _, action, _ in link.invoked].count("turn") == 4
+
+
+def test_reaction_to_touch():
+    play, link = run(1)
+    until(lambda: len(said(link)) == 1)
+    for times in (1, 2, 3):
+        link.happen(("Pepper", "touched"), {"place": "head"})
+        until(lambda times=times: said(link).count("Ha ha! That tickles.") == times)
+    until(lambda: said(link)[-1] == "You did that so often: 3")
+    link.happen(("Pepper", "touched"), {"place": "right_hand"})
+    until(lambda: link.invoked[-1][1] == "turn")
+    play.stop()
+    play.end()
+    assert play.runtime.error is None
+
+
+def test_tour_guide():
+    play, link = run(2)
+    play.end()
+    assert said(link)[-1] == "Thank you for coming."
+    assert link.published == [("/tour", {"station": station}) for station in (1, 2, 3)]
+    assert said(link)[1] == "This is station 1"
+    assert play.runtime.error is None
