@@ -67,6 +67,7 @@ def td_for(model: Mapping[str, object], name: str) -> dict[str, object]:
         "@type": ["rb:Robot"],
         "title": name,
         "id": f"urn:nep:robot:{_NOT_IN_TOPICS.sub('_', name)}",
+        "version": {"instance": "1.0.0", **part(described, "version")},
         "securityDefinitions": {"nosec_sc": {"scheme": "nosec"}},
         "security": "nosec_sc",
         "rb:robot": {**kind, "title": text(kind.get("title")) or str(model["title"])},

@@ -46,6 +46,11 @@ class Driver:
         self._tasks: Tasks | None = None
         self._unread: set[str] = set()
 
+    @property
+    def body(self) -> object:
+        """The robot's own object while it runs, else None."""
+        return self._body
+
     # ---- life -------------------------------------------------------------------------------------
 
     def start(self) -> None:

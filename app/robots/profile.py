@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -88,9 +88,8 @@ def _sentence(error: ValidationError) -> str:
     place = ".".join(str(part) for part in error.absolute_path) or "the description"
     rule = str(error.validator)
     limit: object = error.validator_value
-    if rule == "required" and isinstance(error.instance, Mapping) and isinstance(limit, Sequence):
-        missing = next((str(name) for name in limit if name not in error.instance), "something")
-        return f"{place} has no '{missing}'"
+    if rule == "required":  # one error for each missing name, which only its message tells
+        return f"{place} has no '{error.message.split(chr(39))[1]}'"
     if rule == "type":
         kinds = limit if isinstance(limit, list) else [limit]
         return f"{place} must be {' or '.join(_TYPE_WORDS.get(str(kind), str(kind)) for kind in kinds)}"

@@ -1,0 +1,221 @@
+"""What the tests of robots share: a clock of their own, a robot of their own, ears on its topics."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Annotated, Literal
+
+import pytest
+
+import nep
+from app.robots.kit import (
+    Call,
+    Canceled,
+    Colour,
+    Driver,
+    Failed,
+    Kind,
+    Link,
+    Range,
+    Suggested,
+    Text,
+    action,
+    event,
+    safe_stop,
+    sensor,
+)
+
+
+def eventually(true: Callable[[], object], timeout_s: float = 3.0) -> None:
+    """Wait until something is true; fails when it never is."""
+    never = threading.Event()
+    end = time.monotonic() + timeout_s
+    while not true():
+        assert time.monotonic() < end, "it never came true"
+        never.wait(0.002)
+
+
+class FakeClock:
+    """Time that passes when a test says so."""
+
+    def __init__(self) -> None:
+        self._now = 100.0
+
+    def now(self) -> float:
+        return self._now
+
+    def advance(self, seconds: float) -> None:
+        self._now += seconds
+
+    def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
+        end = None if timeout_s is None else self._now + timeout_s
+        while not event.wait(0.001):
+            if end is not None and self._now >= end:
+                return False
+        return True
+
+
+class Turtle:
+    """A small robot whose functions end when the test lets them."""
+
+    battery = sensor(Annotated[int, Range(0, 100, unit="%")], title="battery", text="battery", icon="battery")
+    bumped = event(
+        "when %robot bumps on the %side",
+        title="bumped",
+        icon="zap",
+        fields={"side": Literal["left", "right"]},
+        choose=("side",),
+        rize=lambda data: ("bumpers", {str(data["side"]): 1}),
+    )
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+        self.done: list[object] = []
+        self.go_on = threading.Event()
+        self.moving = False
+        self.stops = 0
+        self.may_stop = threading.Event()
+        self.may_stop.set()
+        self.is_closed = False
+
+    def close(self) -> None:
+        self.is_closed = True
+
+    @action("move %distance m", category="Movement", icon="move", uses=("base",), on_busy="replace",
+            timeout_s=5, risk="locomotes", feedback={"moved": float})  # fmt: skip
+    def move(
+        self, call: Call, distance: Annotated[float, Range(-2, 2, 0.05, "m")] = 0.5
+    ) -> dict[str, object]:
+        """Move until the test says that it arrived."""
+        self.moving = True
+        call.feedback(moved=0.0)
+        try:
+            self._let(call)
+        finally:
+            self.moving = False
+        self.done.append(("move", distance))
+        return {"moved": distance}
+
+    @action("say %text", category="Speech", icon="mic", uses=("speech",), on_busy="queue", rize="say")
+    def say(self, call: Call, text: Annotated[str, Text(1, 40), Suggested("hi")]) -> None:
+        """Say it when the test lets it."""
+        self._let(call)
+        self.done.append(("say", text))
+
+    @action("light %colour", category="Looks", icon="lightbulb", cancellable=False, rize="leds")
+    def light(self, call: Call, colour: Colour = "#ffffff", bright: bool = True) -> None:
+        """At once."""
+        self.done.append(("light", colour, bright))
+
+    @action("dig %times times", category="Movement", icon="move", uses=("base",), on_busy="reject")
+    def dig(self, call: Call, times: Annotated[int, Range(1, 9)] = 1) -> None:
+        """Refuses when something moves."""
+        self.done.append(("dig", times))
+
+    @action("fail", category="Movement", icon="x")
+    def fail(self, call: Call, how: Literal["told", "broken"] = "told") -> None:
+        """Never works."""
+        if how == "told":
+            raise Failed("no fuel")
+        raise ZeroDivisionError
+
+    @action("ignore", category="Movement", icon="x", uses=("base",), timeout_s=5)
+    def ignore(self, call: Call) -> None:
+        """Does not listen to its call."""
+        self.go_on.wait(10)
+
+    def _let(self, call: Call) -> None:
+        # Not by the call's clock, which stands still: real drivers write call.until(...).
+        while not self.go_on.wait(0.005):
+            if call.canceled:
+                raise Canceled
+
+    @safe_stop(watchdog_s=1.0, within_s=0.2)
+    def stop(self) -> None:
+        """Stands still once the test lets it."""
+        self.may_stop.wait(10)
+        self.stops += 1
+        self.moving = False
+
+
+TURTLE = Kind(model="turtle", title="Turtle", body=Turtle)
+
+
+class Ears:
+    """Hears topics of a robot and speaks to it."""
+
+    def __init__(self, node: nep.Node, name: str) -> None:
+        self.name = name
+        self.heard: dict[str, list[object]] = {}
+        self._node = node
+        self._command = node.new_pub(f"/{name}/command", "robot/command")
+        self._rize = node.new_pub("robot_action", "json")
+        self.listen("answer", "robot/answer")
+        self.listen("action_state", topic="action_state")
+
+    def listen(self, leaf: str, msg_type: str = "json", topic: str | None = None) -> list[object]:
+        kept: list[object] = self.heard.setdefault(leaf, [])
+        self._node.new_sub(
+            topic or f"/{self.name}/{leaf}",
+            msg_type,
+            sink=lambda batch: kept.extend(m.payload for m in batch),
+        )
+        return kept
+
+    def command(self, **command: object) -> None:
+        self._command.publish(command)
+
+    def invoke(self, wanted: str, action: str, program: str | None = None, **given: object) -> None:
+        self.command(
+            id=wanted, op="invoke", action=action, input=given, **({"from": program} if program else {})
+        )
+
+    def rize(self, message: dict[str, object]) -> None:
+        self._rize.publish(message)
+
+    def answers(self, wanted: str) -> list[dict[str, object]]:
+        return [a for a in list(self.heard["answer"]) if a["id"] == wanted]
+
+    def states(self, wanted: str) -> list[object]:
+        return [a["state"] for a in self.answers(wanted)]
+
+    def final(self, wanted: str, op: str = "invoke", timeout_s: float = 5.0) -> dict[str, object]:
+        """The last answer to a command, when it has come."""
+
+        def ends() -> list[dict[str, object]]:
+            final = {"succeeded", "failed", "canceled"}
+            return [a for a in self.answers(wanted) if a["state"] in final and a["op"] == op]
+
+        eventually(ends, timeout_s)
+        return ends()[0]
+
+
+@pytest.fixture
+def clock() -> FakeClock:
+    return FakeClock()
+
+
+@pytest.fixture
+def node() -> Iterator[nep.Node]:
+    with nep.node("robots", "memory") as made:
+        yield made
+
+
+@pytest.fixture
+def turtle(node: nep.Node, clock: FakeClock) -> Iterator[tuple[Turtle, Ears, FakeClock]]:
+    """A running turtle, ears on it, and the clock it goes by."""
+    with nep.node("listener", "memory") as other:
+        ears = Ears(other, "Turtle")
+        driver = Driver(TURTLE, "Turtle", node, clock=clock)
+        driver.start()
+        body = driver.body
+        assert isinstance(body, Turtle)
+        try:
+            yield body, ears, clock
+        finally:
+            body.go_on.set()
+            body.may_stop.set()
+            driver.close()
+    assert [t.name for t in threading.enumerate() if t.name.startswith("Turtle")] == []

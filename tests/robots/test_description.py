@@ -1,0 +1,214 @@
+from __future__ import annotations
+
+import copy
+import json
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from app import resources
+from app.errors import DescriptionError
+from app.robots.description import parse, td_for, topic_of, validate
+
+MODELS = sorted(resources.path("robots").glob("*.tm.jsonld"))
+
+
+def model(name: str) -> dict[str, object]:
+    return json.loads(resources.path("robots", f"{name}.tm.jsonld").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_our_models_are_good_and_so_are_their_descriptions(path):
+    document = json.loads(path.read_text(encoding="utf-8"))
+    assert validate(document) == ()
+    described = td_for(document, "My robot")
+    assert validate(described) == ()
+    robot = parse(described)
+    assert robot.name == "My robot"
+    assert {action.name for action in robot.actions} == set(document["actions"])
+    assert all(action.text.count("%robot") == 1 for action in robot.actions)
+    assert json.loads(json.dumps(described)) == described
+
+
+def test_a_description_has_the_topics_of_the_name():
+    robot = parse(td_for(model("pepper"), "Miss Pepper"))
+    assert robot.topics.command == "/Miss_Pepper/command"
+    assert robot.topics.answer == "/Miss_Pepper/answer"
+    assert robot.topics.state == "/Miss_Pepper/state"
+    assert robot.sensor("camera").topic == "/Miss_Pepper/camera"
+    assert robot.sensor("camera").is_image
+    assert robot.event("touched").topic == "/Miss_Pepper/touched"
+    assert topic_of("a/b {c}", "x") == "/a_b__c_/x"
+
+
+def test_topics_are_taken_from_the_forms():
+    document = td_for(model("pepper"), "Pepper")
+    document["properties"]["camera"]["forms"] = [{"href": "nep:/elsewhere/eye"}]
+    document["actions"]["say"]["forms"] = [{"href": "nep:/x/do", "rb:answer": "nep:/x/did"}]
+    robot = parse(document)
+    assert robot.sensor("camera").topic == "/elsewhere/eye"
+    assert (robot.action("say").topic, robot.action("say").answer_topic) == ("/x/do", "/x/did")
+
+
+def test_the_blocks_read_as_in_the_design():
+    robot = parse(td_for(model("pepper"), "Pepper"))
+    texts = {action.name: action.text for action in robot.actions}
+    assert texts["say"] == "%robot say %text"
+    assert texts["turn"] == "%robot turn %direction by %angle °"
+    assert texts["light"] == "%robot light %where %colour"
+    assert texts["show_emotion"] == "%robot look %emotion for %seconds s"
+    assert texts["wave"] == "%robot wave %hand hand"
+    assert robot.sensor("sees_face").text == "%robot sees a face"
+    assert robot.sensor("battery").text == "%robot battery"
+    assert robot.event("touched").text == "when %robot %place is touched"
+    assert robot.event("touched").fields[0].choices[0].title == "head"
+    assert robot.action("turn").parameter("angle").unit == "°"
+    assert {action.category for action in robot.actions} == {"Speech", "Movement", "Face and lights"}
+
+
+def test_every_icon_is_one_that_studio_ships():
+    icons = {path.stem for path in resources.path("icons").glob("*.svg")}
+    for path in MODELS:
+        robot = parse(json.loads(path.read_text(encoding="utf-8")))
+        for part in (*robot.actions, *robot.sensors, *robot.events):
+            assert part.icon in icons, f"{path.stem}: {part.name}"
+
+
+def test_the_robot_knows_how_it_is_stopped():
+    robot = parse(model("pepper"))
+    assert robot.safe_stop.action == "stop"
+    assert (robot.safe_stop.watchdog_s, robot.safe_stop.within_s) == (1.0, 0.2)
+    assert robot.safe_stop.confirmed
+    assert robot.virtual
+
+
+def test_inputs_are_checked_with_sentences_for_people():
+    robot = parse(model("pepper"))
+    turn, say, light = robot.action("turn"), robot.action("say"), robot.action("light")
+    assert turn.check({"angle": 400}) == ("turn: angle must be between -360 and 360 °",)
+    assert turn.check({"angle": "x"}) == ("turn: angle must be a number",)
+    assert turn.check({"angel": 3}) == ("turn: there is no “angel”; did you mean “angle”?",)
+    assert turn.check({"direction": "up"}) == ("turn: direction must be left or right",)
+    assert turn.check([]) == ("turn: the input must be an object with named values",)
+    assert say.check({}) == ("say: text is missing",)
+    assert say.check({"text": ""}) == ("say: text must not be empty",)
+    assert say.check({"text": "x" * 501}) == ("say: text must be at most 500 characters long",)
+    assert say.check({"text": "x", "volume": 2.5}) == ("say: volume must be a whole number",)
+    assert light.check({"colour": "red"}) == ("light: colour must be a colour like #20c0e0",)
+    assert turn.check({"angle": 90, "direction": "left"}) == ()
+    assert turn.complete({"angle": 90}) == {"direction": "left", "angle": 90, "speed": 40.0}
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), True, None, 10**400, [1]])
+def test_what_is_no_number_is_refused(wrong):
+    assert parse(model("pepper")).action("turn").check({"angle": wrong}) == ("turn: angle must be a number",)
+
+
+def broken(change) -> tuple[str, ...]:
+    document = copy.deepcopy(model("pepper"))
+    change(document)
+    return validate(document)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda d: d.pop("title"), "the description has no 'title'"),
+        (lambda d: d.pop("actions"), "the description has no 'actions'"),
+        (lambda d: d["actions"]["turn"].update({"rb:uses": ["wings"]}),
+         "actions.turn.rb:uses names 'wings', which is not in rb:resources"),
+        (lambda d: d["actions"]["turn"].update({"rb:onBusy": "panic"}),
+         "actions.turn.rb:onBusy must be one of queue, replace, reject"),
+        (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(minimum="low"),
+         "actions.turn.input.properties.angle.minimum must be a number"),
+        (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(minimum=400),
+         "actions.turn.input.angle: minimum 400 is above maximum 360"),
+        (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(default=400),
+         "actions.turn.input.angle: the default must be between -360 and 360 °"),
+        (lambda d: d["actions"]["turn"]["rb:block"]["text"].update(en="turn %wings"),
+         "actions.turn.rb:block.text.en uses %wings, which is not described"),
+        (lambda d: d["events"]["touched"].update({"rb:filter": ["where"]}),
+         "events.touched.rb:filter names 'where', which is not in its data"),
+        (lambda d: d["rb:safeStop"].update(action="halt"),
+         "rb:safeStop.action names 'halt', but there is no such action"),
+        (lambda d: d["rb:safeStop"].update(action="say"),
+         "'say' is the safe stop, so its input must not require anything"),
+        (lambda d: d["actions"]["turn"]["input"].update({"$ref": "http://example.org"}),
+         "actions.turn.input uses $ref, which is not allowed here; write the part out"),
+        (lambda d: d.update({"rb:profile": 2}), "rb:profile must be 1"),
+        (lambda d: d["events"].update(state={}),
+         "'state' names two things of one robot; its topics would be the same"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_in_a_sentence(change, sentence):
+    assert sentence in broken(change)
+
+
+def test_a_bad_description_is_an_error_with_all_sentences():
+    document = model("pepper")
+    del document["rb:profile"], document["rb:safeStop"]
+    with pytest.raises(DescriptionError) as caught:
+        parse(document)
+    assert len(caught.value.problems) == 2
+    assert "the description of 'Pepper' can't be used" in str(caught.value)
+
+
+# ---- whatever comes from the network, it is a robot or a sentence ----------------------------------
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+def places(value: object, path: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
+    found = [path] if path else []
+    if isinstance(value, dict):
+        for key, item in value.items():
+            found += places(item, (*path, key))
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            found += places(item, (*path, index))
+    return found
+
+
+PLACES = places(model("pepper"))
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(st.tuples(st.sampled_from(PLACES), json_values), min_size=1, max_size=3))
+def test_a_damaged_description_never_crashes(changes):
+    document = copy.deepcopy(model("pepper"))
+    for path, value in changes:
+        target = document
+        try:
+            for step in path[:-1]:
+                target = target[step]
+            target[path[-1]] = value
+        except (KeyError, IndexError, TypeError):
+            continue
+    problems = validate(document)
+    assert all(isinstance(sentence, str) and sentence for sentence in problems)
+    if problems:
+        with pytest.raises(DescriptionError):
+            parse(document)
+    else:
+        robot = parse(td_for(document, "X"))
+        for action in robot.actions:
+            action.check({})
+            action.check({parameter.name: 10**400 for parameter in action.parameters})
+
+
+@settings(max_examples=200, deadline=None)
+@given(json_values)
+def test_any_json_is_no_crash(value):
+    assert validate(value) != ()
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.dictionaries(st.text(max_size=8), json_values, max_size=4))
+def test_any_input_gets_sentences(value):
+    for action in parse(model("pepper")).actions:
+        assert all(sentence.startswith(action.name) for sentence in action.check(value))

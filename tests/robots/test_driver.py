@@ -1,0 +1,343 @@
+"""The kit's promises, with a robot whose functions end when the test lets them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import nep
+from app.robots.driver import Driver
+from tests.robots.conftest import TURTLE, Ears, eventually
+
+
+def test_the_description_is_there_for_whoever_comes_later(turtle, node):
+    _, _, _ = turtle
+    with nep.node("late", "memory") as late:
+        message = late.new_sub("/Turtle/description", "robot/description").receive(2.0)
+        assert message is not None
+        assert message.payload["title"] == "Turtle"
+        assert late.graph().topics["/Turtle/description"].msg_type == "robot/description"
+        ready = late.new_sub("rize_event").receive(2.0)
+        assert ready is not None
+        assert ready.payload == {"robot": "ready", "name": "Turtle"}
+
+
+def test_an_action_is_accepted_runs_and_succeeds(turtle):
+    body, ears, _ = turtle
+    ears.invoke("1", "move", distance=1)
+    eventually(lambda: {"moved": 0.0} in [a["feedback"] for a in ears.answers("1")])
+    assert ears.states("1") == ["accepted", "running", "running"]
+    body.go_on.set()
+    answer = ears.final("1")
+    assert answer == {
+        "id": "1", "op": "invoke", "action": "move", "state": "succeeded",
+        "output": {"moved": 1.0}, "feedback": {}, "error": None,
+    }  # fmt: skip
+    assert body.done == [("move", 1.0)]
+    assert isinstance(body.done[0][1], float)
+
+
+def test_bad_input_never_reaches_the_function(turtle):
+    body, ears, _ = turtle
+    ears.invoke("1", "move", distance=3)
+    assert ears.final("1")["error"] == "move: distance must be between -2 and 2 m"
+    ears.invoke("2", "mov")
+    assert ears.final("2")["error"] == "Turtle can't “mov”; did you mean “move”?"
+    ears.command(id="3", op="dance")
+    assert ears.final("3", "dance")["error"].startswith("there is no “dance”")
+    ears.command(id="4", op="invoke", action="say", input="text")
+    assert ears.final("4")["error"] == "say: the input must be an object with named values"
+    assert body.done == []
+    assert ears.states("1") == ["failed"]
+
+
+def test_noise_on_the_command_topic_is_survived(turtle, node):
+    _, ears, _ = turtle
+    noise = node.new_pub("/Turtle/command", "robot/command")
+    for payload in (None, 5, [], "x", {}, {"id": 5, "op": "invoke"}, {"id": "x" * 300, "op": "invoke"}):
+        noise.publish(payload)
+    node.new_pub("/Turtle/command", "string").publish("{no json")
+    ears.invoke("1", "dig")
+    assert ears.final("1")["state"] == "succeeded"
+
+
+def test_a_function_that_fails_is_answered_with_its_sentence(turtle, caplog):
+    _, ears, _ = turtle
+    ears.invoke("1", "fail")
+    assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", "no fuel")
+    ears.invoke("2", "fail", how="broken")
+    assert ears.final("2")["error"] == "fail broke off: ZeroDivisionError"
+
+
+def test_cancel_ends_what_runs_and_what_waits(turtle):
+    body, ears, _ = turtle
+    ears.invoke("1", "say", text="a")
+    ears.invoke("2", "say", text="b")
+    eventually(lambda: ears.states("2") == ["accepted"] and "running" in ears.states("1"))
+    ears.command(id="2", op="cancel")
+    assert ears.final("2")["state"] == "canceled"
+    ears.command(id="1", op="cancel")
+    assert ears.final("1")["state"] == "canceled"
+    ears.command(id="9", op="cancel")
+    assert ears.final("9", "cancel")["error"] == "nothing with this id runs"
+    assert body.done == []
+
+
+def test_too_long_is_a_failure(turtle):
+    _, ears, clock = turtle
+    ears.invoke("1", "move")
+    eventually(lambda: "running" in ears.states("1"))
+    clock.advance(5.1)
+    assert ears.final("1")["error"] == "move took longer than 5 s"
+
+
+def test_a_function_that_ignores_its_call_is_answered_for(turtle):
+    body, ears, clock = turtle
+    ears.invoke("1", "ignore")
+    eventually(lambda: "running" in ears.states("1"))
+    clock.advance(5.1)
+    eventually(lambda: clock.advance(0.2) or "failed" in ears.states("1"))
+    ears.invoke("2", "dig")  # what it uses is still in use
+    assert ears.final("2")["error"] == "dig: Turtle is busy with ignore"
+    body.go_on.set()
+    eventually(lambda: ears.invoke("3", "dig") or "succeeded" in ears.states("3"))
+    assert ears.states("1").count("failed") == 1
+
+
+def test_queue_replace_and_reject(turtle):
+    body, ears, _ = turtle
+    ears.invoke("1", "say", text="one")
+    ears.invoke("2", "say", text="two")
+    ears.invoke("3", "move")
+    eventually(lambda: "running" in ears.states("3") and "running" in ears.states("1"))
+    assert ears.states("2") == ["accepted"]
+    ears.invoke("4", "dig")
+    assert ears.final("4")["error"] == "dig: Turtle is busy with move"
+    ears.invoke("5", "move", distance=1)
+    replaced = ears.final("3")
+    assert (replaced["state"], replaced["error"]) == ("canceled", "move took its place")
+    eventually(lambda: "running" in ears.states("5"))
+    body.go_on.set()
+    assert ears.final("2")["state"] == "succeeded"
+    assert [entry for entry in body.done if entry[0] == "say"] == [("say", "one"), ("say", "two")]
+
+
+def test_what_can_not_be_canceled_says_so(turtle):
+    body, ears, _ = turtle
+    ears.invoke("1", "light", colour="#102030")
+    assert ears.final("1")["state"] == "succeeded"
+    assert body.done == [("light", "#102030", True)]
+
+
+def test_the_same_command_twice_runs_once(turtle):
+    body, ears, _ = turtle
+    ears.invoke("1", "say", text="once")
+    ears.invoke("1", "say", text="once")
+    body.go_on.set()
+    ears.final("1")
+    ears.invoke("2", "dig")
+    ears.final("2")
+    assert body.done.count(("say", "once")) == 1
+
+
+def test_a_flood_of_waiting_actions_is_refused(turtle):
+    _, ears, _ = turtle
+    for number in range(60):
+        ears.invoke(str(number), "say", text="x")
+    assert "other actions are waiting" in str(ears.final("59")["error"])
+
+
+# ---- stop -----------------------------------------------------------------------------------------
+
+
+def test_stop_answers_only_when_the_robot_stands_still(turtle):
+    body, ears, _ = turtle
+    body.may_stop.clear()
+    for wanted, action, given in (
+        ("1", "move", {}),
+        ("2", "say", {"text": "a"}),
+        ("3", "say", {"text": "b"}),
+    ):
+        ears.invoke(wanted, action, **given)
+    eventually(lambda: body.moving)
+    ears.command(id="s", op="stop")
+    assert [ears.final(wanted)["state"] for wanted in "123"] == ["canceled"] * 3
+    assert ears.states("s") == []
+    ears.invoke("4", "move")
+    assert ears.final("4")["error"] == "move: Turtle is stopping"
+    ears.command(id="t", op="stop")
+    body.may_stop.set()
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert ears.final("t", "stop")["state"] == "succeeded"
+    assert not body.moving
+    assert body.stops == 1
+
+
+def test_a_stop_that_does_not_work_is_said(turtle):
+    body, ears, clock = turtle
+    ears.invoke("1", "ignore")
+    eventually(lambda: "running" in ears.states("1"))
+    ears.command(id="s", op="stop")
+    eventually(lambda: body.stops == 1)
+    eventually(lambda: clock.advance(0.5) or ears.states("s"))
+    assert ears.final("s", "stop")["error"] == "Turtle may still move: ignore did not end"
+    body.go_on.set()
+    eventually(lambda: ears.command(id="t", op="stop") or "succeeded" in ears.states("t"))
+
+
+def test_the_stop_can_also_be_invoked_as_an_action(turtle):
+    body, ears, _ = turtle
+    ears.invoke("1", "stop")
+    assert ears.final("1")["state"] == "succeeded"
+    assert body.stops == 1
+
+
+def test_a_program_that_falls_silent_stops_the_robot(turtle):
+    body, ears, clock = turtle
+    ears.invoke("1", "move", program="p")
+    eventually(lambda: body.moving)
+    for number in range(4):  # alive: nothing happens
+        clock.advance(0.6)
+        ears.command(op="alive", **{"from": "p"})
+        ears.invoke(f"d{number}", "fail")  # answered: the sign of life before it was taken
+        ears.final(f"d{number}")
+    assert body.stops == 0
+    clock.advance(1.1)
+    assert ears.final("1")["error"] == "no sign of life from its program for 1 s"
+    eventually(lambda: body.stops == 1)
+    assert not body.moving
+
+
+def test_programs_that_only_listen_or_have_stopped_are_not_watched(turtle):
+    body, ears, clock = turtle
+    ears.command(op="alive", **{"from": "looker"})
+    ears.invoke("1", "dig", program="p")
+    ears.final("1")
+    ears.command(id="s", op="stop", **{"from": "p"})
+    ears.final("s", "stop")
+    clock.advance(10)
+    ears.invoke("2", "dig")
+    ears.final("2")
+    assert body.stops == 1
+
+
+def test_closing_stops_the_robot_and_answers_everything(node, clock):
+    with nep.node("listener", "memory") as other:
+        ears = Ears(other, "Turtle")
+        driver = Driver(TURTLE, "Turtle", node, clock=clock)
+        driver.start()
+        body = driver.body
+        ears.invoke("1", "move")
+        eventually(lambda: body.moving)
+        driver.close()
+        driver.close()
+        assert ears.final("1")["error"] == "the driver ends"
+        assert (body.moving, body.stops, body.is_closed) == (False, 1, True)
+        eventually(lambda: not other.graph().topics["/Turtle/answer"].publishers)
+
+
+# ---- what the robot tells -------------------------------------------------------------------------
+
+
+def test_sensors_events_and_the_blackboard(turtle):
+    body, ears, _ = turtle
+    bumps = ears.listen("bumped")
+    board = ears.listen("board", topic="/blackboard")
+    body.link.sense("battery", 84)
+    assert ears.listen("battery") is not None  # latched: heard although it was told before
+    body.link.happen("bumped", side="left")
+    eventually(lambda: bumps and board and ears.heard["battery"])
+    assert ears.heard["battery"] == [{"value": 84}]
+    assert bumps == [{"side": "left"}]
+    assert board == [{"primitive": "bumpers", "input": {"left": 1}, "robot": "Turtle"}]
+    with pytest.raises(KeyError):
+        body.link.sense("speed", 1)
+
+
+# ---- RIZE -----------------------------------------------------------------------------------------
+
+SAY = {"primitive": "say", "input": "hello", "options": {"contextual": True, "pitch": 50, "velocity": 50}}
+COMMAND = {
+    "node": "action", "primitives": SAY, "robots": "Turtle", "state": "idle", "times": 0,
+    "id": "acti20261120075304-0",
+}  # fmt: skip
+
+
+def test_rize_gets_its_own_object_back(turtle):
+    body, ears, _ = turtle
+    body.go_on.set()
+    ears.rize(COMMAND)
+    eventually(lambda: ears.heard["action_state"])
+    (answer,) = ears.heard["action_state"]
+    assert json.dumps(answer) == json.dumps({**COMMAND, "state": "success"})
+    assert body.done == [("say", "hello")]
+    assert ears.heard["answer"] == []
+
+
+def test_a_list_of_primitives_runs_side_by_side(turtle):
+    body, ears, clock = turtle
+    wait = {"primitive": "wait", "input": "2", "options": "none"}
+    ears.rize({**COMMAND, "primitives": [SAY, wait], "robots": ["Other", "Turtle"]})
+    body.go_on.set()
+    eventually(lambda: body.done)
+    assert ears.heard["action_state"] == []
+    eventually(lambda: clock.advance(0.5) or ears.heard["action_state"])
+    assert ears.heard["action_state"][0]["state"] == "success"
+    assert ears.heard["action_state"][0]["primitives"] == [SAY, wait]
+
+
+@pytest.mark.parametrize(
+    "primitives",
+    [
+        {"primitive": "fly", "input": "high", "options": "none"},
+        {"primitive": "wait", "input": "soon", "options": "none"},
+        {"primitive": "say", "input": "", "options": "none"},
+        {"primitive": "move", "input": "99", "options": "none"},
+        [],
+        None,
+        [SAY, {"primitive": "fly"}],
+    ],
+)
+def test_what_rize_can_not_have_is_a_failure(turtle, primitives):
+    body, ears, _ = turtle
+    body.go_on.set()
+    ears.rize({**COMMAND, "primitives": primitives})
+    eventually(lambda: ears.heard["action_state"])
+    assert ears.heard["action_state"] == [{**COMMAND, "primitives": primitives, "state": "failure"}]
+
+
+def test_numbers_come_as_text_and_go_by_name(turtle):
+    body, ears, _ = turtle
+    body.go_on.set()
+    moved = {"primitive": "move", "input": "0.75", "options": "none"}
+    lit = {"primitive": "leds", "input": "#112233", "options": {"bright": "false", "strange": 1}}
+    ears.rize({**COMMAND, "primitives": [moved, lit]})
+    eventually(lambda: ears.heard["action_state"])
+    assert ears.heard["action_state"][0]["state"] == "success"
+    assert sorted(body.done) == [("light", "#112233", False), ("move", 0.75)]
+
+
+def test_commands_for_other_robots_are_left_alone(turtle):
+    body, ears, _ = turtle
+    body.go_on.set()
+    ears.rize({**COMMAND, "robots": "Turtle2"})
+    ears.rize({**COMMAND, "robots": ["a", "b"]})
+    ears.rize({**COMMAND, "robots": None})
+    ears.rize({**COMMAND, "id": "mine"})
+    eventually(lambda: ears.heard["action_state"])
+    assert [answer["id"] for answer in ears.heard["action_state"]] == ["mine"]
+    assert body.done == [("say", "hello")]
+
+
+def test_rize_is_told_of_a_stop_and_can_cancel(turtle):
+    _, ears, _ = turtle
+    ears.rize(COMMAND)
+    eventually(lambda: ears.invoke("q", "say", text="x") or ears.states("q"))
+    ears.command(id="s", op="stop")
+    eventually(lambda: ears.heard["action_state"])
+    assert ears.heard["action_state"][0]["state"] == "failure"
+    ears.rize({**COMMAND, "id": "two"})
+    ears.rize({"node": "cancel", "robots": "Turtle", "id": "c"})
+    eventually(lambda: len(ears.heard["action_state"]) == 2)
+    assert ears.heard["action_state"][1] == {**COMMAND, "id": "two", "state": "failure"}
