@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -35,6 +36,14 @@ class Undoes(Protocol):
         """Do it again."""
 
 
+@runtime_checkable
+class ShowsBlocks(Protocol):
+    """A panel that can bring a block into view."""
+
+    def show_block(self, block: str) -> None:
+        """Scroll to a block by its id."""
+
+
 class Commands:
     """Gives a window its menus, shortcuts and named commands."""
 
@@ -46,6 +55,14 @@ class Commands:
             window.session, asking, window.toast.say, lambda: self._show("behaviour"), self._editor
         )
         self.actions = Actions(window, window.theme, self._handlers())
+        self._asked: dict[str, Callable[[str], object]] = {
+            "panel": window.open_panel,
+            "inspect": self._inspect,
+            "topic.open": self._inspect,
+            "block": self._show_block,
+            "connect": self._connect_robot,
+            "run.confirm": lambda _nothing: self._session.runs.confirm_still(),
+        }
         self._menus = self.actions.fill(window.bar.menus)
         self._recent = QMenu("Recent", window)
         self._menus["File"].insertMenu(self.actions["file.save"], self._recent)
@@ -83,7 +100,7 @@ class Commands:
             "run.step": lambda: files.with_newest(session.runs.step),
             "run.stop": session.runs.stop,
             "robots.virtual": self._virtual_robot,
-            "robots.show": lambda: window.open_panel("robot"),
+            "robots.show": lambda: window.open_panel("robots"),
             "help.shortcuts": lambda: self._sheet("Keyboard shortcuts", shortcuts()),
             "help.about": lambda: self._sheet("NEP Studio", [(line, "") for line in ABOUT]),
         }
@@ -116,22 +133,42 @@ class Commands:
     # -- by name ----------------------------------------------------------------------------------
 
     def run(self, name: str) -> bool:
-        """Do a command; ``panel:topics`` shows a panel, ``inspect:/faces`` a topic. False when unknown."""
+        """Do a command by its name; False when there is none.
+
+        ``panel:topics`` shows a panel, ``inspect:/faces`` a topic, ``block:ID`` a block; a problem's
+        ``mend_action`` changes the blocks (`app.blocks.mend`).
+        """
+        if name in self.actions:
+            return self.actions.run(name)
         verb, _, argument = name.partition(":")
-        if verb == "panel":
-            return self._window.open_panel(argument) is not None
-        if verb == "inspect":
-            self._inspect(argument)
+        asked = self._asked.get(verb)
+        if asked is not None:
+            asked(argument)
             return True
-        if name == "run.confirm":
-            self._session.runs.confirm_still()
-            return True
-        return self.actions.run(name)
+        words, _, panel = name.partition(".")
+        if words == "panel":
+            return self._window.open_panel(panel) is not None
+        return self.files.mend(name)
 
     def _inspect(self, topic: str) -> None:
         dock = self._open_in("developer", "inspector")
         if dock is not None:
             dock.panel.show_topic(topic)
+
+    def _show_block(self, block: str) -> None:
+        self._show("behaviour")
+        editor = self._editor()
+        if isinstance(editor, ShowsBlocks):
+            editor.show_block(block)
+
+    def _connect_robot(self, name: str) -> None:
+        """A virtual robot starts; for a real one the list of robots shows."""
+        description = self._session.document.robots.get(name, {})
+        virtual = description.get("rb:robot")
+        if isinstance(virtual, Mapping) and virtual.get("virtual") is True:
+            self._session.companions.start_virtual_robot(name)
+        else:
+            self._window.open_panel("robots")
 
     def _open_in(self, layout: str, panel: str) -> Dock | None:
         self._show(layout)

@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from app.blocks.mend import mend
 from app.core.document import SUFFIX
 from app.core.journal import Unsaved
 from app.core.session import Session
@@ -129,6 +130,21 @@ class Files:
         folder = document.path.parent if document.path is not None else Path.home()
         suggestion = str(folder / f"{document.name}{SUFFIX}")
         self._asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
+
+    def mend(self, action: str) -> bool:
+        """Change the blocks as a problem's button says; False when it says nothing about blocks."""
+        document = self._session.document
+        if mend(document.workspace, action) is None:
+            return False
+
+        def change() -> None:
+            made = mend(document.workspace, action)
+            if made is not None:
+                document.edited(made)
+                document.revision += 1
+
+        self.with_newest(change)
+        return True
 
     def with_newest(self, then: Callable[[], None]) -> None:
         """Do something once the editor's newest edit is in the document."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from app.ui.panels.base import Density
@@ -17,7 +18,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Layout:
-    """A layout as it is at first: columns from the left; in narrow windows ``narrow`` become tabs."""
+    """A layout as it is at first: columns from the left; in narrow windows ``narrow`` become tabs.
+
+    ``homes`` tells beside which panel another one opens, as a tab; the rest open beside the last panel.
+    """
 
     name: str
     title: str
@@ -25,6 +29,7 @@ class Layout:
     density: Density
     columns: tuple[Column, ...]
     narrow: tuple[str, str]
+    homes: Mapping[str, str]
 
 
 BEHAVIOUR = Layout(
@@ -34,9 +39,10 @@ BEHAVIOUR = Layout(
     "comfortable",
     (
         Column(1032, ((("behaviour",), 626), (("problems",), 124))),
-        Column(384, ((("robot",), 327), (("image",), 275), (("sensors",), 140))),
+        Column(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140))),
     ),
-    ("robot", "image"),
+    ("robot", "camera"),
+    {"robots": "behaviour", "console": "problems", "alerts": "problems", "image": "camera"},
 )
 DEVELOPER = Layout(
     "developer",
@@ -49,6 +55,7 @@ DEVELOPER = Layout(
         Column(446, ((("image",), 380), (("console", "alerts"), 394))),
     ),
     ("topics", "inspector"),
+    {"robots": "topics", "robot": "image", "camera": "image"},
 )
 LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 

@@ -62,7 +62,7 @@ class RobotArt(Art):
         painter.drawPixmap(area.topLeft(), self._still(room, area))
 
     def _still(self, room: QRectF, area: QRectF) -> QPixmap:
-        """The drawing, made once for each size and theme; it sets a clip of its own, so it has its own canvas."""
+        """The drawing, made once for each size and theme, on a canvas of its own: it sets its own clip."""
         ratio = self.devicePixelRatioF()
         key = (area.width(), area.height(), ratio, self._theme.dark)
         if self._made is None or self._made[0] != key:

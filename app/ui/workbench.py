@@ -141,11 +141,12 @@ class Workbench(QMainWindow):
         return dock
 
     def _join(self, dock: Dock) -> None:
-        """Give a panel that has no place yet one beside the last panel of the last column."""
+        """Give a panel that has no place yet one beside its home, else beside the last panel."""
         others = [other for other in self.docks.values() if other is not dock and not other.isFloating()]
         placed = [o for o in others if self.dockWidgetArea(o) != Qt.DockWidgetArea.NoDockWidgetArea]
+        home = self.docks.get(self._layout.homes.get(dock.description.name, ""))
         if placed:
-            self.tabifyDockWidget(placed[-1], dock)
+            self.tabifyDockWidget(home if home in placed else placed[-1], dock)
         else:
             self.addDockWidget(AREA, dock)
 

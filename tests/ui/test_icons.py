@@ -1,0 +1,86 @@
+"""Icons: one file for all themes, sharp at every ratio, and every name that the design uses is shipped."""
+
+from __future__ import annotations
+
+import gc
+
+import pytest
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QImage, QPainter
+
+from app import resources
+from app.ui import icons, theme_tokens
+from app.ui.actions import TABLE
+from app.ui.theme import Theme
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def inks(image: QImage) -> set[str]:
+    """The colours of all pixels that are fully painted."""
+    colours = set()
+    for y in range(image.height()):
+        for x in range(image.width()):
+            pixel = image.pixelColor(x, y)
+            if pixel.alpha() == 255:
+                colours.add(pixel.name())
+    return colours
+
+
+def test_every_icon_of_the_design_is_shipped() -> None:
+    tokens = theme_tokens.load()
+    wanted = {*tokens.icons.values(), *tokens.block_icons.values()}
+    wanted |= {status.icon for status in tokens.status.values() if status.icon != "dot"}
+    wanted |= {row.icon for row in TABLE if row.icon is not None}
+    assert wanted <= icons.names()
+
+
+def test_the_licences_are_beside_the_files() -> None:
+    assert "ISC License" in resources.path("icons", "LICENSE.txt").read_text("utf-8")
+    for name in ("Inter", "JetBrainsMono"):
+        text = resources.path("fonts", f"LICENSE-{name}.txt").read_text("utf-8")
+        assert "SIL Open Font License, Version 1.1" in text
+
+
+def test_an_icon_has_the_colour_of_its_role_and_follows_the_theme(theme: Theme) -> None:
+    icon = theme.icon("square", "accent")
+    assert inks(icon.pixmap(QSize(48, 48), 1.0).toImage()) == {theme.colour("accent").name()}
+    theme.set_mode("dark")
+    assert inks(icon.pixmap(QSize(48, 48), 1.0).toImage()) == {theme.colour("accent").name()}
+
+
+def test_a_disabled_icon_is_grey(theme: Theme) -> None:
+    image = theme.icon("square", "accent").pixmap(QSize(48, 48), 1.0, QIcon.Mode.Disabled).toImage()
+    assert inks(image) == {theme.colour("textDisabled").name()}
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.5, 2.0])
+def test_an_icon_is_painted_at_the_screens_ratio(theme: Theme, ratio: float) -> None:
+    pixmap = theme.icon("play").pixmap(QSize(20, 20), ratio)
+    assert pixmap.width() == round(20 * ratio)
+    assert pixmap.devicePixelRatio() == ratio
+
+
+def test_an_unknown_icon_names_the_nearest() -> None:
+    with pytest.raises(KeyError, match="did you mean 'play'"):
+        icons.IconEngine("plya", lambda _mode, _state: QColor("red"))
+
+
+def test_painting_puts_the_icon_into_its_square(qapp: object) -> None:
+    image = QImage(40, 40, QImage.Format.Format_ARGB32)
+    image.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(image)
+    icons.paint_icon(painter, QRectF(20, 20, 16, 16), "square", QColor("#ff0000"), filled=True)
+    painter.end()
+    assert image.pixelColor(28, 28).name() == "#ff0000"
+    assert image.pixelColor(10, 10).alpha() == 0
+
+
+def test_copies_of_an_icon_outlive_the_first(theme: Theme) -> None:
+    copies = []
+    for _ in range(50):
+        icon = QIcon(icons.IconEngine("play", lambda _mode, _state: QColor("#123456")))
+        copies.append(QIcon(icon))
+        del icon
+    gc.collect()
+    assert all(not copy.pixmap(QSize(16, 16), 1.0).isNull() for copy in copies)

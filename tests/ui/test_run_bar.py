@@ -1,0 +1,135 @@
+"""The six states of Run and Stop, large and compact, in the words of picture 10."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.core.run_view import RunView
+from app.ui.run_bar import RunBar, ToolBar
+from app.ui.theme import Theme
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+VIEWS = {
+    "ready": RunView("ready", "Ready", "Pepper and Turtle are connected", "Ready", can_run=True, can_step=True),
+    "running": RunView(
+        "running", "Running, 14 s", "Pepper says “Touch my head.”", "Greeting runs, 14 s",
+        can_pause=True, can_step=True, last_stop="all 2 robots stopped (41 ms)",
+    ),
+    "paused": RunView(
+        "paused", "Paused at “wait 2 s”", "Robots hold still; the clock stands", "Greeting is paused",
+        can_run=True, can_step=True, run_word="Go on",
+    ),
+    "stopping": RunView(
+        "stopping", "Stopping", "Waiting for Turtle, 0.2 s", "Stopping",
+        stop_word="Stopping", result="1 of 2 robots stopped",
+    ),
+    "proven": RunView(
+        "proven", "Stopped after 14 s", "The dashed outline shows where", "Stopped after 14 s",
+        can_run=True, can_step=True, result="all 2 robots stopped (41 ms)", result_ok=True,
+    ),
+    "unanswered": RunView(
+        "unanswered", "Turtle did not answer", "Pepper stopped (38 ms). Switch Turtle off by hand.",
+        "Turtle did not answer; switch it off by hand", stop_word="Stop again",
+        result="1 of 2 robots stopped", result_ok=False, confirm="Turtle is still",
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture
+def bar(qtbot, theme: Theme) -> RunBar:
+    made = RunBar(theme)
+    made.resize(1440, 60)
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+@pytest.fixture
+def tools(qtbot, theme: Theme) -> ToolBar:
+    made = ToolBar(theme)
+    made.resize(1440, 40)
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+@pytest.mark.parametrize(
+    ("state", "run", "pause", "step", "stop", "look"),
+    [
+        ("ready", True, False, True, "Stop", ""),
+        ("running", False, True, True, "Stop", "reminder"),
+        ("paused", True, False, True, "Stop", ""),
+        ("stopping", False, False, False, "Stopping", "counting"),
+        ("proven", True, False, True, "Stop", "ok"),
+        ("unanswered", False, False, False, "Stop again", "error"),
+    ],
+)
+def test_each_state_is_as_in_the_picture(bar: RunBar, state, run, pause, step, stop, look) -> None:
+    bar.show_view(VIEWS[state])
+    assert (bar.run.isEnabled(), bar.pause.isEnabled(), bar.step.isEnabled()) == (run, pause, step)
+    assert bar.run.kind == ("run" if run else "plain")
+    assert bar.stop.text() == stop
+    assert bar.stop.isEnabled()
+    assert bar.result.look == look
+    assert bar.confirm.isVisible() == (state == "unanswered")
+    assert bar.sentence.accessibleName() == f"{VIEWS[state].title}. {VIEWS[state].detail}"
+
+
+def test_nothing_jumps_between_the_states(bar: RunBar) -> None:
+    places = set()
+    for view in VIEWS.values():
+        bar.show_view(view)
+        QTest.qWait(1)
+        places.add(tuple(w.geometry().getRect() for w in (bar.run, bar.pause, bar.step, bar.stop)))
+    assert len(places) == 1
+
+
+def test_paused_says_go_on(bar: RunBar) -> None:
+    bar.show_view(VIEWS["paused"])
+    assert bar.run.text() == "Go on"
+    bar.show_view(VIEWS["ready"])
+    assert bar.run.text() == "Run"
+
+
+def test_the_buttons_tell_what_was_pressed(qtbot, bar: RunBar) -> None:
+    told: list[str] = []
+    bar.run_pressed.connect(lambda: told.append("run"))
+    bar.stop_pressed.connect(lambda: told.append("stop"))
+    bar.confirm_pressed.connect(lambda: told.append("confirm"))
+    bar.show_view(VIEWS["ready"])
+    QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
+    bar.show_view(VIEWS["unanswered"])
+    QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(bar.confirm, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(bar.stop, Qt.MouseButton.LeftButton)
+    assert told == ["run", "confirm", "stop"]
+
+
+@pytest.mark.parametrize(
+    ("state", "run", "pause", "words"),
+    [
+        ("running", False, True, "Greeting runs, 14 s"),
+        ("proven", True, False, "all 2 robots stopped (41 ms)"),
+        ("unanswered", False, False, "Turtle did not answer; switch it off by hand"),
+        ("paused", True, False, "Greeting is paused"),
+    ],
+)
+def test_compact_states(tools: ToolBar, state: str, run: bool, pause: bool, words: str) -> None:
+    tools.show_view(VIEWS[state])
+    assert (tools.run.isVisible(), tools.pause.isVisible()) == (run, pause)
+    spoken = tools.result.text if tools.result.isVisible() else tools.words.text()
+    assert spoken == words
+    assert tools.stop.isVisible()
+    assert tools.confirm.isVisible() == (state == "unanswered")
+
+
+def test_stop_is_where_it_was_in_every_compact_state(tools: ToolBar) -> None:
+    places = set()
+    for view in VIEWS.values():
+        tools.show_view(view)
+        QTest.qWait(1)
+        places.add(tools.stop.geometry().getRect())
+    assert len(places) == 1

@@ -1,0 +1,283 @@
+"""The painted widgets: what they show, and how they are used without a mouse."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QFontMetricsF, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
+
+from app.ui.theme import Theme
+from app.ui.widgets import (
+    Bar,
+    Button,
+    Chip,
+    Choice,
+    ColourSwatches,
+    EmptyAction,
+    EmptyState,
+    IconButton,
+    RunButton,
+    SearchField,
+    Segments,
+    SliderWithUnit,
+    Sparkline,
+    StatusItem,
+    StopButton,
+    Switch,
+)
+from app.ui.widgets.slider import decimals_of
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def colours(widget: QWidget) -> set[str]:
+    """The colours that are really painted."""
+    image = widget.grab().toImage()
+    return {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
+
+
+def wheel(widget: QWidget, steps: int) -> None:
+    event = QWheelEvent(
+        QPointF(5, 5), QPointF(5, 5), QPoint(0, 0), QPoint(0, 120 * steps), Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(widget, event)
+
+
+def shown(qtbot, widget: QWidget) -> QWidget:
+    qtbot.addWidget(widget)
+    widget.show()
+    return widget
+
+
+@pytest.fixture
+def slider(qtbot, theme: Theme) -> SliderWithUnit:
+    made = SliderWithUnit(theme, -1, 1, step=0.05, value=0.5, default=0.25, unit="m", name="Distance")
+    shown(qtbot, made)
+    return made
+
+
+def test_a_slider_steps_with_the_keyboard(qtbot, slider: SliderWithUnit) -> None:
+    told: list[float] = []
+    slider.changed.connect(told.append)
+    keys = (Qt.Key.Key_Right, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End)
+    for key in keys:
+        QTest.keyClick(slider.track, key)
+    assert told == pytest.approx([0.55, 0.05, -1.0, 1.0])
+    assert slider.field.text() == "1.00"
+
+
+def test_the_wheel_needs_the_focus(qtbot, slider: SliderWithUnit) -> None:
+    slider.activateWindow()
+    slider.field.setFocus()
+    qtbot.waitUntil(slider.field.hasFocus)
+    wheel(slider.track, 1)
+    assert slider.value == 0.5
+    slider.track.setFocus()
+    qtbot.waitUntil(slider.track.hasFocus)
+    wheel(slider.track, 1)
+    assert slider.value > 0.5
+
+
+def test_a_double_click_brings_the_default_back(slider: SliderWithUnit) -> None:
+    QTest.mouseDClick(slider.track, Qt.MouseButton.LeftButton)
+    assert slider.value == 0.25
+
+
+def test_a_press_on_the_track_goes_there(slider: SliderWithUnit) -> None:
+    place = QPoint(slider.track.width() - 10, slider.track.height() // 2)
+    QTest.mouseClick(slider.track, Qt.MouseButton.LeftButton, pos=place)
+    assert slider.value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("typed", "sentence"),
+    [("2", "The most is 1 m."), ("-3", "The least is -1 m."), ("far", "This needs a number."), ("nan", "This needs a number.")],
+)  # fmt: skip
+def test_a_wrong_number_stays_and_is_explained(slider: SliderWithUnit, typed: str, sentence: str) -> None:
+    slider.field.setText(typed)
+    slider.field.editingFinished.emit()
+    assert slider.field.text() == typed
+    assert slider.field.sentence == sentence
+    assert slider.field.property("wrong") == "true"
+    assert slider.value == 0.5
+    slider.field.setText("0,75")
+    slider.field.editingFinished.emit()
+    assert slider.value == 0.75
+    assert slider.field.sentence == ""
+
+
+def test_limits_that_make_no_range_are_refused(theme: Theme) -> None:
+    with pytest.raises(ValueError, match="no range from 1 to 1"):
+        SliderWithUnit(theme, 1, 1)
+
+
+@pytest.mark.parametrize(("step", "digits"), [(1, 0), (5, 0), (0.5, 1), (0.05, 2), (1e-9, 6)])
+def test_a_step_tells_its_decimals(step: float, digits: int) -> None:
+    assert decimals_of(step) == digits
+
+
+def test_segments_choose_with_arrows_and_tell_only_a_person(qtbot, theme: Theme) -> None:
+    made = Segments(theme, [("a", "One", None), ("b", "Two", "bot")], "a", check=True)
+    shown(qtbot, made)
+    told: list[str] = []
+    made.changed.connect(told.append)
+    made.set_value("b")
+    assert (made.value, told) == ("b", [])
+    made.set_value("z")
+    assert made.value == "b"
+    first = made.findChildren(QWidget)[0]
+    made.activateWindow()
+    qtbot.waitUntil(made.isActiveWindow)
+    QTest.mouseClick(first, Qt.MouseButton.LeftButton)
+    assert (made.value, told) == ("a", ["a"])
+    qtbot.waitUntil(first.hasFocus)
+    QTest.keyClick(first, Qt.Key.Key_Right)
+    assert (made.value, told) == ("b", ["a", "b"])
+
+
+def test_a_chip_without_words_is_hidden_and_makes_no_window(qtbot, theme: Theme) -> None:
+    holder = QWidget()
+    chip = Chip(theme, "", "ok", parent=holder)
+    loose = Chip(theme, "ready", "ok")
+    shown(qtbot, holder)
+    qtbot.addWidget(loose)
+    assert not loose.isVisible()
+    assert chip.isHidden()
+    chip.set("silent for 4 s", "error")
+    assert chip.isVisible()
+    assert chip.accessibleName() == "silent for 4 s"
+    assert theme.colour("errorTint").name() in colours(chip)
+    with pytest.raises(KeyError):
+        chip.set("x", "sparkling")
+
+
+def test_buttons_are_filled_by_their_kind(qtbot, theme: Theme) -> None:
+    primary = Button(theme, "Try", "play", kind="primary")
+    shown(qtbot, primary)
+    assert theme.colour("accent").name() in colours(primary)
+    primary.setEnabled(False)
+    assert theme.colour("accent").name() not in colours(primary)
+
+
+def test_an_icon_button_says_its_name_and_key(theme: Theme) -> None:
+    button = IconButton(theme, "pause", "Pause", "F8")
+    assert (button.accessibleName(), button.toolTip()) == ("Pause", "Pause (F8)")
+
+
+def test_run_keeps_its_width_when_it_becomes_go_on(theme: Theme) -> None:
+    button = RunButton(theme, "Run", "play", widest="Go on")
+    before = button.sizeHint()
+    button.set_word("Go on")
+    assert button.sizeHint() == before
+
+
+@pytest.mark.parametrize(("place", "least"), [("runBar", (164, 44)), ("toolBar", (132, 30)), ("appBar", (112, 30))])
+def test_stop_keeps_its_size_and_its_red_in_every_state(qtbot, theme: Theme, place: str, least) -> None:
+    stop = StopButton(theme, place)  # type: ignore[arg-type]
+    shown(qtbot, stop)
+    before = stop.sizeHint()
+    assert (before.width() - 8, before.height() - 8) >= least
+    for word, ring in (("Stop", False), ("Stopping", True), ("Stop again", False)):
+        stop.show_state(word, ring=ring)
+        assert stop.sizeHint() == before
+        assert stop.isEnabled()
+        assert theme.colour("stop").name() in colours(stop)
+        assert stop.accessibleName() == word
+
+
+def test_swatches_name_the_colour_and_take_another(qtbot, theme: Theme) -> None:
+    made = ColourSwatches(theme, "#3AB7FF")
+    shown(qtbot, made)
+    told: list[str] = []
+    made.changed.connect(told.append)
+    assert made.value == "#3ab7ff"
+    made._ask()
+    made._field.setText("#nonsense")
+    made._typed()
+    assert made._field.property("wrong") == "true"
+    made._field.setText("#102030")
+    made._typed()
+    assert (made.value, told) == ("#102030", ["#102030"])
+    made.set_value("no colour")
+    assert made.value == "#102030"
+
+
+def test_a_bar_knows_what_it_does_not_know(theme: Theme) -> None:
+    bar = Bar(theme)
+    assert bar.fraction is None
+    bar.set_fraction(1.7)
+    assert bar.fraction == 1.0
+    bar.set_fraction(float("nan"))
+    assert bar.fraction is None
+
+
+def test_a_sparkline_paints_a_stroke(qtbot, theme: Theme) -> None:
+    spark = Sparkline(theme)
+    shown(qtbot, spark)
+    before = colours(spark)
+    spark.set_values([1, 5, 2, 8])
+    assert len(colours(spark)) > len(before)
+
+
+def test_an_empty_state_leads_on(qtbot, theme: Theme) -> None:
+    done: list[str] = []
+    made = EmptyState(
+        theme, "bot", "No robot", "Connect one.", [EmptyAction("Use it", lambda: done.append("used"), primary=True)]
+    )
+    shown(qtbot, made)
+    QTest.mouseClick(made.findChildren(Button)[0], Qt.MouseButton.LeftButton)
+    assert done == ["used"]
+    made.set_actions([])
+    assert made._buttons == []
+
+
+def test_a_switch_is_turned_with_space(qtbot, theme: Theme) -> None:
+    switch = Switch(theme, "loud")
+    shown(qtbot, switch)
+    QTest.keyClick(switch, Qt.Key.Key_Space)
+    assert switch.isChecked()
+    assert theme.colour("accent").name() in colours(switch)
+
+
+def test_a_choice_keeps_what_is_not_offered_out(theme: Theme) -> None:
+    choice = Choice(theme, [("en", "English"), ("fr", "French")], name="Language")
+    choice.set_value("fr")
+    choice.set_value("xx")
+    assert choice.value == "fr"
+    wheel(choice, 1)
+    assert choice.value == "fr"
+
+
+def test_a_status_item_without_words_is_not_there(qtbot, theme: Theme) -> None:
+    holder = QWidget()
+    item = StatusItem(theme, "lock", "This computer only")
+    item.setParent(holder)
+    shown(qtbot, holder)
+    item.set("", "")
+    assert item.isHidden()
+    item.set("triangle-alert", "12 lost in 30 s", "warn")
+    assert not item.isHidden()
+
+
+def test_a_search_field_shows_its_key_only_while_empty(qtbot, theme: Theme) -> None:
+    field = SearchField(theme, "Filter", "/")
+    field.resize(200, 28)
+    shown(qtbot, field)
+    empty = field.grab().toImage()
+    field.setText("x")
+    assert field.grab().toImage() != empty
+    assert field.accessibleName() == "Filter"
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_controls_grow_with_their_text(theme: Theme, percent: int) -> None:
+    theme.set_text_percent(percent)
+    button = Button(theme, "Use the virtual robot", "bot", size="large")
+    font = QFontMetricsF(theme.font("button"))
+    assert button.sizeHint().height() >= font.height()
+    assert button.sizeHint().width() >= font.horizontalAdvance("Use the virtual robot") + 20
+    chip = Chip(theme, "virtual, ready")
+    assert chip.sizeHint().height() >= QFontMetricsF(theme.font("small")).height()
