@@ -79,6 +79,7 @@ class SocketInlet(Generic[R]):
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._problem = ""
         self._leased_until = 0.0
+        self._io_comes = False
         self._waiters: list[Waker] = []
         self._lock = threading.Condition(threading.Lock())
 
@@ -109,6 +110,11 @@ class SocketInlet(Generic[R]):
             if self.is_closed:
                 return None
             self._leased_until = time.monotonic() + LEASE_S
+            if not self._io_comes:
+                # Reading one message and not the rest leaves the descriptor silent for those that follow:
+                # the node's thread has to look when the lease is over.
+                self._io_comes = True
+                self._io.serve_soon(self)
             if self.spec.keep == "latest":
                 self._fill()
             return self._inbox.take() or self._readable.read()
@@ -160,9 +166,11 @@ class SocketInlet(Generic[R]):
             if self.is_closed:
                 return Rest(is_quiet=True)
             if self._waiters:
+                self._io_comes = False
                 return Rest(is_quiet=True, due=now + _WAITING_S)
             if now < self._leased_until:
                 return Rest(is_quiet=True, due=self._leased_until)
+            self._io_comes = False
             count = self._fill()
             batch = self._inbox.take_all() if sink is not None else []
             if count and sink is None:

@@ -1,0 +1,49 @@
+"""What all tests share: a master, and the guard against threads and sockets that are left behind."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+
+import psutil
+import pytest
+
+from nep.masters import Master
+
+_GRACE_S = 1.0
+
+
+def _our_threads() -> set[threading.Thread]:
+    return {thread for thread in threading.enumerate() if thread.name.startswith("nep-")}
+
+
+def _listening() -> set[tuple[str, int]]:
+    """Addresses on which this process listens."""
+    connections = psutil.Process(os.getpid()).net_connections(kind="tcp")
+    return {each.laddr for each in connections if each.status == psutil.CONN_LISTEN}
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left() -> Iterator[None]:
+    """Fails a test that leaves a thread of nep, or a listening socket, behind."""
+    threads, sockets = _our_threads(), _listening()
+    yield
+    deadline = time.monotonic() + _GRACE_S
+    for thread in _our_threads() - threads:
+        thread.join(max(0.0, deadline - time.monotonic()))
+    left = sorted(thread.name for thread in _our_threads() - threads)
+    if left:
+        pytest.fail(f"threads are left behind: {left}")
+    opened = _listening() - sockets
+    if opened:
+        pytest.fail(f"listening sockets are left behind: {sorted(opened)}")
+
+
+@pytest.fixture
+def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
+    """A running native master on a free port of loopback; NEP_MASTER names it."""
+    with Master("127.0.0.1:0", learn_s=0.0) as running:
+        monkeypatch.setenv("NEP_MASTER", running.address)
+        yield running
