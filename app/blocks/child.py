@@ -159,7 +159,7 @@ class Run:
             self._runtime.scheduler.stop()
             silent = network.stop_robots(self._stop_answer_s)
             network.close()
-        return silent
+        return silent if self._stop_answer_s else ()
 
     def _begin(self, network: Network) -> None:
         names = self._runtime.namespace()
@@ -173,7 +173,7 @@ class Run:
         runtime, before = self._runtime, None
         while not runtime.finished.wait(SAMPLE_S):
             now = runtime.scheduler.snapshot()
-            words = runtime.says(now.blocks[0] if now.blocks else None)
+            words = runtime.says(now.blocks)
             self._out.send_printed()
             if (now, words) == before:
                 continue

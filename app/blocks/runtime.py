@@ -49,8 +49,7 @@ class Runtime:
         self._subscriptions: list[Callable[[Link], None]] = []
         self._count_lock = threading.Lock()
         self._running = 0
-        self._says = ""
-        self._says_block: str | None = None
+        self._told: dict[str | None, str] = {}
         self.scheduler = Scheduler()
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
@@ -285,12 +284,17 @@ class Runtime:
     # ---- what happens now, in words
 
     def tell(self, sentence: str) -> None:
-        """What a robot does now: it stays until the next robot's block."""
-        self._says = sentence
+        """What a robot does now for the calling script's block; "" when it is done."""
+        block = self.scheduler.block()
+        if sentence:
+            self._told[block] = sentence
+        else:
+            self._told.pop(block, None)
 
-    def says(self, block: str | None) -> str:
-        """The sentence for the run bar: what a robot does now, else the block in words."""
-        return self._says or self.reading(block)
+    def says(self, blocks: Sequence[str]) -> str:
+        """The sentence for the run bar: what a robot does now, else the first block in words."""
+        told = next((self._told[block] for block in blocks if block in self._told), None)
+        return told or self.reading(blocks[0] if blocks else None)
 
     def reading(self, block: str | None) -> str:
         """A block in words, "" for none."""

@@ -49,20 +49,25 @@ def test_a_block_waits_for_its_robot(running):
     until(lambda: bool(link.calls))
     assert link.invoked == [("Pepper", "turn", {"direction": "left", "angle": 30})]
     assert run.runtime.scheduler.snapshot().blocks == ("t",)
-    assert run.runtime.says("t") == "Pepper turns left by 30 °"
+    assert run.runtime.says(["t"]) == "Pepper turns left by 30 °"
     link.answer(link.calls[0], "succeeded")
     run.end()
     assert link.invoked[1] == ("Pepper", "say", {"text": "done"})
 
 
-def test_what_the_robot_says_appears_in_words(running):
+def test_what_the_robot_says_appears_in_words_until_it_is_done(running):
     link = FakeLink()
     link.held = {"say"}
-    run = running(workspace(started(say(block("values_join", A=text("Touch my "), B=text("head."))))), link)
-    until(lambda: bool(link.calls))
-    assert run.runtime.says(None) == "Pepper says “Touch my head.”"
+    words = block("values_join", A=text("Touch my "), B=text("head."))
+    other = block("robot_pepper_do_light", "l", ROBOT="Pepper", WHERE="eyes", COLOUR="#37b6ff")
+    run = running(workspace(started(say(words) | {"id": "x"}), started(other)), link)
+    until(lambda: len(link.calls) == 2)
+    # The other script's block is done meanwhile, and takes nothing away.
+    until(lambda: run.runtime.scheduler.snapshot().blocks == ("x",))
+    assert run.runtime.says(["x"]) == "Pepper says “Touch my head.”"
     link.answer(link.calls[0], "succeeded")
     run.end()
+    assert run.runtime.says(["l"]) == "Pepper light eyes #37b6ff"
 
 
 def test_a_refused_action_is_an_error_on_its_block_with_the_robots_sentence():

@@ -1,0 +1,160 @@
+"""``python -m app run FILE``: one behaviour with no window.
+
+Exit codes: 0 it ended well, 1 a block failed or a robot did not stop, 2 the file can't be run, 3 a robot of
+it is not there, 130 it was stopped by Ctrl+C.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TextIO
+
+import nep
+from app.blocks import Program, compile_behaviour
+from app.blocks.fleet_search import find_robots
+from app.core.document import read
+from app.core.runner import Runner, RunnerEvent
+from app.core.stopping import RobotStopper, StopReport
+from app.errors import AppError, DescriptionError
+from app.robots.description import Robot, parse
+from nep.errors import NepError
+
+OK, FAILED, UNUSABLE, ROBOT_MISSING, INTERRUPTED = 0, 1, 2, 3, 130
+ROBOT_WAIT_S = 10.0
+STOP_S = 1.0
+SLICE_S = 0.1
+
+
+def run_file(
+    path: Path | str,
+    *,
+    robot_wait_s: float = ROBOT_WAIT_S,
+    master: str | None = None,
+    out: TextIO | None = None,
+    interrupted: threading.Event | None = None,
+) -> int:
+    """Run a behaviour file to its end; the exit code of this module's docstring.
+
+    It waits `robot_wait_s` for the robots that its blocks name. What happens is written to `out` (stdout),
+    one line each. Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots stopped.
+    """
+    stream = out or sys.stdout
+
+    def say(line: str) -> None:
+        stream.write(line + "\n")
+        stream.flush()
+
+    try:
+        name, workspace, descriptions = read(Path(path))
+        known = _known(descriptions)
+        wanted = compile_behaviour(workspace, known, name=name).robots
+        with nep.node("behaviour runner", master=master) as node:
+            robots = find_robots(node, robot_wait_s, wanted=wanted) if wanted else ()
+            program = compile_behaviour(workspace, robots, absent=known, name=name)
+            code = _refused(program, wanted, robots, say)
+            if code is not None:
+                return code
+            used = [robot for robot in robots if robot.name in program.robots]
+            stopper = RobotStopper(node)
+            try:
+                stopper.set_robots(used)
+                return _run(program, used, master, stopper, say, interrupted or threading.Event())
+            finally:
+                stopper.close()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except (AppError, NepError) as error:
+        say(f"{error}.")
+        return UNUSABLE
+
+
+def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
+    """The robots that the file describes; one that can't be understood is as good as not described."""
+    found = []
+    for description in descriptions.values():
+        try:
+            found.append(parse(description))
+        except DescriptionError:
+            continue
+    return found
+
+
+def _refused(
+    program: Program, wanted: Sequence[str], robots: Sequence[Robot], say: Callable[[str], None]
+) -> int | None:
+    """Tell the problems; the exit code if the program must not run with them."""
+    for problem in program.problems:
+        say(f"{problem.severity}: {problem.sentence}")
+    missing = sorted(set(wanted) - {robot.name for robot in robots})
+    if missing:
+        say(f"{' and '.join(missing)} not found. Switch it on, or start the virtual robot.")
+        return ROBOT_MISSING
+    if program.errors or not program.starts:
+        say(f"“{program.name}” can't run.")
+        return UNUSABLE
+    return None
+
+
+def _run(
+    program: Program,
+    robots: Sequence[Robot],
+    master: str | None,
+    stopper: RobotStopper,
+    say: Callable[[str], None],
+    interrupted: threading.Event,
+) -> int:
+    told = _Told(say)
+    runner = Runner(told)
+    say(f"“{program.name}” runs")
+    runner.start(program, [robot.source for robot in robots], master)
+    was_interrupted = False
+    try:
+        while not runner.wait(SLICE_S) and not interrupted.is_set():
+            pass
+        was_interrupted = interrupted.is_set()
+    except KeyboardInterrupt:
+        was_interrupted = True
+    stopper.send_stop()  # at once; and again when the program is gone and can't move them any more
+    runner.close()
+    report = stopper.stop_all(timeout_s=STOP_S)
+    for line in stop_lines(report):
+        say(line)
+    if was_interrupted:
+        return INTERRUPTED if report.proven else FAILED
+    return OK if told.ok and report.proven else FAILED
+
+
+class _Told:
+    """Writes what the program tells; remembers whether it ended well."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._last = ""
+        self.ok = True
+
+    def __call__(self, event: RunnerEvent) -> None:
+        if event.kind == "running" and event.says != self._last:
+            self._last = event.says
+            if event.says:
+                self._say(event.says)
+        elif event.kind in ("print", "error") or (event.kind == "ended" and event.text):
+            self._say(event.text)
+        if event.kind == "ended":
+            self.ok = event.ok
+            if event.elapsed_s is not None:
+                self._say(f"ended after {event.elapsed_s:.1f} s")
+
+
+def stop_lines(report: StopReport) -> list[str]:
+    """The stop in words: "all 2 robots stopped (41 ms)", and each robot that did not."""
+    if not report.robots:
+        return []
+    others = [robot.sentence for robot in report.robots if not robot.answered]
+    if others:
+        return [*(robot.sentence for robot in report.robots if robot.answered), *others]
+    if len(report.robots) == 1:
+        return [f"{report.robots[0].name} stopped ({report.elapsed_ms:.0f} ms)"]
+    return [f"all {len(report.robots)} robots stopped ({report.elapsed_ms:.0f} ms)"]
