@@ -11,9 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO
 
-from nep.masters import is_running, start_process
-
 from nep.errors import NepError
+from nep.masters import is_running, start_process
 
 END_WAIT_S = 2.0
 TAIL_BYTES = 2000

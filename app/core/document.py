@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
+from app.blocks.mend import mend
 from app.core.files import write_atomically
 from app.core.journal import Journal, Unsaved
 from app.errors import DescriptionError, DocumentError
@@ -113,6 +114,15 @@ class Document:
         self.saved_at = self._clock()
         self._journal.discard()
 
+    def mend(self, action: str) -> bool:
+        """Do what a problem's button says to the blocks; False when the action is no matter of blocks."""
+        mended = mend(self.workspace, action)
+        if mended is None:
+            return False
+        self.edited(mended)
+        self.revision += 1
+        return True
+
     def close(self) -> None:
         """The window closes: unsaved work stays in the journal and is offered at the next start."""
         if not self.dirty:
@@ -143,7 +153,8 @@ class Document:
         """The blocks as a program, for the robots known now; compiled once for each edit."""
         key = (self.revision, self.edits, self.definitions_revision)
         if self._compiled is None or self._compiled[0] != key:
-            self._compiled = (key, compile_behaviour(self.workspace, self._connected))
+            made = compile_behaviour(self.workspace, self._connected, absent=self.absent, name=self.name)
+            self._compiled = (key, made)
         return self._compiled[1]
 
     def problems(self) -> tuple[Problem, ...]:

@@ -9,16 +9,16 @@ import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 
-from nep.nodes import Node
-
 from app.core.heartbeat import Heartbeat
 from app.core.mailbox import Batch
-from app.core.robot_link import Invocation, Payload, RobotLink
+from app.core.rize_names import RizeNames
+from app.core.robot_link import FINAL_STATES, Invocation, Payload, RobotLink
 from app.core.watches import Watch, Watches
 from app.errors import DescriptionError, RobotInputError, RobotUnknownError
 from app.robots import rize
 from app.robots.description import Robot, parse
 from nep.errors import NepError
+from nep.nodes import Node
 from nep.views import GraphView
 
 DESCRIPTION_TYPE = "robot/description"
@@ -42,6 +42,8 @@ class Fleet:
         self._links: dict[str, RobotLink] = {}
         self._descriptions: dict[str, Watch] = {}
         self._named: dict[str, str] = {}
+        self._rize = RizeNames()
+        self._rize_events: Watch | None = None
         self._alive = Heartbeat(SENDER)
         self.revision = 0
 
@@ -130,15 +132,18 @@ class Fleet:
             link = self._links.get(self._named.get(topic, ""))
             if link is not None:
                 self._away(link)
-
-    def forget(self) -> None:
-        """The master is gone; robots that are still connected directly are shown until they fall silent."""
+        self._update_rize(view)
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Take over what arrived: descriptions, answers, sensor values."""
         for topic, batch in batches.items():
             if topic in self._descriptions and batch.messages:
                 self._describe(topic, batch)
+        events = batches.get(rize.EVENTS)
+        for message in events.messages if events is not None else ():
+            name = rize.ready(_mapping(message))
+            if name is not None:
+                self._rize.tell(name)
         for link in self._links.values():
             self._read(link, batches)
 
@@ -158,18 +163,27 @@ class Fleet:
             raise RobotUnknownError(name)
         return link
 
+    def _update_rize(self, view: GraphView) -> None:
+        if self._rize_events is None and rize.EVENTS in view.topics:
+            self._rize_events = self._watches.open([rize.EVENTS])
+        there = self._rize.present(view)
+        for name in there:
+            known = self._links.get(name)
+            if known is None or known.robot.dialect == "rize":
+                self.join(rize.robot(name), f"{rize.COMMANDS} {name}")
+        for link in self._links.values():
+            if link.robot.dialect == "rize" and link.connected and link.name not in there:
+                self._away(link)
+
     def _describe(self, topic: str, batch: Batch) -> None:
         try:
-            payload = batch.messages[-1].payload
-            if not isinstance(payload, Mapping):
-                return
-            robot = parse(payload)
-        except (NepError, DescriptionError):
+            robot = parse(_mapping(batch.messages[-1]) or {})
+        except DescriptionError:
             return  # the session's alert `message:<topic>` says so
         self.join(robot, topic)
 
     def join(self, robot: Robot, topic: str) -> None:
-        """A robot has told who it is, on ``topic``."""
+        """A robot is there, known by ``topic``; said again it does nothing unless the robot changed."""
         self._named[topic] = robot.name
         link = self._links.get(robot.name)
         if link is None:
@@ -222,7 +236,8 @@ class Fleet:
             answer = _mapping(message)
             if answer is not None and link.robot.dialect == "rize":
                 answer = rize.from_answer(answer)
-            self._answer(link, answer)
+            if answer is not None:
+                self._answer(link, answer)
         for sensor in link.robot.sensors:
             batch = batches.get(sensor.topic)
             if batch is not None and batch.messages and not sensor.is_image:
@@ -233,7 +248,7 @@ class Fleet:
         if state is not None and state.messages:
             link.drawing = _mapping(state.messages[-1]) or link.drawing
 
-    def _answer(self, link: RobotLink, answer: Payload | None) -> None:
+    def _answer(self, link: RobotLink, answer: Payload) -> None:
         if answer is None:
             return
         for invocation in link.invocations.values():
@@ -244,7 +259,7 @@ class Fleet:
             invocation.output = _object(answer.get("output")) or invocation.output
             error = answer.get("error")
             invocation.error = str(error) if error else None
-            if not invocation.running:
+            if invocation.state in FINAL_STATES:
                 invocation.ended_s = self._clock()
         if not any(invocation.running for invocation in link.invocations.values()):
             self._alive.rest(link.name)

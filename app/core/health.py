@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from app.core.alerts import Alerts
-from app.core.fleet import Fleet, RobotLink
+from app.core.fleet import Fleet
 from app.core.mailbox import Batch
+from app.core.robot_link import RobotLink
 from app.core.topics import Topics
 from nep.errors import NepError
 from nep.message import Message

@@ -5,9 +5,8 @@ from __future__ import annotations
 import threading
 import uuid
 
-from nep.pubsub import Publisher
-
 from nep.errors import NepError
+from nep.pubsub import Publisher
 
 ALIVE_S = 0.2
 

@@ -173,7 +173,8 @@ class Images:
                         stream.picture = picture
 
     def _any_waiting(self) -> bool:
-        return any(s._waiting is not None for streams in self._streams.values() for s in streams)  # noqa: SLF001
+        every = (stream for streams in self._streams.values() for stream in streams)
+        return any(stream._waiting is not None for stream in every)  # noqa: SLF001
 
     def _take_waiting(self) -> list[tuple[list[ImageStream], Message]]:
         work = []

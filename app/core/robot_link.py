@@ -6,10 +6,9 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from nep.pubsub import Publisher
-
 from app.core.watches import Watch
 from app.robots.description import Robot
+from nep.pubsub import Publisher
 
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 

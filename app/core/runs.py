@@ -240,7 +240,9 @@ class Runs:
             self._post_event(RobotAnswered(number, robot))
 
         if runner is not None:
-            runner.stop()  # first: a program that still runs could move a robot after its stop
+            if stopper is not None:
+                stopper.send_stop()  # at once; they are told again below, because the program may still speak
+            runner.stop()
         report = StopReport((), 0.0)
         if stopper is not None:
             report = stopper.stop_all(timeout_s=STOP_TIMEOUT_S, on_answer=answered)

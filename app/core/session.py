@@ -12,9 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from nep.masters import master_address
-from nep.nodes import Node
-
 from app.core.alerts import Alerts
 from app.core.companions import CompanionFailed, Companions
 from app.core.console import Console
@@ -39,6 +36,8 @@ from app.core.source import (
 from app.core.stopping import RobotStopper
 from app.core.topics import Topics, total_rate_hz
 from app.core.watches import Watch, Watches
+from nep.masters import master_address
+from nep.nodes import Node
 from nep.views import GraphView
 
 LOSS_WINDOW_S = 30.0

@@ -9,13 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from nep.masters import is_running
-from nep.nodes import Node
-from nep.pubsub import Subscriber
-
 import nep
 from nep.errors import NepError
+from nep.masters import is_running
 from nep.message import Message
+from nep.nodes import Node
+from nep.pubsub import Subscriber
 from nep.views import GraphView
 
 POLL_S = 0.4

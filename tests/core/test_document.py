@@ -1,0 +1,195 @@
+"""The open behaviour: edits are journalled, saving is atomic, damaged files are told in a sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.core.document import LARGEST_BYTES, Document, read
+from app.core.journal import Journal, left_behind
+from app.errors import DocumentError
+from app.robots import rize
+
+EMPTY: dict[str, object] = {}
+STARTED: dict[str, object] = {
+    "blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": "a", "x": 1, "y": 2}]}
+}
+
+
+@pytest.fixture
+def journals(tmp_path: Path) -> Path:
+    return tmp_path / "journal"
+
+
+@pytest.fixture
+def document(journals: Path) -> Document:
+    return Document(lambda: Journal(journals), clock=lambda: 5.0)
+
+
+def test_an_edit_is_in_the_journal_before_anything_else(document: Document, journals: Path) -> None:
+    document.edited(STARTED)
+    (file,) = journals.glob("*.json")
+    assert json.loads(file.read_bytes())["workspace"] == STARTED
+    assert document.dirty
+
+
+def test_the_same_blocks_again_are_no_edit(document: Document) -> None:
+    document.edited(STARTED)
+    edits = document.edits
+    document.edited(json.loads(json.dumps(STARTED)))
+    assert document.edits == edits
+
+
+def test_a_saved_behaviour_opens_as_it_was_and_its_journal_is_gone(
+    document: Document, journals: Path, tmp_path: Path
+) -> None:
+    document.edited(STARTED)
+    path = tmp_path / "Grüße.nepb"
+    document.save(path)
+    assert not document.dirty
+    assert list(journals.glob("*")) == []
+    other = Document(lambda: Journal(journals))
+    other.open(path)
+    assert (other.name, other.workspace, other.dirty) == ("Grüße", STARTED, False)
+
+
+def test_saving_without_a_file_says_what_to_do(document: Document) -> None:
+    with pytest.raises(DocumentError, match="choose one"):
+        document.save()
+
+
+def test_a_failed_save_keeps_the_work_unsaved_and_journalled(
+    document: Document, journals: Path, tmp_path: Path
+) -> None:
+    document.edited(STARTED)
+    (tmp_path / "folder.nepb").mkdir()
+    with pytest.raises(DocumentError, match="save it in another place"):
+        document.save(tmp_path / "folder.nepb")
+    assert document.dirty
+    assert len(list(journals.glob("*.json"))) == 1
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"", "damaged"),
+        (b"{", "damaged"),
+        (b"[1, 2]", "no behaviour"),
+        (b'{"format": "other"}', "no behaviour"),
+        (b'{"format": "nep-behaviour", "version": 99, "workspace": {}}', "newer NEP Studio"),
+        (b'{"format": "nep-behaviour", "version": 1}', "no blocks"),
+        (b'{"format": "nep-behaviour", "version": 1, "workspace": []}', "no blocks"),
+        (b"[" * 100_000, "damaged"),
+    ],
+)
+def test_a_bad_file_is_a_sentence_and_changes_nothing(
+    document: Document, tmp_path: Path, data: bytes, reason: str
+) -> None:
+    document.edited(STARTED)
+    path = tmp_path / "bad.nepb"
+    path.write_bytes(data)
+    with pytest.raises(DocumentError, match=reason):
+        document.open(path)
+    assert document.workspace == STARTED
+
+
+def test_a_file_cut_at_any_byte_opens_whole_or_not_at_all(document: Document, tmp_path: Path) -> None:
+    document.edited(STARTED)
+    path = tmp_path / "a.nepb"
+    document.save(path)
+    whole = path.read_bytes()
+    for length in range(len(whole)):
+        path.write_bytes(whole[:length])
+        with pytest.raises(DocumentError):
+            read(path)
+
+
+def test_a_huge_file_is_refused_unread(document: Document, tmp_path: Path) -> None:
+    path = tmp_path / "huge.nepb"
+    with path.open("wb") as file:
+        file.truncate(LARGEST_BYTES + 1)
+    with pytest.raises(DocumentError, match="at most 32 MB"):
+        document.open(path)
+
+
+def test_a_missing_file_is_a_sentence(document: Document, tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match="can't be read"):
+        document.open(tmp_path / "none.nepb")
+
+
+def test_an_example_is_opened_without_its_file(document: Document, tmp_path: Path) -> None:
+    document.edited(STARTED)
+    path = tmp_path / "Example.nepb"
+    document.save(path)
+    document.new()
+    document.example(path)
+    assert document.path is None
+    assert document.workspace == STARTED
+    assert not document.dirty
+
+
+def test_work_left_behind_is_put_back_and_stays_journalled(document: Document, journals: Path) -> None:
+    document.edited(STARTED)
+    (file,) = journals.glob("*.json")
+    entry = json.loads(file.read_bytes())
+    entry["pid"], entry["born_s"] = 2**22 + 5, 0.0
+    file.write_text(json.dumps(entry))
+    (unsaved,) = left_behind(journals)
+    after = Document(lambda: Journal(journals))
+    after.recover(unsaved)
+    assert after.workspace == STARTED
+    assert after.dirty
+    assert not unsaved.journal.exists()
+    assert len(list(journals.glob("*.json"))) == 1
+
+
+def test_closing_keeps_the_journal_of_unsaved_work_only(document: Document, journals: Path) -> None:
+    document.close()
+    assert list(journals.glob("*")) == []
+    document.edited(STARTED)
+    document.close()
+    assert len(list(journals.glob("*.json"))) == 1
+
+
+def test_a_journal_that_cant_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    document = Document(lambda: Journal(tmp_path / "file"))
+    document.edited(STARTED)
+    assert document.journal_error is not None
+    assert "save the file now" in document.journal_error
+
+
+def test_the_file_carries_the_robots_that_its_blocks_name(document: Document, tmp_path: Path) -> None:
+    pepper, other = rize.robot("Pepper"), rize.robot("Other")
+    block = {"type": "robot_rize_do_say", "id": "b", "fields": {"ROBOT": "Pepper"}}
+    document.set_connected([pepper, other])
+    document.edited({"blocks": {"blocks": [block]}})
+    document.save(tmp_path / "a.nepb")
+    assert list(document.robots) == ["Pepper"]
+    document.set_connected([])
+    assert [robot.name for robot in document.absent] == ["Pepper"]
+    later = Document(lambda: Journal(tmp_path / "other"))
+    later.open(tmp_path / "a.nepb")
+    assert [robot.name for robot in later.absent] == ["Pepper"]
+
+
+def test_the_program_is_compiled_once_for_each_edit_and_change_of_robots(document: Document) -> None:
+    document.edited(STARTED)
+    first = document.program()
+    assert document.program() is first
+    document.set_connected([rize.robot("Pepper")])
+    second = document.program()
+    assert second is not first
+    document.edited(EMPTY)
+    assert document.program() is not second
+
+
+def test_definitions_follow_the_robots(document: Document) -> None:
+    before = document.definitions()
+    revision = document.definitions_revision
+    assert document.definitions() is before
+    document.set_connected([rize.robot("Pepper")])
+    assert document.definitions_revision > revision
+    assert "Pepper" in json.dumps(document.definitions())
