@@ -1,29 +1,82 @@
-"""NEP Studio's entry: the window."""
+"""NEP Studio's entries: the window, a behaviour without a window, and the processes of a frozen build.
+
+``python -m app [FILE]`` opens the window, ``python -m app run FILE`` runs a behaviour with none. A frozen Studio
+is also its own child: ``--child`` runs a program, ``--module NAME`` one of our modules that are processes.
+"""
 
 from __future__ import annotations
 
 import argparse
+import runpy
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+PROCESSES = ("app.blocks.child", "app.robots.simulated", "nep")
 
-def parser() -> argparse.ArgumentParser:
+
+def window_parser() -> argparse.ArgumentParser:
     """The options of ``python -m app``."""
-    made = argparse.ArgumentParser(prog="nep-studio", description="NEP Studio.")
-    made.add_argument("--demo", action="store_true", help="start with the virtual robot")
+    made = argparse.ArgumentParser(
+        prog="nep-studio", description="NEP Studio. `nep-studio run FILE` runs a behaviour with no window."
+    )
+    made.add_argument("file", nargs="?", type=Path, metavar="FILE", help="a behaviour to open")
+    made.add_argument(
+        "--demo", action="store_true", help="begin with the virtual robot and the first example"
+    )
+    made.add_argument("--theme", choices=("light", "dark", "system"), help="its colours")
     made.add_argument(
         "--self-drive", metavar="DIR", type=Path, help="do the main job alone; screenshots go to DIR"
     )
     return made
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Open the window; the exit code is 0 when it was closed in order."""
-    options = parser().parse_args(arguments)
-    from app.ui.first_window import run  # noqa: PLC0415 (without a window nothing may load Qt)
+def run_parser() -> argparse.ArgumentParser:
+    """The options of ``python -m app run``."""
+    made = argparse.ArgumentParser(
+        prog="nep-studio run",
+        description="Run a behaviour with no window. 0: it ended well; 1: a block failed or a robot did not stop; "
+        "2: the file can't be run; 3: a robot of it is not there; 130: stopped by Ctrl+C.",
+    )
+    made.add_argument("file", type=Path, metavar="FILE", help="the behaviour")
+    made.add_argument(
+        "--robot-wait", type=float, metavar="S", default=10.0, help="wait for its robots, in seconds"
+    )
+    made.add_argument("--master", metavar="HOST:PORT", help="the master to join")
+    return made
 
-    return run(options.self_drive)
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Do what the command line asks; the exit code is 0 when it went well."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given[:1] == ["--child"]:
+        return hand_over("app.blocks.child", given[1:])
+    if given[:1] == ["--module"] and len(given) > 1:
+        return hand_over(given[1], given[2:])
+    if given[:1] == ["run"]:
+        return run_behaviour(given[1:])
+    options = window_parser().parse_args(given)
+    from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
+
+    return run(Options(options.file, options.demo, options.theme, options.self_drive))
+
+
+def run_behaviour(arguments: Sequence[str]) -> int:
+    """Run a behaviour file with no window; the exit code of `app.run`."""
+    options = run_parser().parse_args(arguments)
+    from app.run import run_file  # noqa: PLC0415  a child process needs none of it
+
+    return run_file(options.file, robot_wait_s=options.robot_wait, master=options.master)
+
+
+def hand_over(module: str, arguments: Sequence[str]) -> int:
+    """Become the process of one of our modules; 2 when it is none of them."""
+    if module not in PROCESSES:
+        sys.stderr.write(f"no process '{module}'; there are {', '.join(PROCESSES)}\n")
+        return 2
+    sys.argv = [module, *arguments]
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
+    return 0
 
 
 if __name__ == "__main__":
