@@ -12,12 +12,13 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
 
-CACHE = Path(__file__).resolve().parents[2] / ".cache" / "peers"
+REPOSITORY = Path(__file__).resolve().parents[2]
+CACHE = REPOSITORY / ".cache" / "peers"
 SCRIPTS = Path(__file__).parent / "peers"
 FIXED_PORTS = (7000, 50000)
 PYTHON_PEERS = {
@@ -41,7 +42,7 @@ class Program:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8", **environment},
+            env=_environment(environment),
             encoding="utf-8",
             errors="replace",
         )
@@ -103,6 +104,12 @@ class Program:
                 pipe.close()
 
 
+def _environment(changes: Mapping[str, str]) -> dict[str, str]:
+    """This process's environment without what would lead a peer to our own `nep` instead of its own."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return {**kept, "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8", **changes}
+
+
 class Peers:
     """Starts programs of the original NEP. A peer that cannot be had skips the test that asks for it."""
 
@@ -128,9 +135,13 @@ class Peers:
             shutil.copyfile(SCRIPTS / "javascript_peer.js", script)
             return self.run(["node", str(script), *arguments])
         if version == "native":
-            return self.run([sys.executable, str(SCRIPTS / "native_peer.py"), *arguments])
+            return self.run_native([str(SCRIPTS / "native_peer.py"), *arguments])
         folder = self._have(version, _install_python)
         return self.run([str(_python_of(folder)), str(SCRIPTS / "python_peer.py"), *arguments])
+
+    def run_native(self, arguments: Sequence[str]) -> Program:
+        """A program on our own `nep`."""
+        return self.run([sys.executable, *arguments], PYTHONPATH=str(REPOSITORY))
 
     def run(self, command: Sequence[str], **environment: str) -> Program:
         """Any program that speaks the same lines."""
@@ -182,9 +193,19 @@ def _install_javascript(version: str, folder: Path) -> str:
 
 def _run_all(commands: Sequence[Sequence[str]], what: str, folder: Path) -> str:
     """Run the commands that install a peer; the reason why it is not there, or nothing."""
+    where = folder.parent  # not where we are: `import nep` would find our own
+    where.mkdir(parents=True, exist_ok=True)
     for command in commands:
         try:
-            subprocess.run(command, check=True, capture_output=True, text=True, timeout=240)
+            subprocess.run(
+                command,
+                check=True,
+                capture_output=True,
+                text=True,
+                timeout=240,
+                cwd=where,
+                env=_environment({}),
+            )
         except subprocess.CalledProcessError as error:
             lines = (error.stderr or error.stdout).strip().splitlines() or ["no reason given"]
             return f"{what} could not be installed: {lines[-1]}"
@@ -264,7 +285,7 @@ def start_master(peers: Peers, address: str) -> Program:
     """Start `nep master` and wait until it answers."""
     from nep.masters import is_running
 
-    program = peers.run([sys.executable, "-m", "nep", "master"])
+    program = peers.run_native(["-m", "nep", "master"])
     if not is_running(address, LONG_S):
         raise AssertionError(f"the master does not answer\n{program.printed}")
     return program

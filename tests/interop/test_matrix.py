@@ -41,7 +41,9 @@ class Room:
                 if all(each.hears(make(kind, number), 0.3) for each in self.subscribers.values()):
                     break
             else:
-                pytest.fail(f"{kind} is not heard by everybody")
+                heard = {to: len(each.got) for to, each in self.subscribers.items()}
+                printed = {to: each.printed[-1500:] for to, each in self.subscribers.items()}
+                pytest.fail(f"{kind} is not heard by everybody: {heard} {printed} {publisher.printed}")
 
     def publish(self, make, first=0, count=MESSAGES):
         """All publish in turn, each message when the one before was heard: originals keep the newest only."""
