@@ -39,7 +39,8 @@ def run_file(
     """Run a behaviour file to its end; the exit code of this module's docstring.
 
     It waits `robot_wait_s` for the robots that its blocks name. What happens is written to `out` (stdout),
-    one line each. Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots stopped.
+    one line each. Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots
+    stopped.
     """
     stream = out or sys.stdout
 

@@ -29,7 +29,8 @@ from app.robots.description import Robot
 
 COMMANDS = frozenset(
     {
-        "fail", "is_known", "join", "length", "newest", "on_message", "on_start", "on_true", "part", "publish",
+        "fail", "is_known", "join", "length", "newest", "on_message", "on_start", "on_true", "part",
+        "publish",
         "random_number", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_program",
         "wait", "wait_until", "write",
     }

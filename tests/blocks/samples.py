@@ -36,16 +36,32 @@ ACTIONS: dict[str, object] = {
         {"title": "light"} | _block("Face and lights", "lightbulb", "%robot light %where %colour"),
         ["where", "colour"],
         where={"title": "where", "type": "string", "enum": ["eyes", "shoulders"], "default": "eyes"},
-        colour={"title": "colour", "type": "string", "pattern": "^#[0-9a-fA-F]{6}$", "default": "#37b6ff",
-                "rb:widget": "colour"},
+        colour={
+            "title": "colour",
+            "type": "string",
+            "pattern": "^#[0-9a-fA-F]{6}$",
+            "default": "#37b6ff",
+            "rb:widget": "colour",
+        },
     ),
     "turn": _action(
         {"title": "turn"}
-        | _block("Movement", "rotate-ccw", "%robot turn %direction by %angle °",
-                 "%robot turns %direction by %angle °"),
+        | _block(
+            "Movement",
+            "rotate-ccw",
+            "%robot turn %direction by %angle °",
+            "%robot turns %direction by %angle °",
+        ),
         ["direction", "angle"],
         direction={"title": "direction", "type": "string", "enum": ["left", "right"], "default": "left"},
-        angle={"title": "angle", "type": "number", "minimum": 0, "maximum": 360, "unit": "deg", "default": 90},
+        angle={
+            "title": "angle",
+            "type": "number",
+            "minimum": 0,
+            "maximum": 360,
+            "unit": "deg",
+            "default": 90,
+        },
     ),
     "look": _action(
         {"title": "look"} | _block("Face and lights", "smile", "%robot look %emotion for %seconds s"),
@@ -64,7 +80,7 @@ ACTIONS: dict[str, object] = {
         with_song={"title": "with a song", "type": "boolean", "default": False},
     ),
     "stop": _action({"title": "stop"} | _block("Control", "square", "%robot stop"), []),
-}  # fmt: skip
+}
 
 MODEL: dict[str, object] = {
     "@context": ["https://www.w3.org/2022/wot/td/v1.1", {"rb": "https://example.org/robot-blocks/v1#"}],
@@ -73,32 +89,80 @@ MODEL: dict[str, object] = {
     "rb:profile": 1,
     "rb:robot": {"model": "pepper", "virtual": True},
     "rb:resources": ["speech"],
-    "rb:safeStop": {"action": "stop", "watchdog": 1.0, "onProgramEnd": True, "onDisconnect": True, "within": 0.2},
+    "rb:safeStop": {
+        "action": "stop",
+        "watchdog": 1.0,
+        "onProgramEnd": True,
+        "onDisconnect": True,
+        "within": 0.2,
+    },
     "properties": {
-        "battery": {"title": "battery", "type": "integer", "minimum": 0, "maximum": 100, "unit": "%",
-                    "readOnly": True, "observable": True,
-                    "rb:block": _block("Sensors", "battery", "%robot battery")},
-        "distance": {"title": "distance", "type": "number", "unit": "m", "readOnly": True, "observable": True,
-                     "rb:block": _block("Sensors", "ruler", "%robot distance")},
-        "sees_face": {"title": "sees a face", "type": "boolean", "readOnly": True, "observable": True,
-                      "rb:block": _block("Sensors", "scan-face", "%robot sees a face")},
-        "pose": {"title": "position", "type": "object", "readOnly": True, "observable": True,
-                 "properties": {"x": {"type": "number", "unit": "m"}, "y": {"type": "number", "unit": "m"}},
-                 "rb:block": _block("Sensors", "map-pin", "%robot position")},
-        "camera": {"title": "camera", "type": "string", "readOnly": True, "observable": True,
-                   "contentEncoding": "base64", "contentMediaType": "image/jpeg", "rb:widget": "image"},
+        "battery": {
+            "title": "battery",
+            "type": "integer",
+            "minimum": 0,
+            "maximum": 100,
+            "unit": "%",
+            "readOnly": True,
+            "observable": True,
+            "rb:block": _block("Sensors", "battery", "%robot battery"),
+        },
+        "distance": {
+            "title": "distance",
+            "type": "number",
+            "unit": "m",
+            "readOnly": True,
+            "observable": True,
+            "rb:block": _block("Sensors", "ruler", "%robot distance"),
+        },
+        "sees_face": {
+            "title": "sees a face",
+            "type": "boolean",
+            "readOnly": True,
+            "observable": True,
+            "rb:block": _block("Sensors", "scan-face", "%robot sees a face"),
+        },
+        "pose": {
+            "title": "position",
+            "type": "object",
+            "readOnly": True,
+            "observable": True,
+            "properties": {"x": {"type": "number", "unit": "m"}, "y": {"type": "number", "unit": "m"}},
+            "rb:block": _block("Sensors", "map-pin", "%robot position"),
+        },
+        "camera": {
+            "title": "camera",
+            "type": "string",
+            "readOnly": True,
+            "observable": True,
+            "contentEncoding": "base64",
+            "contentMediaType": "image/jpeg",
+            "rb:widget": "image",
+        },
     },
     "actions": ACTIONS,
     "events": {
-        "touched": {"title": "touched", "rb:filter": ["place"], "rb:level": True,
-                    "data": {"type": "object", "properties": {
-                        "place": {"type": "string", "enum": ["head", "left_hand"]}, "down": {"type": "boolean"}}},
-                    "rb:block": _block("Sensors", "hand", "when %robot %place is touched")},
-        "heard": {"title": "heard", "rb:filter": ["word"],
-                  "data": {"type": "object", "properties": {"word": {"type": "string"}}},
-                  "rb:block": _block("Speech", "ear", "when %robot hears %word")},
+        "touched": {
+            "title": "touched",
+            "rb:filter": ["place"],
+            "rb:level": True,
+            "data": {
+                "type": "object",
+                "properties": {
+                    "place": {"type": "string", "enum": ["head", "left_hand"]},
+                    "down": {"type": "boolean"},
+                },
+            },
+            "rb:block": _block("Sensors", "hand", "when %robot %place is touched"),
+        },
+        "heard": {
+            "title": "heard",
+            "rb:filter": ["word"],
+            "data": {"type": "object", "properties": {"word": {"type": "string"}}},
+            "rb:block": _block("Speech", "ear", "when %robot hears %word"),
+        },
     },
-}  # fmt: skip
+}
 
 
 def robot(name: str = "Pepper", **changes: object) -> Robot:
@@ -120,9 +184,11 @@ def nao(name: str = "NAO") -> Robot:
 _ids = itertools.count(1)
 
 
-def block(type: str, id: str | None = None, *, next: object = None, **parts: object) -> dict[str, object]:
-    """A block as Blockly saves it. Mappings that are blocks and lists of blocks become inputs, the rest fields."""
-    saved: dict[str, object] = {"type": type, "id": id or f"b{next_id()}"}
+def block(
+    block_type: str, id: str | None = None, *, below: object = None, **parts: object
+) -> dict[str, object]:
+    """A block as Blockly saves it. Blocks and lists of blocks become inputs, the rest fields."""
+    saved: dict[str, object] = {"type": block_type, "id": id or f"b{next_id()}"}
     for name, value in parts.items():
         if isinstance(value, Mapping) and "type" in value:
             _part(saved, "inputs")[name] = {"block": value}
@@ -130,8 +196,8 @@ def block(type: str, id: str | None = None, *, next: object = None, **parts: obj
             _part(saved, "inputs")[name] = {"block": stack(*value)} if value else {}
         else:
             _part(saved, "fields")[name] = value
-    if next is not None:
-        saved["next"] = {"block": next}
+    if below is not None:
+        saved["next"] = {"block": below}
     return saved
 
 

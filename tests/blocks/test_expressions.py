@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import operator
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.blocks.compiler import compile_behaviour
+from app.blocks.explain import BehaviourError
 from app.blocks.runtime import Runtime
 from app.blocks.values import text as as_text
-from tests.blocks.samples import block, boolean, number, text, workspace, write
+from tests.blocks.samples import block, boolean, number, started, text, workspace, write
 
 ARITHMETIC = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "%": operator.mod,
@@ -27,7 +29,7 @@ booleans_plain = st.booleans()
 texts_plain = st.text(max_size=6)
 
 
-class Wrong(Exception):
+class NoResultError(Exception):
     """The reference has no result."""
 
 
@@ -77,15 +79,15 @@ def reference(tree):
     try:
         result = table[how](left, right)
     except (ZeroDivisionError, OverflowError) as error:
-        raise Wrong from error
+        raise NoResultError from error
     if isinstance(result, complex):
-        raise Wrong
+        raise NoResultError
     return result
 
 
 def rounded(how, value):
     if not math.isfinite(value):
-        raise Wrong
+        raise NoResultError
     return {"round": lambda x: math.floor(x + 0.5), "up": math.ceil, "down": math.floor}[how](value)
 
 
@@ -129,8 +131,6 @@ def small(tree):
 )
 @given(trees.filter(small))
 def test_a_compiled_expression_is_worth_what_the_reference_says(tree):
-    from tests.blocks.samples import started
-
     program = compile_behaviour(workspace(started(write(blocks(tree)))), [])
     assert not program.problems
     written: list[object] = []
@@ -140,14 +140,11 @@ def test_a_compiled_expression_is_worth_what_the_reference_says(tree):
     exec(compile(program.runnable, "", "exec"), names)
     try:
         expected = reference(tree)
-    except Wrong:
-        try:
+    except NoResultError:
+        with pytest.raises(BehaviourError) as caught:
             scripts[0]()
-        except Exception as error:
-            assert type(error).__name__ == "BehaviourError"
-            assert error.block is not None
-            return
-        raise AssertionError(f"should have failed: {written}") from None
+        assert caught.value.block is not None
+        return
     scripts[0]()
     assert written == [expected] or (math.isnan(written[0]) and math.isnan(expected))
     assert type(written[0]) is type(expected)

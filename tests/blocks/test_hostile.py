@@ -20,10 +20,30 @@ CATALOGUE = Catalogue([robot()])
 TYPES = sorted(CATALOGUE.blocks)
 
 ATTACKS = (
-    "');boom();('", '");boom();("', "\\", "\\'", "\n    boom()\n", "\r\nboom()", "%A", "%ROBOT", "_hole_A", "{boom()}",
-    "__import__('os').system('boom')", "'''", '"""', "#", "\0", "\ud800", "\u2028boom()", "a b", "lambda: boom()",
-    "１", "boom", "*boom", "x=1, **boom",
-)  # fmt: skip
+    "');boom();('",
+    '");boom();("',
+    "\\",
+    "\\'",
+    "\n    boom()\n",
+    "\r\nboom()",
+    "%A",
+    "%ROBOT",
+    "_hole_A",
+    "{boom()}",
+    "__import__('os').system('boom')",
+    "'''",
+    '"""',
+    "#",
+    "\0",
+    "\ud800",
+    "\u2028boom()",
+    "a b",
+    "lambda: boom()",
+    "\uff11",
+    "boom",
+    "*boom",
+    "x=1, **boom",
+)
 
 texts = st.sampled_from(ATTACKS) | st.text(max_size=20) | st.text(st.characters(), max_size=5)
 hostile = texts | st.integers() | st.floats() | st.none() | st.booleans() | st.lists(texts, max_size=2)

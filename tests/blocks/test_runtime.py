@@ -117,8 +117,10 @@ def test_values_become_what_the_parameter_wants():
         workspace(started(score, say(get("n")), say(boolean(True)), write(listen)), variables=("n",)), link
     )
     assert [given for _, _, given in link.invoked] == [
-        {"text": "0.5"}, {"text": "true"}, {"words": ["yes", "no", "maybe"]},
-    ]  # fmt: skip
+        {"text": "0.5"},
+        {"text": "true"},
+        {"words": ["yes", "no", "maybe"]},
+    ]
     assert run.lines == ["no"]
 
 
@@ -314,16 +316,31 @@ def test_wait_until_takes_the_unknown_for_not_so(running):
     ("value", "sentence"),
     [
         (block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0)), "“÷” can't divide by 0."),
-        (block("values_compare", "v", A=text("a"), RELATION="<", B=number(0)),
-         "“is below” can't do this with a number and a text."),
-        (block("values_compare", "v", A=block("messages_newest", FIELD="x", TOPIC="/x"), RELATION="<", B=number(0)),
-         "“is below” needs a value that is not known yet."),
-        (block("values_arithmetic", "v", A=text("a"), SIGN="+", B=text("b")), "“+” needs numbers, not a text."),
-        (block("values_arithmetic", "v", A=number(-8), SIGN="**", B=number(0.5)),
-         "“to the power of” has no result for these numbers."),
+        (
+            block("values_compare", "v", A=text("a"), RELATION="<", B=number(0)),
+            "“is below” can't do this with a number and a text.",
+        ),
+        (
+            block(
+                "values_compare",
+                "v",
+                A=block("messages_newest", FIELD="x", TOPIC="/x"),
+                RELATION="<",
+                B=number(0),
+            ),
+            "“is below” needs a value that is not known yet.",
+        ),
+        (
+            block("values_arithmetic", "v", A=text("a"), SIGN="+", B=text("b")),
+            "“+” needs numbers, not a text.",
+        ),
+        (
+            block("values_arithmetic", "v", A=number(-8), SIGN="**", B=number(0.5)),
+            "“to the power of” has no result for these numbers.",
+        ),
         (block("values_round", "v", HOW="round", NUMBER=text("x")), "“round” needs a number, not a text."),
     ],
-)  # fmt: skip
+)
 def test_an_error_inside_a_value_belongs_to_the_value(value, sentence):
     outer = block("values_join", A=text("is "), B=value)
     run = play(workspace(started(write(outer))))
