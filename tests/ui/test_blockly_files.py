@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import random
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -60,6 +61,7 @@ def test_unknown_blocks_survive_moving_copying_and_undo(qtbot, view, person):
     them = person(rover)
     them.drag("[data-id=r]", QPoint(640, 400))
     qtbot.waitUntil(lambda: them.tops()[0]["x"] > 300, timeout=WAIT_MS)
+    them.wait_for("!document.querySelector('.blocklyDragging')")
     moved = them.tops()[0]
     assert {**moved, "x": 0, "y": 0} == {**rover, "x": 0, "y": 0}
     them.press(Qt.Key_Delete)
@@ -79,3 +81,68 @@ def test_a_definition_that_comes_later_wakes_the_kept_block(qtbot, view, person)
     them.wait_for("document.querySelector('[data-id=r]').classList.contains('robot_rover_do_wave')")
     assert them.ask("document.querySelector('[data-id=r]').classList.contains('nepAbsent')") is False
     assert them.tops() == [rover]
+
+
+KNOWN = {
+    "control_wait": (("SECONDS",), {}),
+    "control_repeat": (("TIMES", "DO"), {}),
+    "values_compare": (("A", "B"), {"OP": ">"}),
+    "values_number": ((), {"NUMBER": 4.5}),
+    "robot_pepper_do_say": (("TEXT",), {"ROBOT": "Somebody"}),
+    "events_message": ((), {"TOPIC": "/any"}),
+}
+
+
+class Maker:
+    """Random programs: known and unknown blocks, fitting and not, shadows, stacks and nesting."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._count = 0
+
+    def block(self, depth: int) -> dict:
+        self._count += 1
+        made: dict = {"id": f"n{self._count}"}
+        if self._random.random() < 0.5:
+            made["type"] = self._random.choice(list(KNOWN))
+            names, fields = KNOWN[made["type"]]
+        else:
+            made["type"] = self._random.choice(
+                ["rover_wave", "robot_rover_get_x", "robot_rover_when_y", "new"]
+            )
+            names, fields = (
+                ("A", "DO", "TIMES"),
+                {"F": self._random.choice([1, "text", None, [1], {"id": "v"}])},
+            )
+            extras = {"extraState": {"items": 2}, "data": "d", "collapsed": True, "inline": False}
+            chosen = self._random.sample(list(extras), self._random.randint(0, 2))
+            made.update({name: extras[name] for name in chosen})
+        if fields:
+            made["fields"] = fields
+        inputs = {
+            name: self.connected(depth + 1) for name in names if depth < 3 and self._random.random() < 0.5
+        }
+        if inputs:
+            made["inputs"] = inputs
+        if depth < 4 and self._random.random() < 0.4:
+            made["next"] = {"block": self.block(depth + 1)}
+        return made
+
+    def connected(self, depth: int) -> dict:
+        kind = self._random.random()
+        made = {"block": self.block(depth)} if kind < 0.7 else {}
+        if kind > 0.5:
+            made["shadow"] = self.block(4)
+        return made
+
+    def program(self) -> dict:
+        tops = [{**self.block(0), "x": 28 + 280 * column, "y": 28} for column in range(3)]
+        return workspace(*tops)
+
+
+def test_random_programs_come_back_as_they_were(view, person):
+    them = person()
+    for seed in range(60):
+        program = Maker(seed).program()
+        view.load(program)
+        assert them.newest() == program, f"seed {seed}"

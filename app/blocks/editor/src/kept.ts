@@ -51,16 +51,16 @@ export function keep(state: BlockState, shape: Shape | null = null): BlockState 
   if (state.next) result.next = keepConnected(state.next, 'statement');
   if (known) return result;
   const {id, x, y, inputs, next, ...original} = state;
-  void inputs;
-  void next;
+  const form = shape ?? guessTop(state);
   const kept: KeptState = {
-    original,
-    shape: shape ?? guessTop(state),
-    inputs: Object.entries(state.inputs ?? {}).map(([name, each]) => [name, kindOf(name, each)]),
+    // Nothing can hang below a value; what the file says there stays inside.
+    original: form === 'value' && next ? {...original, next} : original,
+    shape: form,
+    inputs: Object.entries(inputs ?? {}).map(([name, each]) => [name, kindOf(name, each)]),
     label: labelOf(state),
   };
   return {...position(id, x, y), type: KEPT, extraState: kept,
-    ...(result.inputs && {inputs: result.inputs}), ...(result.next && {next: result.next})};
+    ...(result.inputs && {inputs: result.inputs}), ...(form !== 'value' && result.next && {next: result.next})};
 }
 
 /** One kept block that holds a whole stack: the last resort when even `keep` cannot be made. */
