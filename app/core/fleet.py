@@ -249,8 +249,6 @@ class Fleet:
             link.drawing = _mapping(state.messages[-1]) or link.drawing
 
     def _answer(self, link: RobotLink, answer: Payload) -> None:
-        if answer is None:
-            return
         for invocation in link.invocations.values():
             if invocation.id != answer.get("id") or not invocation.running or answer.get("op") == "cancel":
                 continue

@@ -1,0 +1,120 @@
+"""The six states of the run bar, to the letter of the design."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.core.run_view import RunState, listed, seconds, stop_words, view_of
+from app.core.stopping import RobotStop, StopReport
+
+PEPPER = RobotStop("Pepper", True, 38.2)
+TURTLE = RobotStop("Turtle", True, 41.4)
+SILENT = RobotStop("Turtle", False, None)
+RIZE = RobotStop("Nao", False, None, can_confirm=False)
+
+
+def after(*robots: RobotStop, elapsed_ms: float = 41.4, **values: object) -> RunState:
+    good = all(robot.answered or not robot.can_confirm for robot in robots)
+    state = RunState("proven" if good else "unanswered", "Greeting", report=StopReport(robots, elapsed_ms))
+    for name, value in values.items():
+        setattr(state, name, value)
+    return state
+
+
+def test_ready_names_the_robots() -> None:
+    view = view_of(RunState(), ["Pepper", "Turtle"], 0)
+    assert (view.title, view.detail) == ("Ready", "Pepper and Turtle are connected")
+    assert (view.can_run, view.can_pause, view.can_step, view.stop_filled) == (True, False, True, True)
+    assert view_of(RunState(), ["Pepper"], 0).detail == "Pepper is connected"
+    alone = view_of(RunState(), [], 0)
+    assert (alone.detail, alone.stop_filled) == ("No robot is connected", False)
+
+
+def test_running_tells_its_time_and_what_happens() -> None:
+    run = RunState("running", "Greeting", says="Pepper says “Touch my head.”", started_s=100.0)
+    view = view_of(run, ["Pepper"], 114.9)
+    assert (view.title, view.detail) == ("Running, 14 s", "Pepper says “Touch my head.”")
+    assert view.compact == "Greeting runs, 14 s"
+    assert (view.can_run, view.can_pause, view.can_step) == (False, True, True)
+
+
+def test_the_clock_stands_while_paused() -> None:
+    run = RunState("paused", "Greeting", paused_at="wait 2 s", started_s=100.0, pause_began_s=110.0)
+    view = view_of(run, ["Pepper"], 200.0)
+    assert (view.title, view.detail) == ("Paused at “wait 2 s”", "Robots hold still; the clock stands")
+    assert (view.run_word, view.can_run, view.can_step) == ("Go on", True, True)
+    assert run.elapsed(200.0) == 10.0
+
+
+def test_stopping_shows_only_after_100_ms_and_counts_the_answers() -> None:
+    run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper", "Turtle"), elapsed_s=14.0)
+    assert view_of(run, [], 10.05).stop_word == "Stop"
+    run.answered.append(PEPPER)
+    view = view_of(run, [], 10.2)
+    assert (view.title, view.detail) == ("Stopping", "Waiting for Turtle, 0.2 s")
+    assert (view.stop_word, view.result) == ("Stopping", "1 of 2 robots stopped")
+    assert not view.can_run
+
+
+def test_proven_says_how_long_it_took() -> None:
+    view = view_of(after(PEPPER, TURTLE, elapsed_s=14.0, dashed=True), [], 0)
+    assert (view.title, view.detail) == ("Stopped after 14 s", "The dashed outline shows where")
+    assert (view.result, view.result_ok) == ("all 2 robots stopped (41 ms)", True)
+    assert view.can_run
+    assert view_of(after(PEPPER), [], 0).result == "Pepper stopped (41 ms)"
+
+
+def test_an_answer_in_less_than_a_millisecond_is_not_zero() -> None:
+    assert view_of(after(PEPPER, elapsed_ms=0.2), [], 0).result == "Pepper stopped (1 ms)"
+
+
+def test_not_answered_names_the_robot_and_what_a_hand_can_do() -> None:
+    view = view_of(after(PEPPER, SILENT), [], 0)
+    assert (view.title, view.detail) == (
+        "Turtle did not answer",
+        "Pepper stopped (38 ms). Switch Turtle off by hand.",
+    )
+    assert (view.result, view.result_ok) == ("1 of 2 robots stopped", False)
+    assert (view.stop_word, view.confirm) == ("Stop again", "Turtle is still")
+    assert view.compact == "Turtle did not answer; switch it off by hand"
+    assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)
+
+
+def test_a_robot_of_rize_is_never_called_stopped() -> None:
+    view = view_of(after(RIZE), [], 0)
+    assert view.result == "stop sent; Nao cannot confirm"
+    both = view_of(after(PEPPER, RIZE), [], 0)
+    assert both.result == "Pepper stopped (41 ms); Nao cannot confirm"
+
+
+def test_a_program_that_came_to_its_end_or_failed_says_so() -> None:
+    assert view_of(after(PEPPER, finished=True, elapsed_s=3.0), [], 0).title == "Finished after 3 s"
+    view = view_of(after(PEPPER, errors={"a": "“turn” needs a number."}, elapsed_s=3.0), [], 0)
+    assert (view.title, view.detail) == ("Stopped by a problem after 3 s", "“turn” needs a number.")
+
+
+def test_the_last_stop_stays_beside_a_running_program() -> None:
+    run = RunState("running", "Greeting", last_words="Pepper stopped (41 ms)")
+    assert view_of(run, ["Pepper"], 1).last_stop == "Pepper stopped (41 ms)"
+
+
+@pytest.mark.parametrize(
+    ("value", "words"), [(0.9, "0 s"), (14.99, "14 s"), (60, "1 min 0 s"), (125, "2 min 5 s")]
+)
+def test_seconds(value: float, words: str) -> None:
+    assert seconds(value) == words
+
+
+def test_listed() -> None:
+    assert [listed([]), listed(["a"]), listed(["a", "b"]), listed(["a", "b", "c"])] == [
+        "",
+        "a",
+        "a and b",
+        "a, b and c",
+    ]
+
+
+def test_stop_words() -> None:
+    assert stop_words(PEPPER, "8:40") == "answered in 38 ms, at 8:40"
+    assert stop_words(SILENT, "8:40") == "not answered, at 8:40"
+    assert stop_words(RIZE, "8:40") == "sent at 8:40; this robot cannot confirm"

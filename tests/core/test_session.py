@@ -1,0 +1,231 @@
+"""The session on a real network: a master, a virtual robot, original topics, a program, a stop."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+
+import nep
+from app.core.session import Session
+from app.core.settings import Settings
+from app.errors import RobotInputError, RobotUnknownError
+from app.robots.description import td_for
+from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
+from nep.masters import Master
+from tests.core.waiting import tick_until
+
+EXAMPLES = Path(__file__).parents[2] / "resources" / "examples"
+
+
+@pytest.fixture
+def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    session = Session(
+        Settings(tmp_path),
+        address=master.address,
+        journal_folder=tmp_path / "journal",
+        start_companions=False,
+    )
+    session.start()
+    yield session
+    session.close()
+
+
+class Lamp:
+    """A robot with one action."""
+
+    made: ClassVar[list[Lamp]] = []
+
+    def __init__(self, link: Link) -> None:
+        self.stops = 0
+        self.made.append(self)
+
+    @action("blink", category="Looks", icon="lightbulb", timeout_s=30)
+    def blink(self, call: Call) -> None:
+        """Blinks at once."""
+
+    @safe_stop(watchdog_s=0.5)
+    def stop(self) -> None:
+        """Stands still at once."""
+        self.stops += 1
+
+
+LAMP = Kind("lamp", "Lamp", Lamp)
+
+
+def test_topics_appear_with_their_figures_and_vanish(session: Session) -> None:
+    with nep.node("talker") as node:
+        publisher = node.new_pub("/hello", "json")
+        tick_until(session, lambda: "/hello" in session.topics)
+        assert session.master.kind == "connected"
+
+        def rate() -> float | None:
+            publisher.publish({"n": 1})
+            return session.topics["/hello"].rate_hz
+
+        tick_until(session, rate)
+        assert session.messages_per_s
+        assert session.topics["/hello"].publisher_nodes == ("talker",)
+    tick_until(session, lambda: session.topics["/hello"].gone_s is not None)
+
+
+def test_nothing_is_subscribed_until_somebody_looks(session: Session) -> None:
+    with nep.node("talker") as node:
+        publisher = node.new_pub("/hello", "json")
+        tick_until(session, lambda: "/hello" in session.topics)
+        assert publisher.subscribers == 0
+        watch = session.watch("/hello")
+        tick_until(session, lambda: publisher.subscribers == 1)
+        publisher.publish({"say": "hé"})
+        tick_until(session, lambda: session.topics["/hello"].newest is not None)
+        newest = session.topics["/hello"].newest
+        assert newest is not None
+        assert newest.payload == {"say": "hé"}
+        watch.close()
+        tick_until(session, lambda: publisher.subscribers == 0)
+        assert session.topics["/hello"].newest is None
+
+
+def test_a_topic_may_be_watched_before_it_is_there(session: Session) -> None:
+    with session.watch("/later"), nep.node("talker") as node:
+        publisher = node.new_pub("/later", "json")
+        tick_until(session, lambda: publisher.subscribers == 1)
+        publisher.publish(5)
+        tick_until(session, lambda: session.topics["/later"].received == 1)
+
+
+def test_bad_messages_are_one_alert_that_a_good_one_cures(session: Session) -> None:
+    with session.watch("/bad"), nep.node("talker") as node:
+        publisher = node.new_pub("/bad", "json")
+        tick_until(session, lambda: publisher.subscribers == 1)
+        for _ in range(7):
+            publisher.publish_bytes(b"{not json")
+        tick_until(session, lambda: session.topics["/bad"].received == 7)
+        (alert,) = session.alerts.active
+        assert alert.id == "message:/bad"
+        assert alert.count == 7
+        assert "7 messages" in alert.title
+        publisher.publish({"good": True})
+        tick_until(session, lambda: not session.alerts.active)
+
+
+def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) -> None:
+    session.companions.start_virtual_robot("Pepper")
+    tick_until(session, lambda: session.fleet.connected, 20)
+    link = session.fleet.link("Pepper")
+    assert link is not None
+    assert (link.virtual, link.chip) == (True, "virtual, ready")
+    with session.fleet.look_at("Pepper"):
+        tick_until(session, lambda: "distance" in link.values and link.drawing is not None)
+        stream = session.images.stream("/Pepper/camera")
+        tick_until(session, lambda: stream.picture is not None)
+        stream.close()
+        said = session.fleet.invoke("Pepper", "say", {"text": "hi"})
+        tick_until(session, lambda: said.state == "succeeded")
+        walk = session.fleet.invoke("Pepper", "walk", {"distance": 2.0})
+        tick_until(session, lambda: link.drawing is not None and link.drawing["moving"])
+        assert link.state == "busy"
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "proven")
+        tick_until(session, lambda: link.drawing is not None and not link.drawing["moving"])
+        assert walk.state == "canceled"
+        assert link.last_stop is not None
+        assert link.last_stop.startswith("answered in ")
+    session.companions.stop_virtual_robot("Pepper")
+    tick_until(session, lambda: link.state == "away")
+    with pytest.raises(RobotInputError):
+        session.fleet.invoke("Pepper", "fly", {})
+
+
+def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
+    with nep.node("lamp") as node:
+        driver = Driver(LAMP, "Lamp", node)
+        driver.start()
+        try:
+            tick_until(session, lambda: session.fleet.connected)
+            with pytest.raises(RobotInputError):
+                session.fleet.invoke("Lamp", "blink", {"colour": 5})
+            with pytest.raises(RobotUnknownError):
+                session.fleet.invoke("Nobody", "blink", {})
+        finally:
+            driver.close()
+
+
+def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
+    session.companions.start_virtual_robot("Pepper")
+    tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots, 20)
+    session.document.example(EXAMPLES / "greeting.nepb")
+    assert not [p for p in session.document.problems() if p.severity == "error"]
+    session.runs.run()
+    tick_until(session, lambda: session.runs.running_blocks)
+    assert session.runs.view().state == "running"
+    session.runs.pause()
+    tick_until(session, lambda: session.runs.view().state == "paused", 20)
+    session.runs.go_on()
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "proven")
+    assert session.runs.view().result_ok
+    assert session.runs.view().title.startswith("Stopped after")
+
+
+def test_a_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:
+    block = {"type": "control_wait", "id": "w", "inputs": {}}
+    started = {"type": "events_started", "id": "s", "next": {"block": block}}
+    session.document.edited({"blocks": {"languageVersion": 0, "blocks": [started]}})
+    session.runs.run()
+    assert "w" in session.runs.block_errors
+    assert session.runs.view().state == "ready"
+
+
+def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
+    with nep.node("lamp") as node:
+        driver = Driver(LAMP, "Lamp", node)
+        driver.start()
+        try:
+            tick_until(session, lambda: session.stopper and session.stopper.robots)
+            session.document.edited(json.loads(json.dumps(_forever())))
+            session.runs.run()
+            tick_until(session, lambda: session.runs.running_blocks)
+            runner = session.runs._runner
+            assert runner is not None
+            assert runner.pid is not None
+            os.kill(runner.pid, signal.SIGKILL if os.name == "posix" else signal.SIGTERM)
+            tick_until(session, lambda: session.runs.view().state == "proven")
+            assert Lamp.made[-1].stops >= 1
+            assert [alert.id for alert in session.alerts.active] == ["program"]
+        finally:
+            driver.close()
+
+
+def test_a_robot_that_does_not_answer_is_named_and_run_stays_locked(session: Session) -> None:
+    with nep.node("mute") as node:
+        description = node.new_pub("/Mute/description", "robot/description", latched=True)
+        description.publish(td_for(LAMP.thing_model, "Mute"))
+        tick_until(session, lambda: session.stopper and session.stopper.robots, 20)
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().stop_word == "Stopping")
+        tick_until(session, lambda: session.runs.view().state == "unanswered")
+        view = session.runs.view()
+        assert view.title == "Mute did not answer"
+        assert not view.can_run
+        assert any(alert.id == "stop" for alert in session.alerts.active)
+        session.runs.confirm_still()
+        assert session.runs.view().state == "ready"
+        assert not any(alert.id == "stop" for alert in session.alerts.active)
+
+
+def _forever() -> dict[str, object]:
+    wait = {"type": "control_wait", "id": "w", "inputs": {"SECONDS": {"shadow": _number(1)}}}
+    loop = {"type": "control_forever", "id": "f", "inputs": {"BODY": {"block": wait}}}
+    started = {"type": "events_started", "id": "s", "next": {"block": loop}}
+    return {"blocks": {"languageVersion": 0, "blocks": [started]}}
+
+
+def _number(value: float) -> dict[str, object]:
+    return {"type": "values_number", "id": f"n{value}", "fields": {"NUMBER": value}}
