@@ -160,7 +160,7 @@ def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
 def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
     session.companions.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots, 20)
-    session.document.example(EXAMPLES / "greeting.nepb")
+    session.document.example(EXAMPLES / "1-greeting.nepb")
     assert not [p for p in session.document.problems() if p.severity == "error"]
     session.runs.run()
     tick_until(session, lambda: session.runs.running_blocks)
