@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 
-from tests.ui.blockly_person import PICTURE, START, TOKENS, WAIT_MS, outlined
+from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, TOKENS, WAIT_MS, outlined
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -148,3 +148,21 @@ def test_the_toolbox_is_that_of_the_picture(person):
     tile = "getComputedStyle(document.querySelector('.nepTile')).backgroundColor"
     events = QColor(TOKENS["block"]["events"]["light"]["primary"]).getRgb()[:3]
     assert them.ask(tile) == "rgb({}, {}, {})".format(*events)
+
+
+def test_without_a_robot_the_toolbox_says_so(view, person):
+    them = person()
+    contents = DEFINITIONS["toolbox"]["contents"][:7]
+    view.set_definitions({**DEFINITIONS, "toolbox": {"kind": "categoryToolbox", "contents": contents}})
+    headings = (
+        "[...document.querySelectorAll('.nepHeading')].map(e => [...e.children].map(c => c.textContent))"
+    )
+    them.wait_for(headings, [["Blocks", ""], ["", "No robot", "connected"]])
+
+
+def test_live_values_are_in_the_flyout_too(view, person):
+    them = person()
+    view.set_live_values({"Pepper/battery": "84 %"})
+    them.open_category("Sensors")
+    live = "document.querySelector('.blocklyFlyout .nepLive')?.textContent.replaceAll('\\u00a0', ' ')"
+    them.wait_for(live, "84 %")

@@ -62,7 +62,7 @@ export class States {
 
   private onEvent(event: Blockly.Events.Abstract): void {
     if (event.type === Blockly.Events.BLOCK_CREATE) this.restore();
-    else if (event.type === Blockly.Events.BLOCK_CHANGE || event.type === Blockly.Events.BLOCK_FIELD_INTERMEDIATE_CHANGE) {
+    else if (event.type === Blockly.Events.BLOCK_CHANGE || event.type === Blockly.Events.TOOLBOX_ITEM_SELECT) {
       this.showLive();
     }
     if (this.bubbles.size) this.placeSoon();
@@ -99,11 +99,10 @@ export class States {
   }
 
   private showLive(): void {
-    for (const block of this.workspace.getAllBlocks(false)) {
-      for (const input of block.inputList) {
-        for (const field of input.fieldRow) {
-          if (field instanceof FieldLive) field.show(this.live[block.id] ?? this.live[sensorKey(block)] ?? '');
-        }
+    const flyout = this.workspace.getFlyout()?.getWorkspace().getAllBlocks(false) ?? [];
+    for (const block of [...this.workspace.getAllBlocks(false), ...flyout]) {
+      for (const field of block.getFields()) {
+        if (field instanceof FieldLive) field.show(this.live[block.id] ?? this.live[sensorKey(block)] ?? '');
       }
     }
   }

@@ -75,9 +75,11 @@ interface Items {
   contents: Def[];
 }
 
-/** Gives every item an id that stays the same from one definition to the next. */
+/** Gives every item an id that stays the same from one definition to the next; says so when there is no robot. */
 function withIds(def: Items): Items {
   let section = '';
+  const empty = def.contents.length && !def.contents.some((item) => item['kind'] === 'robotHeading');
+  const none = {kind: 'robotHeading', name: 'No robot', note: 'connected', connected: false};
   const contents = def.contents.map((item) => {
     const name = text(item['name']) || text(item['text']);
     if (item['kind'] !== 'category') {
@@ -86,7 +88,7 @@ function withIds(def: Items): Items {
     }
     return {...item, toolboxitemid: text(item['toolboxitemid']) || `category ${section} / ${name}`};
   });
-  return {...def, contents};
+  return {...def, contents: empty ? [...contents, none] : contents};
 }
 
 export class Toolbox extends Blockly.Toolbox {
@@ -127,6 +129,6 @@ export class Toolbox extends Blockly.Toolbox {
 }
 
 Blockly.registry.register(Blockly.registry.Type.TOOLBOX_ITEM, 'category', Category, true);
-for (const kind of ['blocksHeading', 'robotHeading']) {
+for (const kind of ['heading', 'blocksHeading', 'robotHeading']) {
   Blockly.registry.register(Blockly.registry.Type.TOOLBOX_ITEM, kind, Heading, true);
 }
