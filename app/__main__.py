@@ -1,7 +1,7 @@
 """NEP Studio's entries: the window, a behaviour without a window, and the processes of a frozen build.
 
-``python -m app [FILE]`` opens the window, ``python -m app run FILE`` runs a behaviour with none. A frozen Studio
-is also its own child: ``--child`` runs a program, ``--module NAME`` one of our modules that are processes.
+``python -m app [FILE]`` opens the window, ``python -m app run FILE`` runs a behaviour with none. A frozen
+Studio is also its own child: ``--child`` runs a program, ``--module NAME`` a module that is a process.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def run_parser() -> argparse.ArgumentParser:
     """The options of ``python -m app run``."""
     made = argparse.ArgumentParser(
         prog="nep-studio run",
-        description="Run a behaviour with no window. 0: it ended well; 1: a block failed or a robot did not stop; "
-        "2: the file can't be run; 3: a robot of it is not there; 130: stopped by Ctrl+C.",
+        description="Run a behaviour with no window. Exit codes: 0 it ended well; 1 a block failed or a robot "
+        "did not stop; 2 the file can't be run; 3 a robot of it is not there; 130 stopped by Ctrl+C.",
     )
     made.add_argument("file", type=Path, metavar="FILE", help="the behaviour")
     made.add_argument(

@@ -183,7 +183,7 @@ class Files:
         document = self._session.document
         if not document.dirty:
             return True
-        had_file = document.path is not None
+        had_file, name = document.path is not None, document.name
         path = document.path or kept_path(home() / "kept", document.name, self._clock())
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -191,13 +191,13 @@ class Files:
         except (AppError, OSError) as error:
             self._complain(str(error), "file.save_as", "Save somewhere else")
             return False
-        self._remember(path)
-        self._say(f"Saved {document.name}" if had_file else f"Kept {document.name} in Recent")
+        self._remember(path, name)
+        self._say(f"Saved {name}" if had_file else f"Kept {name} in Recent")
         return True
 
-    def _remember(self, path: Path) -> None:
+    def _remember(self, path: Path, name: str | None = None) -> None:
         try:
-            self._session.settings.add_recent(path, self._session.document.name)
+            self._session.settings.add_recent(path, name or self._session.document.name)
         except SettingsError as error:
             self._session.console.add("warn", "studio", str(error))
 

@@ -6,9 +6,9 @@ import base64
 import binascii
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow
+from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow
 
 from app.ui.docks import Dock
 from app.ui.layouts import Layout
@@ -42,6 +42,9 @@ class Workbench(QMainWindow):
         self._arranged = False
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
+        # the width of the gaps was asked for before the property was there, and is remembered
+        self.style().unpolish(self)
+        QApplication.sendEvent(self, QEvent(QEvent.Type.StyleChange))
         self.setAccessibleName(f"{layout.title} layout")
         gap = theme.size("gap", layout.density)
         self.setContentsMargins(gap, gap, gap, gap)

@@ -13,7 +13,9 @@ from app.ui.theme import Theme
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 VIEWS = {
-    "ready": RunView("ready", "Ready", "Pepper and Turtle are connected", "Ready", can_run=True, can_step=True),
+    "ready": RunView(
+        "ready", "Ready", "Pepper and Turtle are connected", "Ready", can_run=True, can_step=True,
+    ),
     "running": RunView(
         "running", "Running, 14 s", "Pepper says “Touch my head.”", "Greeting runs, 14 s",
         can_pause=True, can_step=True, last_stop="all 2 robots stopped (41 ms)",

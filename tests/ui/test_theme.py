@@ -156,7 +156,7 @@ def test_the_sheet_names_no_object_and_has_no_holes(theme: Theme) -> None:
 
 
 def test_colours_are_written_nowhere_but_in_the_tokens() -> None:
-    # A robot's drawing, its lamps and boxes on a camera's picture have colours of their own: no theme changes them.
+    # A robot's drawing, its lamps and boxes on a picture have colours that no theme changes.
     own = {path.name for path in UI.glob("robot_*.py")} | {"choices.py", "forms.py", "picture_view.py"}
     written = [
         f"{path.relative_to(UI)}: {found}"

@@ -94,8 +94,13 @@ def test_a_press_on_the_track_goes_there(slider: SliderWithUnit) -> None:
 
 @pytest.mark.parametrize(
     ("typed", "sentence"),
-    [("2", "The most is 1 m."), ("-3", "The least is -1 m."), ("far", "This needs a number."), ("nan", "This needs a number.")],
-)  # fmt: skip
+    [
+        ("2", "The most is 1 m."),
+        ("-3", "The least is -1 m."),
+        ("far", "This needs a number."),
+        ("nan", "This needs a number."),
+    ],
+)
 def test_a_wrong_number_stays_and_is_explained(slider: SliderWithUnit, typed: str, sentence: str) -> None:
     slider.field.setText(typed)
     slider.field.editingFinished.emit()
@@ -174,7 +179,9 @@ def test_run_keeps_its_width_when_it_becomes_go_on(theme: Theme) -> None:
     assert button.sizeHint() == before
 
 
-@pytest.mark.parametrize(("place", "least"), [("runBar", (164, 44)), ("toolBar", (132, 30)), ("appBar", (112, 30))])
+@pytest.mark.parametrize(
+    ("place", "least"), [("runBar", (164, 44)), ("toolBar", (132, 30)), ("appBar", (112, 30))]
+)
 def test_stop_keeps_its_size_and_its_red_in_every_state(qtbot, theme: Theme, place: str, least) -> None:
     stop = StopButton(theme, place)  # type: ignore[arg-type]
     shown(qtbot, stop)
@@ -225,7 +232,11 @@ def test_a_sparkline_paints_a_stroke(qtbot, theme: Theme) -> None:
 def test_an_empty_state_leads_on(qtbot, theme: Theme) -> None:
     done: list[str] = []
     made = EmptyState(
-        theme, "bot", "No robot", "Connect one.", [EmptyAction("Use it", lambda: done.append("used"), primary=True)]
+        theme,
+        "bot",
+        "No robot",
+        "Connect one.",
+        [EmptyAction("Use it", lambda: done.append("used"), primary=True)],
     )
     shown(qtbot, made)
     QTest.mouseClick(made.findChildren(Button)[0], Qt.MouseButton.LeftButton)

@@ -1,0 +1,116 @@
+"""Plain panels, a person who answers, and an address where nobody listens: for tests of the window."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtWidgets import QLineEdit, QVBoxLayout
+
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.start_page import Example
+
+NAMES = {
+    "behaviour": ("Behaviour", ()),
+    "problems": ("Problems", ()),
+    "robot": ("Pepper", ()),
+    "robots": ("Robots", ()),
+    "camera": ("Camera", ()),
+    "image": ("Image", ("image",)),
+    "sensors": ("Sensors now", ()),
+    "topics": ("Topics", ()),
+    "inspector": ("Inspector", ("*",)),
+    "console": ("Console", ()),
+    "alerts": ("Alerts", ()),
+}
+
+
+class PlainPanel(PanelWidget):
+    """Writes down what the window asks of it."""
+
+    def __init__(self, context: PanelContext, title: str) -> None:
+        super().__init__(context, title)
+        self.refreshed = 0
+        self.topics: list[str] = []
+        self.state: dict[str, object] = {}
+        self.closed = False
+        self.undone: list[str] = []
+        self.flushed = 0
+        self.blocks: list[str] = []
+        self.explode = False
+        self.filter = QLineEdit()
+        column = QVBoxLayout(self)
+        column.addWidget(self.filter)
+
+    def refresh(self) -> None:
+        if self.explode:
+            raise ValueError("no such luck")
+        self.refreshed += 1
+
+    def show_topic(self, name: str) -> None:
+        self.topics.append(name)
+
+    def focus_filter(self) -> bool:
+        self.filter.setFocus()
+        return True
+
+    def save_state(self) -> dict[str, object]:
+        return {"filter": self.filter.text()}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self.state = dict(state)
+
+    def shut(self) -> None:
+        self.closed = True
+
+    def undo(self) -> None:
+        self.undone.append("undo")
+
+    def redo(self) -> None:
+        self.undone.append("redo")
+
+    def flush(self, done: Callable[[], None]) -> None:
+        self.flushed += 1
+        done()
+
+    def show_block(self, block: str) -> None:
+        self.blocks.append(block)
+
+
+def plain(name: str, title: str, accepts: tuple[str, ...]) -> Panel:
+    """A panel description whose widget is plain."""
+    return Panel(name, title, "bot", accepts, lambda context: PlainPanel(context, title))
+
+
+PANELS = {name: plain(name, title, accepts) for name, (title, accepts) in NAMES.items()}
+
+
+class Answers:
+    """Answers for the person who is asked for a file."""
+
+    def __init__(self) -> None:
+        self.path: Path | None = None
+        self.asked: list[str] = []
+
+    def open(self, folder: str, take: Callable[[Path], None]) -> None:
+        self.asked.append(f"open {folder}")
+        if self.path is not None:
+            take(self.path)
+
+    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
+        self.asked.append(f"save {suggestion}")
+        if self.path is not None:
+            take(self.path)
+
+
+def free_address() -> str:
+    """A loopback address on which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"127.0.0.1:{probe.getsockname()[1]}"
+
+
+def examples(folder: Path) -> list[Example]:
+    """Two examples without blocks."""
+    return [Example(folder / f"{name}.nepb", name, f"{name} does it", ()) for name in ("Greeting", "Quiz")]

@@ -1,0 +1,410 @@
+"""The window: layouts, keyboard, banner, Stop, and what comes back at the next start."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QPushButton
+
+from app.core.journal import Journal, left_behind
+from app.core.session import Session
+from app.core.settings import Settings
+from app.ui.actions import TABLE, shortcuts
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+from app.ui.theme import Theme
+from app.ui.widgets import Button
+from tests.ui.shell_parts import PANELS, PlainPanel, free_address
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def panel(window: MainWindow, layout: str, name: str) -> PlainPanel:
+    found = window.benches[layout].docks[name].panel
+    assert isinstance(found, PlainPanel)
+    return found
+
+
+def show(qtbot, window: MainWindow) -> None:
+    window.show()
+    qtbot.waitExposed(window)
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+
+
+def test_it_begins_with_the_start_page(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    assert window.start.isVisible()
+    assert not window.run_bar.isVisible()
+    assert not window.status.isVisible()
+    assert not window.bar.switch.isVisible()
+    assert window.bar.stop.isVisible()
+    window.tick()
+    assert not window.bar.stop.filled
+
+
+def test_both_layouts_show_their_panels(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    commands.run("layout.behaviour")
+    assert set(window.benches["behaviour"].open_names()) == {
+        "behaviour",
+        "problems",
+        "robot",
+        "camera",
+        "sensors",
+    }
+    assert (window.run_bar.isVisible(), window.tool_bar.isVisible()) == (True, False)
+    commands.run("layout.developer")
+    assert set(window.benches["developer"].open_names()) == {
+        "topics",
+        "inspector",
+        "image",
+        "console",
+        "alerts",
+    }
+    assert (window.run_bar.isVisible(), window.tool_bar.isVisible()) == (False, True)
+    assert window.bar.switch.value == "developer"
+
+
+def test_the_first_arrangement_is_the_pictures(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    commands.run("layout.behaviour")
+    docks = window.benches["behaviour"].docks
+    qtbot.waitUntil(lambda: abs(docks["robot"].width() - 384) <= 2)
+    assert abs(docks["problems"].height() - 124) <= 6
+    assert docks["problems"].width() == docks["behaviour"].width()
+    right = {docks[name].x() for name in ("robot", "camera", "sensors")}
+    assert len(right) == 1
+    assert docks["robot"].x() - docks["behaviour"].geometry().right() - 1 == 8
+    commands.run("layout.developer")
+    docks = window.benches["developer"].docks
+    qtbot.waitUntil(lambda: abs(docks["inspector"].width() - 330) <= 2)
+    assert abs(docks["topics"].width() - 640) <= 4
+    assert docks["inspector"].x() - docks["topics"].geometry().right() - 1 == 6
+    assert docks["console"].y() > docks["image"].y()
+
+
+def test_only_panels_that_can_be_seen_are_refreshed(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    commands.run("layout.behaviour")
+    commands.run("layout.developer")
+    qtbot.waitUntil(window.benches["developer"].docks["console"].shown)
+    hidden = panel(window, "behaviour", "robot").refreshed
+    before = panel(window, "developer", "topics").refreshed
+    window.tick()
+    assert panel(window, "developer", "topics").refreshed == before + 1
+    assert panel(window, "behaviour", "robot").refreshed == hidden
+    behind = panel(window, "developer", "alerts").refreshed
+    window.tick()
+    assert panel(window, "developer", "alerts").refreshed == behind
+    window.benches["developer"].docks["alerts"].raise_()
+    qtbot.waitUntil(window.benches["developer"].docks["alerts"].shown)
+    window.tick()
+    assert panel(window, "developer", "alerts").refreshed == behind + 1
+
+
+def test_a_panel_that_fails_is_shown_as_failed_and_the_window_lives_on(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    commands.run("layout.developer")
+    topics = panel(window, "developer", "topics")
+    topics.explode = True
+    window.tick()
+    dock = window.benches["developer"].docks["topics"]
+    assert dock.failed
+    assert not topics.isVisible()
+    assert window.session.console.records[-1].text == "ValueError: no such luck"
+    count = len(window.session.console.records)
+    window.tick()
+    assert len(window.session.console.records) == count
+    topics.explode = False
+    again = next(b for b in dock.findChildren(Button) if b.text() == "Try again")
+    QTest.mouseClick(again, Qt.MouseButton.LeftButton)
+    window.tick()
+    assert topics.isVisible()
+    assert topics.refreshed > 0
+
+
+def test_f12_stops_everywhere(qtbot, window: MainWindow, commands: Commands, monkeypatch) -> None:
+    stops: list[str] = []
+    commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
+    show(qtbot, window)
+    for layout in ("", "layout.behaviour", "layout.developer"):
+        if layout:
+            commands.run(layout)
+        QTest.keyClick(window, Qt.Key.Key_F12)
+    assert len(stops) == 3
+    dock = window.benches["developer"].docks["topics"]
+    dock.setFloating(True)
+    dock.activateWindow()
+    QTest.keyClick(panel(window, "developer", "topics").filter, Qt.Key.Key_F12)
+    assert len(stops) == 4
+
+
+def test_esc_leaves_a_field_and_stops_nothing(qtbot, window: MainWindow, commands: Commands) -> None:
+    stops: list[str] = []
+    commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
+    show(qtbot, window)
+    commands.run("layout.developer")
+    field = panel(window, "developer", "topics").filter
+    field.setFocus()
+    QTest.keyClick(field, Qt.Key.Key_Escape)
+    assert not field.hasFocus()
+    assert stops == []
+
+
+def test_f6_and_numbers_go_through_the_panels(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    commands.run("layout.developer")
+    qtbot.waitUntil(window.benches["developer"].docks["console"].shown)
+    seen = []
+    for _ in range(4):
+        QTest.keyClick(window, Qt.Key.Key_F6)
+        dock = window.focused_dock()
+        assert dock is not None
+        seen.append(dock.description.name)
+    assert sorted(seen) == ["console", "image", "inspector", "topics"]
+    QTest.keyClick(window, Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
+    found = window.focused_dock()
+    assert found is not None
+    assert found.description.name == window.bench.open_names()[1]
+    assert found.title.name.property("role") == "text"
+
+
+def test_slash_goes_to_the_filter_of_the_panel(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    commands.run("layout.developer")
+    topics = panel(window, "developer", "topics")
+    topics.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    topics.setFocus()
+    QTest.keyClick(topics, Qt.Key.Key_Slash)
+    assert topics.filter.hasFocus()
+    assert topics.filter.text() == ""
+
+
+def test_panels_float_close_and_open_again(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    bench = window.show_layout("developer")
+    dock = bench.docks["inspector"]
+    labels = [action.text() for action in dock.menu().actions()]
+    assert labels == ["Float", "Close"]
+    dock.menu().actions()[0].trigger()
+    assert dock.isFloating()
+    assert [action.text() for action in dock.menu().actions()] == ["Dock it", "Close"]
+    dock.menu().actions()[1].trigger()
+    assert "inspector" not in bench.open_names()
+    assert commands.run("panel:inspector")
+    assert "inspector" in bench.open_names()
+
+
+def test_floating_panels_go_with_their_layout(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    bench = window.show_layout("developer")
+    bench.docks["inspector"].setFloating(True)
+    assert bench.docks["inspector"].isVisible()
+    commands.run("layout.behaviour")
+    assert not bench.docks["inspector"].isVisible()
+    commands.run("layout.developer")
+    assert bench.docks["inspector"].isVisible()
+
+
+def test_panels_that_share_a_place_are_tabs_in_the_title(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    bench = window.show_layout("developer")
+    qtbot.waitUntil(lambda: bench.docks["console"].title.tabs == ("Console", "Alerts"))
+    assert bench.docks["topics"].title.tabs == ()
+    second = bench.docks["console"].title._tabs[1]
+    QTest.mouseClick(second, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(bench.docks["alerts"].shown)
+    assert not bench.docks["console"].shown()
+
+
+def test_a_panel_opens_beside_its_home(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    bench = window.show_layout("behaviour")
+    commands.run("panel:console")
+    assert bench.docks["console"] in bench.tabifiedDockWidgets(bench.docks["problems"])
+
+
+def test_a_narrow_window_makes_tabs_and_a_wide_one_ends_them(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    bench = window.show_layout("behaviour")
+    docks = bench.docks
+    window.resize(1150, 750)
+    qtbot.waitUntil(lambda: docks["camera"] in bench.tabifiedDockWidgets(docks["robot"]))
+    window.resize(1440, 900)
+    qtbot.waitUntil(lambda: bench.tabifiedDockWidgets(docks["robot"]) == [])
+
+
+def test_everything_comes_back_at_the_next_start(qtbot, theme: Theme, session: Session, home: Path) -> None:
+    first = MainWindow(session, theme, PANELS, [])
+    qtbot.addWidget(first)
+    commands = Commands(first)
+    show(qtbot, first)
+    bench = first.show_layout("developer")
+    bench.docks["alerts"].close()
+    bench.docks["inspector"].setFloating(True)
+    panel(first, "developer", "topics").filter.setText("cam")
+    commands.run("theme.dark")
+    commands.run("text.larger")
+    first.close()
+    again = Session(
+        Settings(home), address=free_address(), journal_folder=home / "journal", start_companions=False
+    )
+    second = MainWindow(again, theme, PANELS, [])
+    qtbot.addWidget(second)
+    theme.set_mode("light")
+    second.state.apply_theme(theme)
+    assert (theme.mode, theme.text_percent) == ("dark", 125)
+    assert second.state.layout == "developer"
+    show(qtbot, second)
+    bench = second.show_layout("developer")
+    assert bench.docks["inspector"].isFloating()
+    assert "alerts" not in bench.open_names()
+    assert panel(second, "developer", "topics").state == {"filter": "cam"}
+    second.close()
+
+
+def test_damaged_layouts_give_the_first_arrangement(qtbot, window: MainWindow, commands: Commands) -> None:
+    window.session.settings.set(
+        "layouts", {"developer": {"open": ["topics", 5], "docks": "%%%", "panels": 3}}
+    )
+    show(qtbot, window)
+    assert "inspector" in window.show_layout("developer").open_names()
+
+
+def test_a_topic_opens_in_the_panel_that_fits(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    window.show_layout("behaviour")
+    window.open_topic("/odom")
+    assert window.showing == "developer"
+    assert panel(window, "developer", "inspector").topics == ["/odom"]
+    assert panel(window, "developer", "image").topics == []
+
+
+def test_commands_are_done_by_name(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    assert commands.run("inspect:/faces")
+    assert panel(window, "developer", "inspector").topics == ["/faces"]
+    assert commands.run("block:b7")
+    assert panel(window, "behaviour", "behaviour").blocks == ["b7"]
+    assert commands.run("edit.undo")
+    assert panel(window, "behaviour", "behaviour").undone == ["undo"]
+    assert commands.run("panel.topics")
+    assert not commands.run("nonsense")
+    assert not commands.run("panel.nonsense")
+
+
+def test_an_alert_is_a_banner_until_it_is_cured(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    window.show_layout("developer")
+    alerts = window.session.alerts
+    alerts.put("one", "warn", "A topic is slow.", "Look at it.")
+    alerts.put("two", "error", "The camera is silent.", "It waits.", button="Look", action="inspect:/camera")
+    window.tick()
+    banner = window.banner.banner
+    assert window.banner.isVisible()
+    assert "The camera is silent." in banner.accessibleName()
+    assert banner.more.text() == "and 1 more"
+    QTest.mouseClick(banner.button, Qt.MouseButton.LeftButton)
+    assert panel(window, "developer", "inspector").topics == ["/camera"]
+    alerts.cure("two")
+    window.tick()
+    assert "A topic is slow." in banner.accessibleName()
+    QTest.mouseClick(banner.close_button, Qt.MouseButton.LeftButton)
+    window.tick()
+    assert not window.banner.isVisible()
+    assert alerts.dismissed("one")
+
+
+def test_what_a_dead_studio_left_is_offered_without_a_dialog(
+    qtbot, window: MainWindow, commands: Commands, home: Path
+) -> None:
+    journal = Journal(home / "journal")
+    journal.write("Story", None, {"blocks": {"blocks": [{"type": "events_started"}]}}, {})
+    file = next((home / "journal").glob("*.json"))
+    entry = json.loads(file.read_text("utf-8"))
+    file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
+    show(qtbot, window)
+    commands.offer_unsaved(left_behind(home / "journal"))
+    assert window.banner.isVisible()
+    assert QApplication.activeModalWidget() is None
+    QTest.mouseClick(window.banner.banner.button, Qt.MouseButton.LeftButton)
+    assert window.session.document.name == "Story"
+    assert window.session.document.dirty
+    assert window.showing == "behaviour"
+    assert not window.banner.isVisible()
+
+
+def test_the_theme_changes_at_once(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    window.show_layout("behaviour")
+    commands.run("theme.dark")
+    image = window.grab().toImage()
+    assert image.pixelColor(3, window.height() // 2) == window.theme.colour("window")
+    assert commands.actions["theme.dark"].isChecked()
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_large_text_clips_no_button_of_the_bars(
+    qtbot, window: MainWindow, commands: Commands, percent: int
+) -> None:
+    show(qtbot, window)
+    window.show_layout("behaviour")
+    window.theme.set_text_percent(percent)
+    QApplication.processEvents()
+    for button in (window.run_bar.run, window.run_bar.pause, window.run_bar.step, window.run_bar.stop):
+        hint = button.sizeHint()
+        assert button.width() >= hint.width()
+        assert button.height() >= hint.height()
+    assert window.run_bar.height() >= window.run_bar.sizeHint().height()
+
+
+def test_closing_is_orderly(qtbot, window: MainWindow, commands: Commands) -> None:
+    done: list[str] = []
+    window.on_shut = lambda: done.append("shut")
+    show(qtbot, window)
+    bench = window.show_layout("developer")
+    window.close()
+    window.close()
+    assert done == ["shut"]
+    assert panel(window, "developer", "topics").closed
+    assert bench is window.benches["developer"]
+    assert not window.timer.isActive()
+
+
+def test_every_command_has_words_and_no_two_share_a_key() -> None:
+    assert len({row.name for row in TABLE}) == len(TABLE)
+    keys = [row.shortcut for row in TABLE if row.shortcut]
+    assert len(set(keys)) == len(keys)
+    assert ("Stop the program and all robots", "F12") in shortcuts()
+
+
+def test_no_button_of_qts_own_looks_is_left(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    for layout in ("behaviour", "developer"):
+        window.show_layout(layout)
+    assert window.findChildren(QPushButton) == []
+
+
+def test_all_controls_have_names(qtbot, window: MainWindow, commands: Commands) -> None:
+    show(qtbot, window)
+    window.show_layout("behaviour")
+    window.tick()
+    from PySide6.QtWidgets import QAbstractButton
+
+    nameless = [
+        b
+        for b in window.findChildren(QAbstractButton)
+        if b.isVisible() and not (b.accessibleName() or b.text())
+    ]
+    assert nameless == []
