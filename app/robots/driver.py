@@ -38,7 +38,7 @@ class Driver:
         self.description = td_for(kind.thing_model, name)
         self.robot = parse(self.description)
         self._node = node
-        self._clock = clock or MonotonicClock()
+        self.clock = clock or MonotonicClock()
         self._lock = threading.Lock()
         self._publishers: dict[str, nep.Publisher] = {}
         self._subscribers: list[nep.Subscriber] = []
@@ -85,7 +85,7 @@ class Driver:
         stop, timing = self.kind.stop
         stop_body: Callable[[], None] = getattr(body, stop)
         self._tasks = tasks = Tasks(
-            self.name, stop_body, self._clock, within_s=timing.within_s, watchdog_s=timing.watchdog_s
+            self.name, stop_body, self.clock, within_s=timing.within_s, watchdog_s=timing.watchdog_s
         )
         desk = Desk(self.robot, body, tasks, partial(self._publish, self.robot.topics.answer))
         dialect = Dialect(self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS))

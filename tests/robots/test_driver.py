@@ -164,9 +164,9 @@ def test_stop_answers_only_when_the_robot_stands_still(turtle):
     ears.command(id="s", op="stop")
     assert [ears.final(wanted)["state"] for wanted in "123"] == ["canceled"] * 3
     assert ears.states("s") == []
+    ears.command(id="t", op="stop")
     ears.invoke("4", "move")
     assert ears.final("4")["error"] == "move: Turtle is stopping"
-    ears.command(id="t", op="stop")
     body.may_stop.set()
     assert ears.final("s", "stop")["state"] == "succeeded"
     assert ears.final("t", "stop")["state"] == "succeeded"

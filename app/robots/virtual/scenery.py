@@ -167,6 +167,7 @@ def marker(number: int) -> Texture:
     square = cv2.aruco.generateImageMarker(
         cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), number, 6 * 24
     )
+    square = np.maximum(square, 26)  # printed black is not quite black
     rimmed = cv2.copyMakeBorder(square, 24, 24, 24, 24, cv2.BORDER_CONSTANT, value=(250,))
     return Texture(np.asarray(cv2.cvtColor(rimmed, cv2.COLOR_GRAY2BGR), dtype=np.uint8))
 

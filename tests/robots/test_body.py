@@ -1,0 +1,200 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.robots.virtual.body import RADIUS, Body
+from app.robots.virtual.drawing import drawable
+from app.robots.virtual.motion import Joint, Motion
+from app.robots.virtual.room import Room
+
+STEP = 1 / 30
+
+
+def run(body: Body, until, limit_s: float = 60.0) -> float:
+    passed = 0.0
+    while not until():
+        body.step(STEP)
+        passed += STEP
+        assert passed < limit_s
+    return passed
+
+
+def events(body: Body) -> list[tuple[str, dict[str, object]]]:
+    return [(happening.event, happening.data) for happening in body.happenings]
+
+
+def test_it_turns_by_the_angle_and_not_faster_than_asked():
+    body = Body()
+    motion = body.turn(90, 45)
+    seconds = run(body, lambda: motion.done)
+    assert body.theta_deg == pytest.approx(90, abs=1e-6)
+    assert seconds >= 90 / 45
+    back = body.turn(-180, 90)
+    run(body, lambda: back.done)
+    assert body.theta_deg == pytest.approx(-90, abs=1e-6)
+
+
+def test_it_walks_where_it_looks():
+    body = Body(theta_deg=180.0)
+    motion = body.walk(1.0, 0.3)
+    run(body, lambda: motion.done)
+    assert (body.x, body.y) == (pytest.approx(-1.5), pytest.approx(0.0, abs=1e-9))
+    assert motion.moved == pytest.approx(1.0)
+    back = body.walk(-0.5, 0.3)
+    run(body, lambda: back.done)
+    assert body.x == pytest.approx(-1.0)
+
+
+def test_it_stops_before_the_person_and_says_that_it_bumped():
+    body = Body()
+    motion = body.walk(2.0, 0.35)
+    run(body, lambda: motion.done)
+    assert motion.blocked
+    gap = math.hypot(body.x - body.room.person.x, body.y - body.room.person.y)
+    assert gap >= RADIUS + body.room.person.radius
+    assert events(body) == [("bumped", {"side": "front"})]
+    assert body.distance < 0.05
+    assert body.still
+
+
+@pytest.mark.parametrize("start", [lambda b: b.walk(2.0, 0.35), lambda b: b.turn(360, 90)])
+def test_it_brakes_from_full_speed_in_a_tenth_of_a_second(start):
+    body = Body(room=Room().moved("person", 0.0, 2.0))
+    start(body)
+    for _ in range(30):
+        body.step(STEP)
+    assert body.rolling
+    body.halt()
+    before = (body.x, body.theta_deg)
+    assert run(body, lambda: body.still) <= 0.1 + 1e-9
+    assert abs(body.x - before[0]) < 0.03
+    assert abs(body.theta_deg - before[1]) < 6
+    standing = (body.x, body.y, body.theta_deg)
+    body.step(1.0)
+    assert (body.x, body.y, body.theta_deg) == standing
+
+
+def test_the_head_keeps_its_speed_and_its_limits():
+    body = Body()
+    body.head_yaw.aim(200)
+    body.step(0.5)
+    assert body.head_yaw.angle == pytest.approx(60.0)
+    assert not body.still
+    run(body, lambda: body.still)
+    assert body.head_yaw.angle == 119.0
+
+
+def test_words_take_as_long_as_their_letters():
+    body = Body()
+    speech = body.say("x" * 50)
+    assert body.speech == "x" * 50
+    seconds = run(body, lambda: speech.done)
+    assert seconds == pytest.approx(3.0, abs=2 * STEP)
+    assert body.speech is None
+    first, second = body.say("one two"), body.say("three")
+    assert first.done
+    assert body.speech == "three"
+    assert second.word == "three"
+    body.halt()
+    assert (body.speech, second.done) == (None, True)
+
+
+def test_it_waves_and_puts_its_arm_down():
+    body = Body()
+    wave = body.wave("right")
+    body.step(0.8)
+    assert body.arms["right"].angle == 140
+    assert body.arms["left"].angle == 0
+    run(body, lambda: wave.done)
+    assert (body.arms["right"].angle, body.elbows["right"].angle) == (0, 0)
+    assert body.still
+
+
+def test_a_touch_is_told_once_and_its_end_too():
+    body = Body()
+    body.touch("head", down=True)
+    body.touch("head", down=True)
+    body.touch("head", down=False)
+    body.touch("left_hand", down=False)
+    body.hear("hello")
+    assert events(body) == [
+        ("touched", {"place": "head"}),
+        ("released", {"place": "head"}),
+        ("heard", {"word": "hello"}),
+    ]
+
+
+def test_the_battery_drains_faster_when_it_moves():
+    standing, walking = Body(), Body(theta_deg=180.0)
+    walking.walk(1.5, 0.3)
+    standing.step(4)
+    walking.step(4)
+    assert 84 < walking.battery < standing.battery < 84.4
+
+
+def test_reset_puts_everything_back():
+    body = Body()
+    body.turn(90, 90)
+    body.step(1)
+    body.touch("head", down=True)
+    body.room = body.room.moved("ball", 0.5, 1.0)
+    body.reset(Room())
+    run(body, lambda: body.still)
+    assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, set(), Room())
+
+
+def test_the_drawing_has_what_studio_draws():
+    body = Body()
+    body.touch("head", down=True)
+    body.say("Hi")
+    drawn = drawable(body)
+    assert {k: drawn[k] for k in ("x", "speech", "touched", "moving")} == {
+        "x": -0.5, "speech": "Hi", "touched": ["head"], "moving": False,
+    }  # fmt: skip
+    kinds = [thing["kind"] for thing in drawn["objects"]]
+    assert kinds == ["ball", "person", "marker", "table", "shelf"]
+    assert drawn["room"]["x_max"] == 3.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(st.sampled_from(["walk", "turn"]), st.floats(-2, 2), st.floats(0.1, 2)), max_size=6)
+)
+def test_it_is_never_inside_anything(plan):
+    body = Body()
+    for what, amount, seconds in plan:
+        if what == "walk":
+            body.walk(amount, 0.35)
+        else:
+            body.turn(amount * 90, 90)
+        body.step(seconds)
+        assert body.room.free(body.x, body.y, RADIUS - 1e-6)
+    body.halt()
+    body.step(0.2)
+    assert body.still
+
+
+@given(st.floats(-3, 3), st.floats(0.05, 0.5))
+def test_a_movement_ends_exactly(amount, speed):
+    motion = Motion.walk(amount, speed)
+    total = 0.0
+    for _ in range(20000):
+        way = motion.step(0.01)
+        assert abs(way) <= speed * 0.01 + 0.0021
+        total += way
+        if motion.done:
+            break
+    assert total == pytest.approx(amount, abs=1e-9)
+
+
+def test_a_joint_holds():
+    joint = Joint(100, -10, 10)
+    joint.aim(5)
+    joint.step(0.01)
+    joint.hold()
+    joint.step(1)
+    assert joint.angle == 1.0

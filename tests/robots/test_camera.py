@@ -1,0 +1,140 @@
+"""The camera sees what is there: checked against the geometry, not against itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from app.robots.virtual.body import Body
+from app.robots.virtual.camera import Camera, lens_of
+from app.robots.virtual.lens import Lens
+from app.robots.virtual.room import Room
+from app.robots.virtual.vision import Eyes, angles_to, message
+
+
+@pytest.fixture(scope="module")
+def camera() -> Camera:
+    return Camera(Room())
+
+
+@pytest.fixture(scope="module")
+def eyes() -> Eyes:
+    return Eyes()
+
+
+def test_a_point_ahead_is_in_the_middle_and_left_is_left():
+    lens = Lens((0, 0, 1), 0.0, 0.0)
+    ahead, left, up = lens.to_pixels(
+        lens.to_camera(np.array([[2, 0, 1], [2, 0.5, 1], [2, 0, 1.5]], dtype=float))
+    )
+    assert ahead == pytest.approx((160, 120))
+    assert left[0] == pytest.approx(160 - lens.focal / 4)
+    assert left[1] == pytest.approx(120)
+    assert up[1] == pytest.approx(120 - lens.focal / 4)
+    assert lens.focal == pytest.approx(160 / math.tan(math.radians(28.15)))
+    down = Lens((0, 0, 1), 0.0, 30.0)
+    assert down.to_pixels(down.to_camera(np.array([[2.0, 0, 1]])))[0][1] < 120
+
+
+def test_what_is_behind_the_camera_has_no_outline():
+    lens = Lens((0, 0, 1), 0.0, 0.0)
+    behind = np.array([[-1, -1, 0], [-1, 1, 0], [-1, 1, 2]], dtype=float)
+    assert len(lens.outline(behind)) == 0
+    across = np.array([[-1, -1, 0], [3, -1, 0], [3, 1, 0], [-1, 1, 0]], dtype=float)
+    assert len(lens.outline(across)) == 4
+
+
+@pytest.mark.parametrize("place", [(1.95, -0.78), (1.6, -0.5), (2.5, 0.9), (2.2, -1.2)])
+def test_the_ball_is_found_where_it_lies(camera, eyes, place):
+    body = Body(room=Room().moved("person", -2.0, -2.0).moved("ball", *place))
+    lens = lens_of(body)
+    (found,) = eyes.balls(camera.picture(body.room, lens))
+    ball = body.room.ball
+    seen = lens.to_camera(np.array([[ball.x, ball.y, ball.z]]))
+    expected = lens.to_pixels(seen)[0]
+    assert found.middle == pytest.approx(tuple(expected), abs=2.5)
+    assert found.box[2] == pytest.approx(2 * ball.radius * lens.focal / seen[0][2], abs=5)
+    left, _ = angles_to(lens, found.middle)
+    bearing = math.degrees(math.atan2(ball.y - lens.place[1], ball.x - lens.place[0]))
+    assert left == pytest.approx(bearing, abs=1.5)
+
+
+def test_no_ball_no_detection(camera, eyes):
+    for theta in range(0, 360, 30):
+        body = Body(room=Room().moved("ball", -2.2, -2.2), theta_deg=float(theta) - 60)
+        lens = lens_of(body)
+        found = eyes.balls(camera.picture(body.room, lens))
+        visible = lens.to_camera(np.array([[-2.2, -2.2, 0.15]]))[0]
+        in_front = visible[2] > 0 and abs(visible[0] / visible[2]) < 0.6
+        assert bool(found) <= bool(in_front), f"at {theta}"
+
+
+@pytest.mark.parametrize("theta", [45.0, 60.0, 75.0])
+def test_the_marker_is_read(camera, eyes, theta):
+    body = Body(theta_deg=theta)
+    lens = lens_of(body)
+    (found,) = eyes.markers(camera.picture(body.room, lens))
+    card = body.room.marker
+    expected = lens.to_pixels(lens.to_camera(np.array([[card.x, card.y, card.z]])))[0]
+    assert found.name == "marker 7"
+    assert found.middle == pytest.approx(tuple(expected), abs=3)
+
+
+def test_the_face_is_where_the_skin_is(camera, eyes):
+    body = Body()
+    lens = lens_of(body)
+    picture = camera.picture(body.room, lens)
+    (found,) = eyes.faces(body.room, lens)
+    assert found.name == "Aiko"
+    assert found.confidence > 0.9
+    x, y = (round(value) for value in found.middle)
+    blue, green, red = (int(part) for part in picture[y, x])
+    assert red > green > blue  # skin
+    assert red > 180
+    above = picture[found.box[1] + 3, x].astype(int)
+    assert above.sum() < 250  # hair
+
+
+def test_a_face_counts_only_when_it_can_be_seen(eyes):
+    def seen(body: Body) -> bool:
+        return bool(eyes.faces(body.room, lens_of(body)))
+
+    assert seen(Body())
+    assert not seen(Body(theta_deg=90.0))
+    assert not seen(Body(theta_deg=180.0))
+    assert not seen(Body(theta_deg=30.5))  # at the edge, most of it outside
+    hidden = Body(room=Room().moved("person", 0.35, -2.4), theta_deg=-75.0)
+    tall = hidden.room.boxes[1]
+    assert tall.height > hidden.room.person.face_z
+    assert not seen(hidden)
+
+
+def test_detections_name_the_largest_first(eyes):
+    body = Body()
+    told = message(eyes.faces(body.room, lens_of(body)), lens_of(body))
+    assert (told["count"], told["name"], told["width"], told["height"]) == (1, "Aiko", 320, 240)
+    assert set(told["items"][0]) == {"name", "confidence", "box"}
+    assert message([], lens_of(body))["name"] is None
+
+
+def test_the_same_moment_gives_the_same_picture(camera):
+    body = Body()
+    first = camera.picture(body.room, lens_of(body))
+    again = Camera(Room()).picture(body.room, lens_of(body))
+    assert first.shape == (240, 320, 3)
+    assert first.dtype == np.uint8
+    assert np.array_equal(first, again)
+    body.turn(30, 90)
+    body.step(2.0)
+    assert not np.array_equal(first, camera.picture(body.room, lens_of(body)))
+
+
+def test_every_pixel_is_painted_wherever_it_looks(camera):
+    room = Room().moved("ball", -2.3, -2.3)
+    for theta in range(0, 360, 15):
+        for pitch in (-40.0, 0.0, 36.0):
+            picture = camera.picture(room, Lens((-0.5, 0.3, 1.12), float(theta), pitch))
+            black = (picture.sum(axis=2) == 0).sum()
+            assert black == 0, f"{black} pixels at {theta}°, {pitch}°"

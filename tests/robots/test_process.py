@@ -1,0 +1,136 @@
+"""Drivers as processes: they end with their owner, and a driver of RIZE is driven over the network."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+import nep
+from app.robots import rize
+from app.robots.description import parse
+from tests.robots.conftest import Ears, eventually
+
+ROOT = Path(__file__).resolve().parents[2]
+SLEEPER = "import sys; sys.stdin.read()"
+
+
+@pytest.fixture
+def network() -> Iterator[str]:
+    with nep.Master("127.0.0.1:0") as master:
+        yield master.address
+
+
+def start(*arguments: str, network: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "NEP_MASTER": network, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        [sys.executable, *arguments], cwd=ROOT, env=environment, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def ended(process: subprocess.Popen[str], timeout_s: float = 5.0) -> tuple[int, str]:
+    """Its exit code and what it complained about; it is killed when it did not end."""
+    try:
+        _, errors = process.communicate(timeout=timeout_s)
+    finally:
+        process.kill()
+        process.wait()
+    return process.returncode, errors
+
+
+def found(network: str) -> nep.GraphView:
+    with nep.node("looker", master=network) as node:
+        return node.graph()
+
+
+def has_robot(network: str) -> bool:
+    return any(topic.msg_type == "robot/description" for topic in found(network).topics.values())
+
+
+def test_the_virtual_robot_runs_and_leaves_when_told(network):
+    process = start("-m", "app.robots.simulated", "--name", "Miss Pepper", "--seed", "3", network=network)
+    try:
+        with nep.node("me", master=network) as node:
+            message = node.new_sub("/Miss_Pepper/description", "robot/description").receive(15.0)
+            assert message is not None
+            assert parse(message.payload).name == "Miss Pepper"
+            picture = node.new_sub("/Miss_Pepper/camera", "image").receive(5.0)
+            assert picture is not None
+            assert picture.codec == "image"
+            ears = Ears(node, "Miss_Pepper")
+            ears.invoke("1", "turn", angle=360, speed=20)
+            eventually(lambda: "running" in ears.states("1"))
+            process.send_signal(signal.SIGTERM)
+            assert ears.final("1")["state"] == "canceled"
+    finally:
+        code, errors = ended(process)
+    assert (code, errors) == (0, "")
+    eventually(lambda: not has_robot(network))
+
+
+def test_it_ends_with_its_owner(network):
+    owner = subprocess.Popen([sys.executable, "-c", SLEEPER], stdin=subprocess.PIPE)
+    robot = start("-m", "app.robots.simulated", "--owner-pid", str(owner.pid), network=network)
+    try:
+        eventually(lambda: has_robot(network), timeout_s=15)
+        assert robot.poll() is None
+        owner.kill()
+        owner.wait()
+        code, errors = ended(robot)
+    finally:
+        owner.kill()
+        owner.communicate()
+        ended(robot)
+    assert (code, errors) == (0, "")
+    eventually(lambda: not has_robot(network))
+
+
+def test_it_does_not_begin_without_its_owner(network):
+    gone = max(psutil.pids()) + 100_000
+    assert ended(start("-m", "app.robots.simulated", "--owner-pid", str(gone), network=network), 15) == (
+        0,
+        "",
+    )
+
+
+def test_it_waits_for_a_master_and_can_be_ended_meanwhile():
+    process = start("-m", "app.robots.simulated", network="127.0.0.1:1")
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.communicate(timeout=3)
+    process.send_signal(signal.SIGTERM)
+    assert ended(process) == (0, "")
+
+
+def test_wrong_arguments_are_told(network):
+    code, errors = ended(start("-m", "app.robots.simulated", "--color", "red", network=network), 15)
+    assert code == 2
+    assert "--color" in errors
+
+
+def test_the_example_driver_of_rize_is_driven(network):
+    """The same 30 lines run on the original nep; here on ours, which has the paper's spelling."""
+    process = start("examples/rize_driver.py", "Turtle", network=network)
+    robot = rize.robot("Turtle")
+    try:
+        with nep.node("me", master=network) as node:
+            answers: list[object] = []
+            node.new_sub("action_state", sink=lambda batch: answers.extend(m.payload for m in batch))
+            commands = node.new_pub("robot_action")
+            eventually(lambda: "robot_action" in node.graph().topics and commands.subscribers, timeout_s=15)
+            for other in (rize.robot("Turtle2"), robot):
+                commands.publish(rize.to_command(other, "say", {"text": "hello"}, other.name))
+            commands.publish(rize.to_command(robot, "turn", {"direction": "left", "degrees": 90}, "2"))
+            eventually(lambda: len(answers) == 2)
+    finally:
+        process.kill()
+        output, _ = process.communicate()
+    read = [rize.from_answer(answer) for answer in answers]
+    assert [(answer["id"], answer["state"]) for answer in read] == [("Turtle", "succeeded"), ("2", "failed")]
+    assert output.startswith("Turtle says: hello {")

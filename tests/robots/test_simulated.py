@@ -1,0 +1,258 @@
+"""The virtual robot through the kit: every action of its description, and what it tells by itself."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import cv2
+import pytest
+
+import nep
+from app.robots.driver import Driver
+from app.robots.simulated import ROBOT, room_of
+from tests.robots.conftest import Ears, eventually
+
+
+class Pepper(Ears):
+    """A running virtual robot, heard and spoken to."""
+
+    def __init__(self, node: nep.Node, driver: Driver) -> None:
+        super().__init__(node, "Pepper")
+        self.driver = driver
+        self._world = node.new_pub("/Pepper/world", "json")
+
+    def world(self, **change: object) -> None:
+        self._world.publish(change)
+
+    def newest(self, leaf: str) -> object:
+        return self.heard[leaf][-1] if self.heard.get(leaf) else None
+
+    def stopped(self, wanted: str) -> dict[str, object]:
+        self.command(id=wanted, op="stop")
+        return self.final(wanted, "stop")
+
+
+@pytest.fixture
+def pepper(node: nep.Node) -> Iterator[Pepper]:
+    with nep.node("listener", "memory") as other:
+        driver = Driver(ROBOT, "Pepper", node)
+        ears = Pepper(other, driver)
+        ears.listen("state")
+        driver.start()
+        try:
+            eventually(lambda: ears.heard["state"])
+            yield ears
+        finally:
+            driver.close()
+    assert [t.name for t in threading.enumerate() if t.name.startswith("Pepper")] == []
+
+
+QUICK = {
+    "say": {"text": "Hi"},
+    "turn": {"angle": 5, "speed": 90},
+    "walk": {"distance": 0.05},
+    "look_at": {"target": "left"},
+    "head": {"yaw": 10, "pitch": 0},
+    "wave": {"hand": "left"},
+    "stand": {},
+    "show_emotion": {"emotion": "happy", "seconds": 0.5},
+    "light": {"where": "both", "colour": "#ff0000"},
+    "stop": {},
+}
+
+
+def test_every_action_can_be_done(pepper):
+    assert set(QUICK) == {action.name for action in pepper.driver.robot.actions}
+    for name, given in QUICK.items():
+        pepper.invoke(name, name, **given)
+        assert pepper.final(name, timeout_s=10)["state"] == "succeeded", name
+    lit = ["#ff0000", "#ff0000"]
+    eventually(lambda: [pepper.newest("state")[where] for where in ("eyes", "shoulders")] == lit)
+
+
+@pytest.mark.parametrize(
+    ("action", "given"),
+    [
+        ("say", {"text": "x" * 200}),
+        ("turn", {"angle": 360}),
+        ("walk", {"distance": -1}),
+        ("look_at", {"target": "left"}),
+        ("head", {"yaw": -100}),
+        ("wave", {}),
+        ("show_emotion", {"seconds": 30}),
+    ],
+)
+def test_every_long_action_can_be_canceled_and_stopped(pepper, action, given):
+    pepper.invoke("1", action, **given)
+    eventually(lambda: "running" in pepper.states("1"))
+    pepper.command(id="1", op="cancel")
+    assert pepper.final("1")["state"] == "canceled"
+    pepper.invoke("2", action, **given)
+    eventually(lambda: "running" in pepper.states("2"))
+    assert pepper.stopped("s")["state"] == "succeeded"
+    assert pepper.final("2")["state"] == "canceled"
+    seen = len(pepper.heard["state"])
+    eventually(lambda: len(pepper.heard["state"]) >= seen + 5)
+    still = pepper.heard["state"][seen + 1 :]
+    for value in ("x", "theta_deg", "head_yaw_deg", "arm_right_deg", "speech", "emotion"):
+        assert len({state[value] for state in still}) == 1, value
+    assert not any(state["moving"] for state in still)
+
+
+@pytest.mark.parametrize("action", [name for name in QUICK if name not in {"stand", "stop", "wave"}])
+def test_every_action_refuses_bad_input(pepper, action):
+    parameter = pepper.driver.robot.action(action).parameters[0]
+    pepper.invoke("1", action, **{parameter.name: [1, 2]})
+    answer = pepper.final("1")
+    assert answer["state"] == "failed"
+    assert answer["error"].startswith(f"{action}: {parameter.title} must be ")
+    assert pepper.states("1") == ["failed"]
+
+
+def test_stop_is_answered_in_less_than_200_ms(pepper):
+    pepper.world(move="Aiko", x=0.0, y=2.0)
+    clock = pepper.driver.clock
+    took = []
+    for number, (action, given) in enumerate(
+        [("walk", {"distance": 1, "speed": 0.35}), ("turn", {"angle": 360})]
+    ):
+        pepper.invoke(f"{number}", action, **given)
+        eventually(lambda: pepper.newest("state")["moving"])
+        begun = threading.Event()
+        begun.wait(0.5)
+        before = clock.now()
+        assert pepper.stopped(f"s{number}")["state"] == "succeeded"
+        took.append(clock.now() - before)
+    assert max(took) < 0.2
+
+
+def test_its_program_gone_it_stops_by_itself(pepper):
+    pepper.invoke("1", "turn", program="p", angle=360, speed=20)
+    assert pepper.final("1")["error"] == "no sign of life from its program for 1 s"
+    eventually(lambda: not pepper.newest("state")["moving"])
+
+
+def test_it_moves_and_tells_where_it_is(pepper):
+    pepper.listen("pose")
+    pepper.listen("distance")
+    pepper.invoke("1", "turn", direction="left", angle=90, speed=90)
+    assert pepper.final("1")["state"] == "succeeded"
+    eventually(lambda: pepper.newest("pose") == {"x": -0.5, "y": 0.0, "theta": 90.0})
+    eventually(lambda: pepper.newest("distance") == {"value": pytest.approx(2.5 - 0.27, abs=0.01)})
+
+
+def test_a_person_in_the_way_fails_the_walk(pepper):
+    bumps = pepper.listen("bumped")
+    pepper.world(move="Aiko", x=0.1, y=0.0)
+    eventually(lambda: any(o["x"] == 0.1 for o in pepper.newest("state")["objects"]))
+    pepper.invoke("1", "walk", distance=1)
+    assert pepper.final("1")["error"].startswith("walk: something is in the way after 0.")
+    eventually(lambda: bumps == [{"side": "front"}])
+
+
+def test_it_feels_and_hears(pepper):
+    for leaf in ("touched", "released", "heard", "head_touched", "heard_word"):
+        pepper.listen(leaf)
+    board = pepper.listen("board", topic="/blackboard")
+    pepper.world(touch="head", down=True)
+    eventually(lambda: pepper.newest("head_touched") == {"value": True})
+    pepper.world(touch="head", down=False)
+    pepper.world(say="hello")
+    pepper.world(touch="nose", down=True)
+    pepper.world(move=5, x="a")
+    eventually(lambda: pepper.newest("heard_word") == {"value": "hello"})
+    eventually(lambda: pepper.newest("head_touched") == {"value": False})
+    assert pepper.heard["touched"] == pepper.heard["released"] == [{"place": "head"}]
+    assert pepper.heard["heard"] == [{"word": "hello"}]
+    assert {"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"} in board
+    assert {"primitive": "word", "input": {"hello": 1}, "robot": "Pepper"} in board
+
+
+def test_it_sees(pepper):
+    for leaf in ("faces", "balls", "markers", "sees_face", "sees_ball", "face_seen", "face_lost"):
+        pepper.listen(leaf)
+    eventually(lambda: pepper.newest("sees_face") == pepper.newest("sees_ball") == {"value": True})
+    eventually(lambda: pepper.newest("faces") and pepper.newest("faces")["name"] == "Aiko")
+    eventually(lambda: pepper.newest("balls") and pepper.newest("balls")["items"][0]["name"] == "ball")
+    pepper.invoke("1", "turn", angle=60, speed=90)
+    pepper.final("1")
+    eventually(lambda: pepper.newest("markers")["name"] == "marker 7")
+    eventually(lambda: pepper.heard["face_lost"] == [{"name": "Aiko"}])
+    eventually(lambda: pepper.newest("sees_ball") == {"value": False})
+    pepper.invoke("2", "look_at", target="ball")
+    assert pepper.final("2")["error"] == "look at: there is no ball in the picture"
+
+
+def test_it_looks_at_the_ball(pepper):
+    pepper.listen("balls")
+    eventually(lambda: pepper.newest("balls"))
+    pepper.invoke("1", "look_at", target="ball")
+    assert pepper.final("1")["state"] == "succeeded"
+    seen = len(pepper.heard["balls"])
+    eventually(lambda: len(pepper.heard["balls"]) >= seen + 2)
+    x, y, width, height = pepper.newest("balls")["items"][0]["box"]
+    assert x + width / 2 == pytest.approx(160, abs=12)
+    assert y + height / 2 == pytest.approx(120, abs=12)
+
+
+def test_pictures_come_while_somebody_looks(node, pepper):
+    with nep.node("watcher", "memory") as watcher:
+        camera = watcher.new_sub("/Pepper/camera", "image")
+        picture = camera.receive(3.0)
+        assert picture is not None
+        assert picture.payload.shape == (240, 320, 3)
+        assert picture.extension["encoding"] == "jpeg"
+        assert picture.size_bytes < 40_000
+        assert cv2.Laplacian(picture.payload, cv2.CV_64F).var() > 20  # something is on it
+
+
+def test_a_seed_puts_things_elsewhere_the_same_each_time():
+    assert room_of(5) == room_of(5)
+    assert room_of(5) != room_of(6)
+    assert room_of(None).ball.x == 1.95
+
+
+def test_reset(pepper):
+    pepper.invoke("1", "turn", angle=45, speed=90)
+    pepper.final("1")
+    pepper.world(move="ball", x=1.0, y=1.0)
+    pepper.world(reset=True)
+    eventually(lambda: pepper.newest("state")["theta_deg"] == 0)
+    eventually(lambda: pepper.newest("state")["objects"][0]["x"] == 1.95)
+
+
+def test_rize_drives_it(pepper):
+    def primitive(name: str, given: str, options: object) -> dict[str, object]:
+        return {"primitive": name, "input": given, "options": options}
+
+    both = [
+        primitive("turn", "right", {"degrees": 20}),
+        primitive("leds", "eyes", {"R": 255, "G": 0, "B": 16}),
+    ]
+    command = {
+        "node": "action",
+        "primitives": both,
+        "robots": "Pepper",
+        "state": "idle",
+        "times": 0,
+        "id": "acti1-0",
+    }
+    pepper.rize(command)
+    eventually(lambda: pepper.heard["action_state"], timeout_s=5)
+    assert pepper.heard["action_state"] == [{**command, "state": "success"}]
+    eventually(lambda: pepper.newest("state")["theta_deg"] == -20)
+    eventually(lambda: pepper.newest("state")["eyes"] == "#ff0010")
+    pepper.rize({**command, "id": "2", "primitives": primitive("walk", "backwards", {"meters": 0.1})})
+    eventually(lambda: len(pepper.heard["action_state"]) == 2, timeout_s=5)
+    assert pepper.heard["action_state"][1]["state"] == "success"
+    eventually(lambda: pepper.newest("state")["x"] < -0.55)
+    pepper.rize({**command, "id": "3", "primitives": primitive("walk", "sideways", {"meters": 0.1})})
+    eventually(lambda: len(pepper.heard["action_state"]) == 3)
+    assert pepper.heard["action_state"][2]["state"] == "failure"
+
+
+def test_its_model_is_the_one_that_is_shipped():
+    from tests.robots.test_description import model
+
+    assert model("pepper") == ROBOT.thing_model
