@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
@@ -24,6 +25,7 @@ from app.ui.blockly_scheme import register_scheme as register_scheme
 _log = logging.getLogger(__name__)
 _EMPTY: Json = {"blocks": {"languageVersion": 0, "blocks": []}}
 _RESTART_MS = (0, 500, 2000, 5000)
+_STABLE_S = 60.0
 _FUNCTION_KEYS = range(Qt.Key.Key_F1, Qt.Key.Key_F12 + 1)
 
 
@@ -50,6 +52,7 @@ class BlocklyView(QWidget):
         self._waiting: dict[int, Callable[[Json], None]] = {}
         self._tokens = 0
         self._deaths = 0
+        self._up_since = 0.0
         self._bridge = BlocklyBridge(self._beginning, self)
         self._bridge.came_up.connect(self._came_up)
         self._bridge.edited.connect(self._edited)
@@ -230,6 +233,7 @@ class BlocklyView(QWidget):
 
     def _came_up(self) -> None:
         self._up = True
+        self._up_since = time.monotonic()
         self._watch_keys()
         self._bridge.tell("definitions", self._definitions)
         self._send_program()
@@ -244,6 +248,8 @@ class BlocklyView(QWidget):
         for done in waiting.values():
             done(self._workspace)
         self.history_changed.emit(False, False)
+        if time.monotonic() - self._up_since > _STABLE_S:
+            self._deaths = 0
         delay = _RESTART_MS[min(self._deaths, len(_RESTART_MS) - 1)]
         self._deaths += 1
         if self._web is not None:

@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
+from PySide6.QtTest import QTest
 
-from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined
+from app.ui.blockly_view import BlocklyView
+from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, Person, outlined, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -126,6 +128,24 @@ def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
     with qtbot.waitSignal(view.key_pressed, timeout=WAIT_MS):
         them.press(Qt.Key_F12)
     assert "ended" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("language", "words"), [("de", "Kopieren"), ("pt-BR", "Duplicar"), ("xx", "Duplicate")]
+)
+def test_blockly_speaks_the_language_or_english(qtbot, language, words):
+    view = BlocklyView(language=language)
+    qtbot.addWidget(view)
+    view.set_definitions(DEFINITIONS)
+    view.resize(1031, 586)
+    view.load(workspace(START))
+    with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+        view.show()
+    them = Person(qtbot, view)
+    box = them.box("[data-id=start] > .blocklyPath")
+    at = QPoint(round(box["left"] + 14), round(box["top"] + 30))
+    QTest.mouseClick(them.target, Qt.RightButton, pos=at)
+    them.wait_for(f"!!document.querySelector('.blocklyContextMenu')?.textContent.includes({words!r})")
 
 
 ENDING = """

@@ -188,16 +188,24 @@ interface Beginning {
   theme: {tokens: Tokens; dark: boolean};
 }
 
+/** Blockly's own words in this language, or in English when there are none; which it was. */
+async function useLanguage(wanted: string): Promise<string> {
+  for (const language of new Set([wanted, wanted.split(/[-_]/)[0] ?? '', 'en'])) {
+    // A file that does not exist is a failed request in our scheme, not an answer with a status.
+    const answer = await fetch(`msg/${encodeURIComponent(language.toLowerCase())}.json`).catch(() => null);
+    if (!answer?.ok) continue;
+    Blockly.setLocale(await answer.json() as Record<string, string>);
+    return language;
+  }
+  throw new Error('no words for the block editor');
+}
+
 async function start(bridge: Bridge): Promise<void> {
   const beginning = JSON.parse(await bridge.beginning()) as Beginning;
   useTokens(beginning.theme.tokens, beginning.theme.dark);
   putVariables(beginning.theme.dark);
   document.documentElement.classList.toggle('reduced', beginning.reduced);
-  const wanted = beginning.language;
-  const answer = await fetch(`msg/${wanted}.json`);
-  const language = answer.ok ? wanted : 'en';
-  const words = answer.ok ? answer : await fetch('msg/en.json');
-  Blockly.setLocale(await words.json() as Record<string, string>);
+  const language = await useLanguage(beginning.language);
   trimMenu(language);
   // Blockly measures text once; the font has to be there before.
   await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);

@@ -94,7 +94,8 @@ export class States {
       const root = block.getSvgRoot();
       if (root.classList.contains('nepAbsent') === grey) continue;
       root.classList.toggle('nepAbsent', grey);
-      if (!isKept(block)) block.setTooltip(grey ? absentSentence(block) : String(definitionOf(block.type)?.['tooltip'] ?? ''));
+      if (isKept(block)) continue;
+      block.setTooltip(grey ? absentSentence(block) : String(definitionOf(block.type)?.['tooltip'] ?? ''));
     }
   }
 
