@@ -1,0 +1,211 @@
+"""The process of a program, spoken to as the runner does, but in this process where that is enough."""
+
+from __future__ import annotations
+
+import io
+import json
+import queue
+import threading
+
+import pytest
+
+from app.blocks import child
+from app.blocks.compiler import compile_behaviour
+from tests.blocks.samples import block, number, say, stack, started, text, workspace, write
+from tests.blocks.wire_robot import WireRobot
+
+LONG_S = 10.0
+
+
+class Pipe(io.TextIOBase):
+    """Lines from one thread to another; closing it ends the reading."""
+
+    def __init__(self) -> None:
+        self._lines: queue.Queue[str] = queue.Queue()
+
+    def write(self, text: str) -> int:
+        self._lines.put(text)
+        return len(text)
+
+    def __next__(self) -> str:
+        line = self._lines.get(timeout=LONG_S)
+        if not line:
+            raise StopIteration
+        return line
+
+    def __iter__(self):
+        return self
+
+    def end(self) -> None:
+        self._lines.put("")
+
+
+class Child:
+    """A child in a thread, and what it said."""
+
+    def __init__(self, capsys_disabled) -> None:
+        self.stdin, self.stdout = Pipe(), Pipe()
+        self.said: list[dict[str, object]] = []
+        self.code: list[int] = []
+        self.thread = threading.Thread(target=self._main)
+        self.thread.start()
+
+    def _main(self) -> None:
+        self.code.append(child.main(self.stdin, self.stdout))
+
+    def order(self, **order: object) -> None:
+        self.stdin.write(json.dumps(order) + "\n")
+
+    def start(self, saved, robots=(), master=None, **more: object) -> None:
+        program = compile_behaviour(saved, list(robots), name="Test")
+        sources = [each.source for each in robots]
+        self.order(do="start", program=program.to_json(), robots=sources, master=master, **more)
+
+    def until(self, kind: str, **content: object) -> dict[str, object]:
+        """The next line of this kind with this content."""
+        while True:
+            said = json.loads(next(self.stdout))
+            self.said.append(said)
+            if said["is"] == kind and all(said.get(name) == value for name, value in content.items()):
+                return said
+
+    def end(self) -> int:
+        self.thread.join(LONG_S)
+        assert not self.thread.is_alive()
+        return self.code[0]
+
+
+@pytest.fixture
+def running(capsys):
+    import sys
+
+    stdout = sys.stdout
+    made = Child(capsys)
+    yield made
+    made.stdin.end()
+    made.end()
+    sys.stdout = stdout
+
+
+@pytest.fixture
+def pepper(master):
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+def test_a_program_runs_to_its_end_and_its_robot_is_told(running, pepper, master):
+    running.until("ready")
+    running.start(workspace(started(say("Hi"), write(text("done")))), [pepper.described], master.address)
+    ended = running.until("ended")
+    assert running.end() == 0
+    assert (ended["ok"], ended["silent"]) == (True, [])
+    assert {"is": "print", "text": "done"} in running.said
+    assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
+    assert len(pepper.heard("stop")) == 1
+
+
+def test_a_running_block_is_told_with_its_words(running, pepper, master):
+    pepper.slow = {"say"}
+    running.start(workspace(started(say("Touch my head.") | {"id": "s"})), [pepper.described], master.address)
+    assert running.until("running", says="Pepper says “Touch my head.”")["blocks"] == ["s"]
+    running.order(do="stop")
+    assert running.until("ended")["ok"] is True
+
+
+def test_an_error_names_its_block(running, pepper, master):
+    pepper.refuses = {"say": "no voice"}
+    running.start(workspace(started(say("Hi") | {"id": "s"})), [pepper.described], master.address)
+    assert running.until("error") == {"is": "error", "block": "s", "sentence": "Pepper: no voice."}
+    assert running.until("ended")["ok"] is False
+    assert running.end() == 1
+    assert len(pepper.heard("stop")) == 1
+
+
+def test_pause_step_go(running, master):
+    first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
+    running.start(workspace(started(first, second)), master=master.address, paused=True)
+    paused = running.until("paused")
+    assert (paused["block"], paused["says"]) == ("a", "write “1” to the console")
+    running.order(do="step")
+    assert running.until("paused", block="b")["blocks"] == ["b"]
+    assert {"is": "print", "text": "1"} in running.said
+    running.order(do="go")
+    assert running.until("ended")["ok"] is True
+
+
+def test_the_heartbeat_goes_on_while_paused(running, pepper, master):
+    saved = workspace(started(say("Hi")))
+    running.start(saved, [pepper.described], master.address, paused=True)
+    running.until("paused")
+    before = len(pepper.heard("alive"))
+    with pepper.changed:
+        assert pepper.changed.wait_for(lambda: len(pepper.heard("alive")) >= before + 3, LONG_S)
+    assert pepper.heard("invoke") == []
+
+
+def test_when_its_input_ends_the_program_ends_and_the_robot_is_told(running, pepper, master):
+    hat = block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head")
+    running.start(workspace(stack(hat, say("ouch"))), [pepper.described], master.address)
+    with pepper.changed:
+        assert pepper.changed.wait_for(lambda: bool(pepper.heard("alive")), LONG_S)
+    running.stdin.end()
+    assert running.until("ended")["ok"] is True
+    assert running.end() == 0
+    with pepper.changed:
+        assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)
+
+
+def test_a_robot_that_does_not_answer_the_end_is_named(running, pepper, master):
+    pepper.silent = {"stop"}
+    running.start(workspace(started(say("Hi"))), [pepper.described], master.address)
+    assert running.until("ended")["silent"] == ["Pepper"]
+
+
+def test_an_event_reaches_its_script_through_the_network(running, pepper, master):
+    hat = block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head")
+    running.start(
+        workspace(stack(hat, write(text("ouch")), block("control_stop_program"))),
+        [pepper.described],
+        master.address,
+    )
+    with pepper.changed:
+        assert pepper.changed.wait_for(lambda: bool(pepper.heard("alive")), LONG_S)
+    pepper.tell("touched", {"place": "head", "down": True})
+    assert running.until("ended")["ok"] is True
+    assert {"is": "print", "text": "ouch"} in running.said
+
+
+def test_output_is_bounded(running, master):
+    flood = block("control_repeat", TIMES=number(5000), BODY=[write(text("x" * 3000))])
+    running.start(workspace(started(flood)), master=master.address)
+    running.until("ended")
+    lines = [str(said["text"]) for said in running.said if said["is"] == "print"]
+    assert len(lines) < 3000
+    assert any("were left out: too many at once" in line for line in lines)
+    assert max(map(len, lines)) <= child.LONGEST_LINE
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        {"do": "start"},
+        {"do": "start", "program": {}, "robots": []},
+        {"do": "start", "program": 1, "robots": 2},
+    ],
+)
+def test_a_start_that_is_none_is_refused_in_words(running, order):
+    running.stdin.write("no json\n")
+    running.order(do="pause")
+    running.order(**order)
+    assert "can't be read" in str(running.until("error")["sentence"])
+    assert running.until("ended")["ok"] is False
+    assert running.end() == 1
+
+
+def test_without_a_master_it_says_so(running):
+    running.start(
+        workspace(started(block("messages_publish", VALUE=text("x"), TOPIC="/x"))), master="127.0.0.1:1"
+    )
+    assert "The program can't begin" in str(running.until("error")["sentence"])
+    assert running.end() == 1

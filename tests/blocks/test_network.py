@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+import pytest
+
+import nep
+from app.blocks.fleet_search import find_robots
+from app.blocks.network import Network
+from tests.blocks.fakes import until
+from tests.blocks.wire_robot import RizeRobot, WireRobot
+
+
+@pytest.fixture
+def pepper(master):
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def node(master):
+    with nep.node("test", master=master.address) as made:
+        yield made
+
+
+@pytest.fixture
+def network(node, pepper):
+    made = Network(
+        node,
+        "program-1",
+        [pepper.described],
+        sensors=[("Pepper", "battery")],
+        publishes=["/out"],
+        listens=["/in"],
+    )
+    yield made
+    made.close()
+
+
+def test_an_invoke_is_answered(network, pepper):
+    pokes: list[int] = []
+    network.listen(lambda: pokes.append(1), lambda _: None)
+    call = network.invoke("Pepper", "say", {"text": "Hi"})
+    until(lambda: call.done)
+    assert (call.state, call.output, call.error) == ("succeeded", {"word": "yes"}, "")
+    (command,) = pepper.heard("invoke")
+    assert command == {
+        "id": call.id, "op": "invoke", "from": "program-1", "action": "say", "input": {"text": "Hi"},
+    }  # fmt: skip
+    assert pokes
+
+
+def test_a_refusal_and_a_cancel(network, pepper):
+    pepper.refuses = {"say": "no voice"}
+    pepper.slow = {"turn"}
+    refused = network.invoke("Pepper", "say", {"text": "Hi"})
+    turning = network.invoke("Pepper", "turn", {})
+    until(lambda: refused.done and turning.state == "accepted")
+    assert (refused.state, refused.error) == ("failed", "no voice")
+    network.cancel(turning)
+    until(lambda: bool(pepper.heard("cancel")))
+    assert pepper.heard("cancel")[0]["id"] == turning.id
+
+
+def test_the_heartbeat_goes_on_by_itself(network, pepper):
+    until(lambda: len(pepper.heard("alive")) >= 3)
+    assert {command["from"] for command in pepper.heard("alive")} == {"program-1"}
+
+
+def test_sensors_events_topics(network, pepper, node):
+    events: list[object] = []
+    network.on_event("Pepper", "touched", events.append)
+    assert network.sensor("Pepper", "battery") is None
+    pepper.tell("battery", {"value": 84})
+    pepper.tell("touched", {"place": "head"})
+    until(lambda: network.sensor("Pepper", "battery") == 84 and events == [{"place": "head"}])
+    assert network.sensor("Pepper", "pose") is None  # subscribed at first use
+
+    def told_again() -> bool:  # as a robot does, several times a second
+        pepper.tell("pose", {"x": 1.0, "y": 2.0})
+        return network.sensor("Pepper", "pose") == {"x": 1.0, "y": 2.0}
+
+    until(told_again)
+
+    subscriber = node.new_sub("/out")
+    network.publish("/out", "tired")
+    message = subscriber.receive(5)
+    assert message is not None
+    assert message.payload == "tired"
+    with nep.node("other") as other:
+        other.new_pub("/in").publish({"name": "Ada"})
+        until(lambda: network.newest("/in") == {"name": "Ada"})
+
+
+def test_stopping_waits_for_the_answers_and_names_who_is_silent(network, pepper):
+    outside: list[str] = []
+    network.listen(lambda: None, outside.append)
+    assert network.stop_robots(2.0) == ()
+    pepper.silent = {"stop"}
+    assert network.stop_robots(0.05) == ("Pepper",)
+    assert outside == []
+
+
+def test_a_stop_by_somebody_else_is_noticed(network, pepper, node):
+    outside: list[str] = []
+    network.listen(lambda: None, outside.append)
+    node.new_pub("/Pepper/command", "robot/command").publish({"id": "s", "op": "stop", "from": "person"})
+    until(lambda: outside == ["Pepper"])
+
+
+def test_a_robot_of_rize_gets_its_own_words(master, node):
+    rosie = RizeRobot(master.address)
+    network = Network(node, "program-1", [rosie.described])
+    try:
+        call = network.invoke("Rosie", "say", {"text": "hello"})
+        until(lambda: call.done)
+        assert call.state == "succeeded"
+        (command,) = rosie.commands
+        assert (command["node"], command["robots"], command["state"]) == ("action", "Rosie", "idle")
+        assert command["primitives"]["primitive"] == "say"
+        assert command["primitives"]["input"] == "hello"
+        assert network.stop_robots(0.05) == ()  # it can't answer, so nobody waits for it
+    finally:
+        network.close()
+        rosie.close()
+
+
+def test_robots_are_found_by_their_type(master, node, pepper):
+    turtle = WireRobot(master.address, "Turtle 2")
+    try:
+        found = find_robots(node, 5.0, wanted=["Pepper", "Turtle 2"])
+        assert [robot.name for robot in found] == ["Pepper", "Turtle 2"]
+        assert [robot.name for robot in find_robots(node, 5.0)] == ["Pepper", "Turtle 2"]
+        assert [robot.name for robot in find_robots(node, 0.2, wanted=["NAO"])] == ["Pepper", "Turtle 2"]
+    finally:
+        turtle.close()

@@ -1,0 +1,93 @@
+"""Robots for tests on a real network: one that obeys, is slow, refuses or is silent, as a test says."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+
+import nep
+from app.robots import rize
+from app.robots.description import Robot
+from tests.blocks.samples import robot
+
+
+class WireRobot:
+    """A robot by the contract of ROBOTS: description, command, answer, and what it heard."""
+
+    def __init__(self, master: str, name: str = "Pepper") -> None:
+        self.described: Robot = robot(name)
+        self.commands: list[Mapping[str, object]] = []
+        self.silent: set[str] = set()  # operations that it does not answer
+        self.slow: set[str] = set()  # actions that it accepts and does not end
+        self.refuses: dict[str, str] = {}
+        self.changed = threading.Condition()
+        self._node = nep.node(name, master=master)
+        topics = self.described.topics
+        self._answer = self._node.new_pub(topics.answer, "robot/answer")
+        self._description = self._node.new_pub(topics.description, "robot/description", latched=True)
+        self._description.publish(dict(self.described.source))
+        self._sensors = {
+            sensor.name: self._node.new_pub(sensor.topic)
+            for sensor in (*self.described.sensors, *self.described.events)
+        }
+        self._node.new_sub(topics.command, "robot/command", sink=self._receive)
+
+    def tell(self, name: str, value: object) -> None:
+        """Publish a sensor's value or an event."""
+        self._sensors[name].publish(value)
+
+    def heard(self, op: str) -> list[Mapping[str, object]]:
+        return [command for command in self.commands if command["op"] == op]
+
+    def close(self) -> None:
+        self._node.close()
+
+    def _receive(self, messages: Sequence[nep.Message]) -> None:
+        for message in messages:
+            command = message.payload
+            assert isinstance(command, dict)
+            with self.changed:
+                self.commands.append(command)
+                self.changed.notify_all()
+            if command["op"] in self.silent or command["op"] == "alive":
+                continue
+            if command["op"] == "stop":
+                self._say(command, "succeeded")
+            elif command["op"] == "invoke":
+                self._invoke(command)
+
+    def _invoke(self, command: Mapping[str, object]) -> None:
+        self._say(command, "accepted")
+        action = str(command["action"])
+        if action in self.refuses:
+            self._say(command, "failed", self.refuses[action])
+        elif action not in self.slow:
+            self._say(command, "succeeded")
+
+    def _say(self, command: Mapping[str, object], state: str, error: str = "") -> None:
+        answer = {"id": command["id"], "op": command["op"], "action": command.get("action"), "state": state}
+        self._answer.publish(answer | {"output": {"word": "yes"}, "feedback": {}, "error": error})
+
+
+class RizeRobot:
+    """A driver of RIZE: it acts on commands for its name and answers with the same object."""
+
+    def __init__(self, master: str, name: str = "Rosie") -> None:
+        self.described = rize.robot(name)
+        self.commands: list[dict[str, object]] = []
+        self._node = nep.node(name, master=master)
+        self._answer = self._node.new_pub("action_state")
+        self._node.new_sub("robot_action", sink=self._receive)
+
+    def close(self) -> None:
+        self._node.close()
+
+    def _receive(self, messages: Sequence[nep.Message]) -> None:
+        for message in messages:
+            command = message.payload
+            assert isinstance(command, dict)
+            if command.get("robots") != self.described.name:
+                continue
+            self.commands.append(command)
+            if command["node"] == "action":
+                self._answer.publish(command | {"state": "success"})

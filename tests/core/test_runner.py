@@ -1,0 +1,254 @@
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+
+import psutil
+import pytest
+
+import nep
+from app.blocks.compiler import compile_behaviour
+from app.core.runner import Runner, RunnerEvent, child_command
+from app.errors import RunnerError
+from tests.blocks.samples import block, number, say, started, text, workspace, write
+from tests.blocks.wire_robot import WireRobot
+
+LONG_S = 15.0
+STOP_WITHIN_S = 0.1
+
+HANGS = (sys.executable, "-c", "import time, sys; print('{}'); sys.stdout.flush(); time.sleep(60)")
+IGNORES_TEXT = """
+import signal
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+print('{"is": "ready"}', flush=True)
+while True:
+    pass
+"""
+IGNORES = (sys.executable, "-c", IGNORES_TEXT)
+CRASHES = (sys.executable, "-c", "import os; os.abort()")
+FAILS = (sys.executable, "-c", "raise SystemExit('no room left')")
+TALKS_TEXT = """
+import sys
+print('nonsense', '[1]', '{"is": "dance"}', 'x' * 3000000, sep='\\n', flush=True)
+print('{"is": "ended", "ok": true, "elapsed_s": 1.5}', flush=True)
+sys.stdin.read()
+"""
+TALKS = (sys.executable, "-c", TALKS_TEXT)
+
+
+class Heard:
+    """The events of a runner, and waiting for one."""
+
+    def __init__(self) -> None:
+        self.events: list[RunnerEvent] = []
+        self.changed = threading.Condition()
+
+    def __call__(self, event: RunnerEvent) -> None:
+        with self.changed:
+            self.events.append(event)
+            self.changed.notify_all()
+
+    def until(self, kind: str, **content: object) -> RunnerEvent:
+        def found() -> RunnerEvent | None:
+            for event in self.events:
+                if event.kind == kind and all(
+                    getattr(event, name) == value for name, value in content.items()
+                ):
+                    return event
+            return None
+
+        with self.changed:
+            assert self.changed.wait_for(lambda: found() is not None, LONG_S), self.events
+        event = found()
+        assert event is not None
+        return event
+
+
+@pytest.fixture
+def heard():
+    return Heard()
+
+
+@pytest.fixture
+def runner(heard):
+    made: list[Runner] = []
+
+    def make(command=None) -> Runner:
+        made.append(Runner(heard, command=command))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+        assert each.pid is None or not psutil.pid_exists(each.pid)
+
+
+@pytest.fixture
+def pepper(master):
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+def timed_stop(runner: Runner) -> float:
+    began = time.monotonic()
+    runner.stop()
+    return time.monotonic() - began
+
+
+def program(*blocks):
+    return compile_behaviour(workspace(started(*blocks)), [])
+
+
+def endless():
+    """Pure computing, for ever."""
+    change = block("variables_change", VAR={"id": "n"}, BY=number(1))
+    return compile_behaviour(
+        workspace(started(block("control_forever", "loop", BODY=[change])), variables=("n",)), []
+    )
+
+
+def test_a_program_runs_and_ends(runner, heard, master):
+    made = runner()
+    made.start(program(write(text("Hi"))), [], master.address)
+    assert made.wait(LONG_S)
+    assert [event.kind for event in heard.events if event.kind != "running"] == ["ready", "print", "ended"]
+    assert heard.events[-1].ok
+    assert heard.until("print").text == "Hi"
+    assert made.state == "ended"
+    assert {event.run for event in heard.events} == {made.run}
+
+
+def test_pause_step_and_go_on(runner, heard, master):
+    made = runner()
+    first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
+    made.start(program(first, second), [], master.address, paused=True)
+    assert heard.until("paused").says == "write “1” to the console"
+    assert made.state == "paused"
+    made.step()
+    assert heard.until("paused", blocks=("b",))
+    made.go_on()
+    assert heard.until("ended").ok
+
+
+def test_a_running_program_can_be_paused(runner, heard, master):
+    made = runner()
+    made.start(endless(), [], master.address)
+    heard.until("running")
+    made.pause()
+    assert heard.until("paused").blocks
+    assert made.state == "paused"
+    made.go_on()
+    assert made.state == "running"
+    assert timed_stop(made) < STOP_WITHIN_S
+    assert heard.until("ended").ok
+
+
+def test_stop_ends_an_endless_program_at_once(runner, heard, master):
+    made = runner()
+    made.start(endless(), [], master.address)
+    heard.until("running")
+    assert timed_stop(made) < STOP_WITHIN_S
+    assert not psutil.pid_exists(made.pid)
+    assert made.wait(LONG_S)
+    assert heard.events[-1].kind == "ended"
+    assert [event.kind for event in heard.events].count("ended") == 1
+
+
+def test_stop_ends_one_block_that_computes_for_ever(runner, heard, master):
+    made = runner()
+    power = number(9)
+    for _ in range(3):
+        power = block("values_arithmetic", A=number(9), SIGN="**", B=power)
+    begin = block("messages_publish", VALUE=text("now"), TOPIC="/begin")
+    with nep.node("test", master=master.address) as node:
+        subscriber = node.new_sub("/begin")
+        made.start(program(begin, write(power)), [], master.address)
+        # Nothing else can be heard of it: such a number keeps all its threads from running.
+        assert subscriber.receive(LONG_S) is not None
+    assert timed_stop(made) < STOP_WITHIN_S
+    assert made.wait(LONG_S)
+    assert heard.events[-1].ok  # it was stopped: that is no failure of its own
+
+
+@pytest.mark.parametrize("command", [HANGS, IGNORES], ids=["hangs", "ignores everything"])
+def test_a_child_that_hangs_is_killed(runner, heard, command):
+    made = runner(command)
+    huge = program(*(write(text("x" * 500)) for _ in range(400)))  # far more than a pipe holds
+    made.start(huge, [], None)
+    assert timed_stop(made) < STOP_WITHIN_S
+    assert made.wait(LONG_S)
+    assert heard.events[-1].kind == "ended"
+
+
+def test_a_child_that_crashes_is_told(runner, heard):
+    made = runner(CRASHES)
+    made.start(program(), [], None)
+    ended = heard.until("ended")
+    assert not ended.ok
+    assert ended.text == f"The program's process was killed (signal {signal.SIGABRT.value})."
+    assert timed_stop(made) < STOP_WITHIN_S
+
+
+def test_a_child_that_fails_says_why(runner, heard):
+    runner(FAILS).start(program(), [], None)
+    assert heard.until("ended").text == "The program's process ended with code 1: no room left."
+
+
+def test_a_child_that_was_killed_by_somebody_is_told(runner, heard, master):
+    made = runner()
+    made.start(endless(), [], master.address)
+    heard.until("running")
+    os.kill(made.pid, signal.SIGKILL)
+    assert heard.until("ended").text == f"The program's process was killed (signal {signal.SIGKILL.value})."
+
+
+def test_what_is_no_event_is_left_out(runner, heard):
+    made = runner(TALKS)
+    made.start(program(), [], None)
+    assert heard.until("ended").elapsed_s == 1.5
+    assert [event.kind for event in heard.events] == ["ended"]
+
+
+def test_a_program_that_cannot_be_started(runner):
+    with pytest.raises(RunnerError, match="can't be started"):
+        runner(("/there/is/no/such/program",)).start(program(), [], None)
+
+
+def test_a_runner_runs_once(runner, heard, master):
+    made = runner()
+    made.stop()
+    made.start(program(), [], master.address)
+    with pytest.raises(RunnerError, match="make another"):
+        made.start(program(), [], master.address)
+    heard.until("ended")
+
+
+def test_the_robot_is_told_when_the_window_dies(runner, heard, master, pepper):
+    """The child notices that its parent is gone: its input ends."""
+    pepper.slow = {"say"}
+    made = runner()
+    wanted = compile_behaviour(workspace(started(say("Hi"))), [pepper.described])
+    made.start(wanted, [pepper.described.source], master.address)
+    heard.until("running", says="Pepper says “Hi”")
+    made._orders.put(None)  # what the operating system does with a dead parent's pipe
+    assert heard.until("ended").ok
+    with pepper.changed:
+        assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)
+
+
+def test_an_error_has_its_block_and_its_sentence(runner, heard, master):
+    made = runner()
+    half = block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0))
+    made.start(program(write(half)), [], master.address)
+    error = heard.until("error")
+    assert (error.blocks, error.text, error.ok) == (("v",), "“÷” can't divide by 0.", False)
+    assert not heard.until("ended").ok
+
+
+def test_a_frozen_studio_is_its_own_child(monkeypatch):
+    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    assert child_command() == (sys.executable, "--child")

@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+import nep
+from app.blocks.compiler import compile_behaviour
+from app.core.runner import Runner
+from app.core.stopping import RobotStop, RobotStopper, StopReport
+from tests.blocks.fakes import until
+from tests.blocks.samples import block, number, say, started, workspace
+from tests.blocks.wire_robot import RizeRobot, WireRobot
+
+LONG_S = 15.0
+
+
+@pytest.fixture
+def robots(master):
+    made = [WireRobot(master.address), WireRobot(master.address, "Turtle")]
+    yield made
+    for each in made:
+        each.close()
+
+
+@pytest.fixture
+def stopper(master, robots):
+    with nep.node("studio", master=master.address) as node:
+        made = RobotStopper(node)
+        made.set_robots([each.described for each in robots])
+        yield made
+        made.close()
+
+
+def test_all_robots_answer(stopper, robots):
+    answered: list[RobotStop] = []
+    report = stopper.stop_all(on_answer=answered.append)
+    assert report.proven
+    assert {robot.name for robot in report.robots} == {"Pepper", "Turtle"}
+    assert all(robot.answered and robot.elapsed_ms is not None for robot in report.robots)
+    assert max(robot.elapsed_ms or 0 for robot in report.robots) <= report.elapsed_ms
+    assert sorted(robot.name for robot in answered) == ["Pepper", "Turtle"]
+    assert [len(robot.heard("stop")) for robot in robots] == [1, 1]
+
+
+def test_a_silent_robot_is_named(stopper, robots):
+    robots[1].silent = {"stop"}
+    answered: list[RobotStop] = []
+    report = stopper.stop_all(timeout_s=0.1, on_answer=answered.append)
+    assert (report.proven, report.silent) == (False, ("Turtle",))
+    by_name = {robot.name: robot for robot in report.robots}
+    assert by_name["Pepper"].answered
+    assert by_name["Turtle"].sentence == "Turtle did not answer. Switch it off by hand."
+    assert report.elapsed_ms >= 100
+    assert [robot.name for robot in answered] == [
+        "Pepper",
+        "Turtle",
+    ]  # the answer first, the silence at the end
+
+
+def test_only_the_robots_that_are_named_are_stopped(stopper, robots):
+    assert [robot.name for robot in stopper.stop_all(["Turtle", "Nobody"]).robots] == ["Turtle"]
+    assert robots[0].heard("stop") == []
+
+
+def test_no_robots_is_proven_at_once(stopper):
+    stopper.set_robots(())
+    report = stopper.stop_all()
+    assert (report.robots, report.proven) == ((), True)
+    assert report.elapsed_ms < 100
+
+
+def test_a_stop_that_failed_is_told_with_the_robots_words(stopper, robots):
+    say_ = robots[0]._say
+    robots[0]._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")
+    report = stopper.stop_all(["Pepper"])
+    assert not report.proven
+    assert report.robots[0].sentence == "Pepper: the brake is stuck."
+
+
+def test_robots_come_and_go(stopper, robots):
+    stopper.set_robots([robots[0].described])
+    assert stopper.robots == ("Pepper",)
+    stopper.set_robots([each.described for each in robots])
+    assert stopper.stop_all().proven
+    assert stopper.robots == ("Pepper", "Turtle")
+
+
+def test_a_robot_of_rize_cannot_confirm(master, stopper):
+    rosie = RizeRobot(master.address)
+    try:
+        stopper.set_robots([rosie.described])
+        report = stopper.stop_all(timeout_s=5.0)
+        assert report.robots[0].sentence == "Rosie: stop sent; this robot cannot confirm"
+        assert (report.proven, report.silent) == (True, ())
+        assert report.elapsed_ms < 1000
+        until(lambda: bool(rosie.commands))
+        assert rosie.commands[0]["node"] == "cancel"
+    finally:
+        rosie.close()
+
+
+def test_a_closed_node_is_told_in_words(master, robots):
+    with nep.node("studio", master=master.address) as node:
+        stopper = RobotStopper(node)
+        stopper.set_robots([robots[0].described])
+    report = stopper.stop_all()
+    assert not report.proven
+    assert report.robots[0].sentence.startswith("Pepper can't be told: ")
+
+
+def test_two_stops_at_the_same_time_both_get_their_answers(stopper):
+    reports: list[StopReport] = []
+    threads = [threading.Thread(target=lambda: reports.append(stopper.stop_all())) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(LONG_S)
+    assert [report.proven for report in reports] == [True, True]
+
+
+@pytest.mark.parametrize("how", ["obeys", "computes for ever", "was killed"])
+def test_robots_stop_whatever_the_program_does(master, stopper, robots, how):
+    """A program moves a robot, Stop is pressed, the robot has answered, and nothing moves it again."""
+    robots[0].slow = {"say"} if how == "obeys" else set()
+    power = number(9)
+    for _ in range(3):
+        power = block("values_arithmetic", A=number(9), SIGN="**", B=power)
+    hard = block("control_repeat", TIMES=power, BODY=[])
+    program = compile_behaviour(workspace(started(say("Hi"), hard)), [robots[0].described])
+    runner = Runner(lambda event: None)
+    runner.start(program, [robots[0].described.source], master.address)
+    with robots[0].changed:
+        assert robots[0].changed.wait_for(lambda: bool(robots[0].heard("invoke")), LONG_S)
+    if how == "was killed":
+        import os
+        import signal
+
+        os.kill(runner.pid, signal.SIGKILL)
+    stopper.send_stop()
+    runner.stop()
+    report = stopper.stop_all()
+    runner.close()
+    assert report.proven
+    operations = [command["op"] for command in robots[0].commands]
+    assert operations[-1] == "stop"
+    assert "invoke" not in operations[operations.index("stop") :]
