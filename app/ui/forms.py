@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QDoubleValidator
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
@@ -113,7 +113,7 @@ def _number(theme: Theme, parameter: Parameter) -> Control:
     )
 
     def value() -> object:
-        return round(slider.value) if whole else slider.value
+        return round(slider.value) if whole else float(slider.value)
 
     def show(given: object) -> None:
         if isinstance(given, (int, float)) and not isinstance(given, bool) and low <= given <= high:
@@ -264,7 +264,7 @@ class ActionForm(QWidget):
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(10)
-        self._grid.setVerticalSpacing(0)
+        self._grid.setVerticalSpacing(ROW_GAP)
         self._grid.setColumnMinimumWidth(0, LABEL_WIDTH)
         self._grid.setColumnStretch(1, 1)
         self.more = Button(theme, "More", "chevron-down", kind="ghost", size="small")
@@ -292,16 +292,22 @@ class ActionForm(QWidget):
         name.setMaximumWidth(LABEL_WIDTH)
         wrong = label("", "small", role="error", wrap=True)
         wrong.hide()
-        self._grid.setRowMinimumHeight(row, ROW_HEIGHT + (ROW_GAP if self.controls else 0))
-        self._grid.addWidget(name, row, 0)
-        self._grid.addWidget(control.widget, row, 1)
-        self._grid.addWidget(wrong, row + 1, 1)
-        control.changed(self._told)
-        if isinstance(control.widget, Segments):
+        cell = QWidget()
+        inside = QVBoxLayout(cell)
+        inside.setContentsMargins(0, 0, 0, 0)
+        inside.setSpacing(4)
+        inside.addWidget(control.widget)
+        inside.addWidget(wrong)
+        for widget in (name, control.widget):
+            widget.setMinimumHeight(ROW_HEIGHT)
+        self._grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
+        self._grid.addWidget(cell, row, 1)
+        if parameter.choices and parameter.default is not None:
             control.show_value(parameter.default)
         self.controls[parameter.name] = control
         self._sentences[parameter.name] = wrong
-        self._rows[parameter.name] = (name, control.widget)
+        self._rows[parameter.name] = (name, cell)
+        control.changed(self._told)
 
     def _told(self) -> None:
         self.show_problems(())
@@ -311,8 +317,6 @@ class ActionForm(QWidget):
         self.more.set_word("Fewer" if on else "More", "chevron-up" if on else "chevron-down")
         for parameter in self.action.parameters:
             if parameter.advanced:
-                row = self._grid.getItemPosition(self._grid.indexOf(self._rows[parameter.name][0]))[0]  # type: ignore[index]
-                self._grid.setRowMinimumHeight(row, ROW_HEIGHT + ROW_GAP if on else 0)
                 for widget in self._rows[parameter.name]:
                     widget.setVisible(on)
 

@@ -103,6 +103,7 @@ class TreeModel(QAbstractItemModel):
         super().__init__()
         self._root = Node("", {}, None, depth=-1, children=[])
         self.changed_at_s: float | None = None
+        self._changing = False
 
     # -- Qt's questions ---------------------------------------------------------------------------------
 
@@ -125,13 +126,17 @@ class TreeModel(QAbstractItemModel):
         return 1
 
     def hasChildren(self, parent: Index = _ROOT) -> bool:
-        return parent.column() <= 0 and size_of(self.node(parent).value) > 0
+        node = self.node(parent)
+        return parent.column() <= 0 and (bool(node.children) or size_of(node.value) > 0)
 
     def canFetchMore(self, parent: Index) -> bool:
         node = self.node(parent)
-        return parent.column() <= 0 and len(node.children or ()) < size_of(node.value)
+        # While rows are being changed a view may ask; it gets more when the change is complete.
+        return parent.column() <= 0 and not self._changing and len(node.children or ()) < size_of(node.value)
 
     def fetchMore(self, parent: Index) -> None:
+        if self._changing:
+            return
         node = self.node(parent)
         have = len(node.children or ())
         self._load(node, min(size_of(node.value), have + PAGE))
@@ -179,9 +184,13 @@ class TreeModel(QAbstractItemModel):
         """
         first = not self._root.children
         shown = value if is_container(value) else {"value": value}
-        self._update(self._root, shown, None if first else now)
-        if not self._root.children:
-            self._load(self._root, min(size_of(shown), PAGE))
+        self._changing = True
+        try:
+            self._update(self._root, shown, None if first else now)
+            if not self._root.children:
+                self._load(self._root, min(size_of(shown), PAGE))
+        finally:
+            self._changing = False
 
     def _update(self, node: Node, value: object, now: float | None) -> None:
         before, node.value = node.value, value
@@ -193,7 +202,7 @@ class TreeModel(QAbstractItemModel):
         wanted = keys_of(value, max(len(loaded), PAGE) if loaded or is_container(value) else 0)
         if [child.key for child in loaded] != wanted[: len(loaded)] or len(wanted) < len(loaded):
             self._fit(node, loaded, wanted)
-        elif len(wanted) > len(loaded) and loaded:
+        elif len(wanted) > len(loaded):
             self._load(node, len(wanted))
         if not is_container(value) and node is not self._root:
             node.children = None

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from app.blocks.program import Problem
+from app.blocks import Problem, editor_definitions
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.robots.inputs import Choice, Parameter
@@ -252,6 +252,18 @@ def when_started():
 """
 
 
+WORKSPACE = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {"type": "events_started", "id": "b1", "x": 30, "y": 40, "next": {"block": {
+                "type": "control_wait", "id": "b2", "inputs": {
+                    "SECONDS": {"shadow": {"type": "values_number", "fields": {"NUMBER": 2}}}}}}},
+        ],
+    }
+}  # fmt: skip
+
+
 class Document:
     def __init__(self, calls: list[tuple[object, ...]]) -> None:
         self.calls = calls
@@ -265,6 +277,8 @@ class Document:
         self.edits = 0
         self.definitions_revision = 0
         self.found: tuple[Problem, ...] = ()
+        self.sensors: tuple[tuple[str, str], ...] = ()
+        self.known: Callable[[], list[Robot]] = list
         self.source = ""
         self.compiled = 0
 
@@ -274,13 +288,13 @@ class Document:
 
     def program(self) -> SimpleNamespace:
         self.compiled += 1
-        return SimpleNamespace(source=self.source, problems=self.found)
+        return SimpleNamespace(source=self.source, problems=self.found, sensors=self.sensors)
 
     def problems(self) -> tuple[Problem, ...]:
         return self.found
 
     def definitions(self) -> Mapping[str, object]:
-        return {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
+        return editor_definitions(self.known())
 
     def mend(self, action: str, block_id: str | None) -> None:
         self.calls.append(("mend", action, block_id))
@@ -298,6 +312,7 @@ class Session:
         self.fleet = Fleet(self.calls)
         self.images = Images()
         self.document = Document(self.calls)
+        self.document.known = lambda: [link.robot for link in self.fleet.connected]
         self.runs = SimpleNamespace(
             running_blocks=(), stopped_blocks=(), block_errors={}, blocks_revision=0, active=False
         )
@@ -365,7 +380,7 @@ class Session:
         session.images.source = lambda _topic: picture()
         session.document.name = "Greeting"
         session.document.source = PROGRAM
-        session.document.workspace = {"blocks": {"blocks": [{"type": "events_started"}]}}
+        session.document.workspace = WORKSPACE
         session.document.found = (
             Problem("warning", "b8", "robot", "wave", "NAO is not connected, so wave will be skipped.",
                     "Connect NAO", "connect:NAO", icon="hand"),

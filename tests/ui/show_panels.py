@@ -8,10 +8,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtCore import QCoreApplication, QEventLoop, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from app.ui import fonts
+from app.ui.blockly_scheme import register_scheme
 from app.ui.docks import Dock
 from app.ui.panels import (
     alerts,
@@ -65,7 +66,7 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
     for _ in range(8):
         session.tick()
         dock.refresh()
-        wait(1500 if name == "behaviour" and _ == 4 else 10)
+        wait(2500 if name == "behaviour" and _ == 2 else 10)
     dock.grab().save(str(folder / f"{name}-{suffix}.png"))
     widget.shut()
     dock.close()
@@ -74,7 +75,11 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
 
 def prepare(name: str, widget: PanelWidget) -> None:
     """Choose what the design's picture has chosen."""
-    if name == "inspector" and isinstance(widget, inspector.InspectorPanel) and "/blackboard" in widget.session.topics:
+    if (
+        name == "inspector"
+        and isinstance(widget, inspector.InspectorPanel)
+        and "/blackboard" in widget.session.topics
+    ):
         widget.show_topic("/blackboard")
         widget.session.send("/blackboard", {**__import__("tests.ui.fakes").ui.fakes.blackboard(0.0)})  # type: ignore[attr-defined]
         widget.refresh()
@@ -88,6 +93,8 @@ def main() -> int:
     """Paint what was asked for."""
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
+    QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+    register_scheme()
     application = QApplication(sys.argv[:1])
     fonts.load()
     theme = Theme("light")

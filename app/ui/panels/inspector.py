@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from nep.message import Message
 
 LARGE_BYTES = 1_000_000
+FIRST_ROWS = 24
 NOTHING, LARGE, TREE, RAW = range(4)
 
 
@@ -162,14 +163,15 @@ class InspectorPanel(PanelWidget):
 
     def _expand_first(self) -> None:
         """Open the small parts of a first message, so that there is something to see."""
-        waiting, rows = [QModelIndex()], 0
-        while waiting and rows < 40:
+        waiting, rows = [QModelIndex()], self.model.rowCount()
+        while waiting:
             above = waiting.pop(0)
             for row in range(self.model.rowCount(above)):
                 index = self.model.index(row, 0, above)
                 node = self.model.node(index)
-                rows += 1
-                if node.is_container and 0 < size_of(node.value) <= 8 and node.depth < 3:
+                few = 0 < size_of(node.value) <= (8 if isinstance(node.value, Mapping) else 1)
+                if few and node.depth < 3 and rows + size_of(node.value) <= FIRST_ROWS:
+                    rows += size_of(node.value)
                     self.model.fetchMore(index)
                     self.tree.expand(index)
                     waiting.append(index)

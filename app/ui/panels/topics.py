@@ -167,6 +167,7 @@ class TopicsPanel(PanelWidget):
         if graph is not None and graph.nodes:
             words += f", {plural(len(graph.nodes), 'node')}"
         self.count.setText(words if known else "")
+        self.filter.setVisible(known > 0)
 
     def _show_empty(self, any_rows: bool, filtered: bool) -> None:
         self._stack.setCurrentIndex(0 if any_rows else 1)

@@ -1,0 +1,61 @@
+"""What tests of panels share: a panel over a session in memory, and what it asked of the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.theme import Theme
+from tests.ui.fakes import Session
+
+
+@dataclass
+class Window:
+    """Stands for the main window: writes down what panels ask of it."""
+
+    session: Session
+    theme: Theme = field(default_factory=lambda: Theme("light"))
+    opened: list[str] = field(default_factory=list)
+    toasts: list[str] = field(default_factory=list)
+    commands: list[str] = field(default_factory=list)
+
+    def context(self) -> PanelContext:
+        return PanelContext(
+            self.session,  # type: ignore[arg-type]
+            self.theme,
+            self.opened.append,
+            self.toasts.append,
+            self.commands.append,
+        )
+
+    def make(self, panel: Panel, size: tuple[int, int] = (640, 480)) -> PanelWidget:
+        """The panel, shown, with the widgets of its title beside it."""
+        made = panel.make(self.context())
+        made.resize(*size)
+        made.show()
+        made.refresh()
+        return made
+
+
+def ticks(window: Window, panel: PanelWidget, count: int = 1) -> None:
+    """Some thirtieths of a second."""
+    for _ in range(count):
+        window.session.tick()
+        panel.refresh()
+
+
+def button(widget: QWidget, name: str) -> QWidget:
+    """The visible control of that accessible name."""
+    found = [child for child in widget.findChildren(QWidget) if child.accessibleName() == name]
+    assert found, f"nothing is called {name!r}"
+    return found[0]
+
+
+def press(widget: QWidget) -> None:
+    """Press a button in its middle."""
+    from PySide6.QtCore import Qt
+
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton)

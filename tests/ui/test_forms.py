@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit
+
+from app.robots.inputs import Choice as Option
+from app.robots.inputs import Parameter
+from app.robots.parts import Action
+from app.ui.forms import ActionForm, control_for
+from app.ui.theme import Theme
+from app.ui.widgets import Choice, ColourSwatches, Segments, SliderWithUnit, Switch
+from tests.ui.fakes import ACTIONS
+
+FEW = (Option("en", "English"), Option("fr", "French"))
+MANY = tuple(Option(number, f"number {number}") for number in range(6))
+
+
+def action(*parameters: Parameter) -> Action:
+    return Action("do", "do it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
+
+
+@pytest.fixture
+def theme(qapp) -> Theme:
+    return Theme("light")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "kind", "start", "other"),
+    [
+        (Parameter("p", "p", "text", default="hi"), QLineEdit, "hi", "ho"),
+        (Parameter("p", "p", "number", 0, 1, 0.05, "m", 0.5), SliderWithUnit, 0.5, 0.25),
+        (Parameter("p", "p", "integer", 0, 100, 5, "%", 60), SliderWithUnit, 60, 20),
+        (Parameter("p", "p", "angle", -180, 180, 5, "°", 30), SliderWithUnit, 30.0, -45.0),
+        (Parameter("p", "p", "choice", choices=FEW, default="fr"), Segments, "fr", "en"),
+        (Parameter("p", "p", "choice", choices=MANY, default=3), Choice, 3, 5),
+        (Parameter("p", "p", "colour", default="#35c26b"), ColourSwatches, "#35c26b", "#b06bff"),
+        (Parameter("p", "p", "boolean", default=True), Switch, True, False),
+        (Parameter("p", "p", "list", default=["yes", "no"]), QLineEdit, ["yes", "no"], ["one"]),
+    ],
+    ids=lambda value: value.kind if isinstance(value, Parameter) else "",
+)
+def test_each_kind_of_parameter_has_its_control_and_its_value(
+    qtbot, theme, parameter, kind, start, other
+) -> None:
+    form = ActionForm(theme, action(parameter))
+    qtbot.addWidget(form)
+    control = form.controls["p"]
+    assert isinstance(control.widget, kind)
+    assert form.input() == {"p": start}
+    assert type(form.input()["p"]) is type(start)
+    form.set_input({"p": other})
+    assert form.input() == {"p": other}
+    assert form.action.check(form.input()) == ()
+
+
+def test_numbers_without_limits_and_pictures_are_typed(qtbot, theme) -> None:
+    form = ActionForm(
+        theme,
+        action(
+            Parameter("n", "n", "integer", default=2),
+            Parameter("x", "x", "number"),
+            Parameter("i", "i", "image"),
+        ),
+    )
+    qtbot.addWidget(form)
+    assert form.input() == {"n": 2}  # what is left empty is left out
+    form.set_input({"n": 7, "x": 1.5, "i": "file:///p.png"})
+    assert form.input() == {"n": 7, "x": 1.5, "i": "file:///p.png"}
+
+
+def test_a_number_that_is_none_stays_as_it_was_typed_and_the_check_says_so(qtbot, theme) -> None:
+    form = ActionForm(theme, action(Parameter("n", "count", "integer", default=2)))
+    qtbot.addWidget(form)
+    field = form.findChild(QLineEdit)
+    assert field is not None
+    field.setText("two")
+    assert form.input() == {"n": "two"}
+    form.show_problems(form.action.check(form.input()))
+    assert field.property("wrong") == "true"
+    assert field.text() == "two"
+    QTest.keyClicks(field, "x")
+    assert field.property("wrong") == "false"  # typing takes the sentence away
+
+
+def test_what_a_robot_offers_now_fills_a_list(qtbot, theme) -> None:
+    parameter = Parameter("name", "animation", "text", options_from="animations")
+    asked: list[str] = []
+
+    def options(name: str) -> list[str]:
+        asked.append(name)
+        return ["hey", "bow", "nod", "clap", "wave"]
+
+    form = ActionForm(theme, action(parameter), options)
+    qtbot.addWidget(form)
+    assert asked == ["animations"]
+    assert isinstance(form.controls["name"].widget, Choice)
+    assert form.input() == {"name": "hey"}
+    assert isinstance(control_for(theme, parameter, []).widget, QLineEdit)
+
+
+def test_sentences_stand_below_their_rows_and_others_at_the_end(qtbot, theme) -> None:
+    form = ActionForm(
+        theme, action(Parameter("t", "text", "text", required=True), Parameter("s", "speed", "number", 0, 1))
+    )
+    qtbot.addWidget(form)
+    form.show()
+    form.show_problems(("do: text must not be empty", "Pepper has gone"))
+    below = form._sentences
+    assert below["t"].text() == "Must not be empty." or below["t"].text() == "Text must not be empty."
+    assert below["t"].isVisible()
+    assert not below["s"].isVisible()
+    assert form.problem.text() == "Pepper has gone."
+    form.show_problems(())
+    assert not below["t"].isVisible()
+    assert not form.problem.isVisible()
+
+
+def test_advanced_parameters_come_with_more(qtbot, theme) -> None:
+    form = ActionForm(
+        theme, action(Parameter("a", "a", "text"), Parameter("b", "b", "text", default="x", advanced=True))
+    )
+    qtbot.addWidget(form)
+    form.show()
+    widget = form.controls["b"].widget
+    assert form.controls["a"].widget.isVisible()
+    assert not widget.isVisible()
+    assert form.input()["b"] == "x"  # folded, not forgotten
+    QTest.mouseClick(form.more, Qt.MouseButton.LeftButton)
+    assert widget.isVisible()
+    assert not ActionForm(theme, action(Parameter("a", "a", "text"))).more.isVisibleTo(form)
+
+
+def test_every_control_has_an_accessible_name(qtbot, theme) -> None:
+    for described in ACTIONS:
+        form = ActionForm(theme, described)
+        qtbot.addWidget(form)
+        for parameter in described.parameters:
+            widget = form.controls[parameter.name].widget
+            names = {
+                widget.accessibleName(),
+                *(child.accessibleName() for child in widget.findChildren(QLineEdit)),
+            }
+            assert parameter.title in names
+
+
+def test_the_summary_says_the_values_in_a_few_words(qtbot, theme) -> None:
+    emotion = next(one for one in ACTIONS if one.name == "emotion")
+    form = ActionForm(theme, emotion)
+    qtbot.addWidget(form)
+    assert form.summary() == "happy, for 2 s"

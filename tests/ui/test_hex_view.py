@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+from app.ui.hex_view import HexView, hex_line
+from app.ui.theme import Theme
+
+
+def test_a_line_has_its_offset_its_bytes_and_what_can_be_read_of_them() -> None:
+    assert hex_line(memoryview(b'{"a"\x00\xff'), 0, 16) == ("0000", "7b 22 61 22 00 ff", '{"a"··')
+    assert hex_line(memoryview(bytes(range(64))), 32, 4) == ("0020", "20 21 22 23", ' !"#')
+
+
+def test_only_what_is_seen_is_painted_and_the_place_stays(qtbot, qapp) -> None:
+    view = HexView(Theme("light"))
+    qtbot.addWidget(view)
+    view.resize(600, 200)
+    view.show()
+    view.show_bytes(bytes(1_000_000))
+    assert view.per_line() == 16
+    assert view.verticalScrollBar().maximum() == 62_500 - view.verticalScrollBar().pageStep()
+    view.verticalScrollBar().setValue(30_000)
+    before = view.viewport().grab().toImage()
+    view.show_bytes(b"\xff" * 1_000_000)
+    assert view.verticalScrollBar().value() == 30_000
+    assert view.viewport().grab().toImage() != before
+
+
+def test_narrow_views_have_eight_bytes_in_a_line(qtbot, qapp) -> None:
+    view = HexView(Theme("light"))
+    qtbot.addWidget(view)
+    view.resize(330, 200)
+    view.show_bytes(bytes(20))
+    assert view.per_line() == 8
+    assert view.text().splitlines()[2].startswith("0010")

@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import pytest
+
+from app.ui.panels.alerts import PANEL, AlertsPanel
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> AlertsPanel:
+    made = window.make(PANEL, (446, 300))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, AlertsPanel)
+    return made
+
+
+def test_each_alert_with_its_next_step(panel, window) -> None:
+    assert panel.rows[0].accessibleName().startswith("error: /faces sends text that is not JSON")
+    press(panel.rows[0].button)
+    assert window.commands == ["topic.open:/faces"]
+    assert (panel.chip.text, panel.chip.status) == ("1", "error")
+
+
+def test_alerts_come_the_worst_first_and_go_when_they_are_cured(panel, window) -> None:
+    alerts = window.session.alerts
+    alerts.put("silent:/cam", "warn", "The camera has been silent for 4 s.")
+    panel.refresh()
+    assert [row.alert.severity for row in panel.rows] == ["error", "warn"]
+    assert not panel.rows[1].button.isVisibleTo(panel)
+    alerts.cure("message:/faces")
+    panel.refresh()
+    assert panel.chip.status == "warn"
+    alerts.cure("silent:/cam")
+    panel.refresh()
+    assert panel.rows == []
+    assert panel.empty.isVisible()
+    assert panel.chip.text == ""
+
+
+def test_a_dismissed_alert_stays_in_the_list(panel, window) -> None:
+    rows = list(panel.rows)
+    window.session.alerts.dismiss("message:/faces")
+    panel.refresh()
+    assert panel.rows == rows

@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QWidget
+
+from app.blocks import Problem
+from app.ui.panels.base import Panel
+from app.ui.panels.behaviour import BehaviourPanel
+from app.ui.program_view import ProgramView
+from app.ui.theme import Theme
+from tests.ui.fakes import PROGRAM, RobotLink, Session, pepper
+from tests.ui.panel_case import Window, button, press, ticks
+
+
+class Editor(QWidget):
+    """Stands for the block editor: writes down what it is told."""
+
+    changed = Signal(dict)
+    history_changed = Signal(bool, bool)
+    key_pressed = Signal(str)
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.told: list[tuple[object, ...]] = []
+        self.late: dict[str, object] = {}
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        if name.startswith("_") or name == "flush":
+            raise AttributeError(name)
+        return lambda *given: self.told.append((name, *given))
+
+    def flush(self, done: Callable[[dict[str, object]], None]) -> None:
+        done(self.late)
+
+    def last(self, name: str) -> object:
+        return next(call[1] for call in reversed(self.told) if call[0] == name)
+
+    def count(self, name: str) -> int:
+        return sum(call[0] == name for call in self.told)
+
+
+PANEL = Panel("behaviour", "Behaviour", "blocks", (), lambda context: BehaviourPanel(context, Editor))
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> BehaviourPanel:
+    made = window.make(PANEL, (1032, 600))
+    qtbot.addWidget(made)
+    assert isinstance(made, BehaviourPanel)
+    qtbot.addWidget(made.replaces_title())
+    return made
+
+
+def editor(panel: BehaviourPanel) -> Editor:
+    assert isinstance(panel.editor, Editor)
+    return panel.editor
+
+
+def test_the_editor_is_given_definitions_before_the_blocks_once(panel, window) -> None:
+    names = [call[0] for call in editor(panel).told]
+    assert names.index("set_theme") < names.index("set_definitions") < names.index("load")
+    ticks(window, panel, 10)
+    assert editor(panel).count("load") == editor(panel).count("set_definitions") == 1
+    assert editor(panel).last("load") == window.session.document.workspace
+
+
+def test_only_replacing_the_document_loads_it_anew(panel, window) -> None:
+    document = window.session.document
+    editor(panel).changed.emit({"blocks": {"blocks": [{"type": "x"}]}})
+    panel.refresh()
+    assert document.workspace == {"blocks": {"blocks": [{"type": "x"}]}}
+    assert editor(panel).count("load") == 1
+    document.workspace, document.revision = {"blocks": {}}, 1
+    document.definitions_revision = 1
+    panel.refresh()
+    assert editor(panel).last("load") == {"blocks": {}}
+    assert editor(panel).count("set_definitions") == 2
+
+
+def test_what_runs_glows_and_what_failed_says_so_on_its_block(panel, window) -> None:
+    runs = window.session.runs
+    runs.running_blocks, runs.blocks_revision = ("b1",), 1
+    panel.refresh()
+    assert editor(panel).last("highlight") == ("b1",)
+    runs.running_blocks, runs.stopped_blocks, runs.blocks_revision = (), ("b1",), 2
+    runs.block_errors = {"b2": "“turn left” needs a number."}
+    panel.refresh()
+    assert editor(panel).last("highlight") == ()
+    assert editor(panel).last("mark_stopped") == ("b1",)
+    assert editor(panel).last("set_errors") == {"b2": "“turn left” needs a number."}
+
+
+def test_blocks_of_absent_robots_are_grey(panel, window) -> None:
+    assert editor(panel).last("set_absent") == ["b8"]
+    window.session.document.found = (Problem("info", "b3", "control", "x", "x."),)
+    window.session.document.edits += 1
+    panel.refresh()
+    assert editor(panel).last("set_absent") == []
+
+
+def test_sensor_blocks_say_their_newest_value(panel, window) -> None:
+    document = window.session.document
+    document.sensors, document.edits = (("Pepper", "battery"), ("NAO", "battery")), 5
+    ticks(window, panel, 6)
+    assert editor(panel).last("set_live_values") == {"Pepper/battery": "84 %"}
+    assert window.session.fleet.looked_at == ["Pepper"]
+    document.sensors, document.edits = (), 6
+    panel.refresh()
+    assert window.session.fleet.looked_at == []
+
+
+def test_python_shows_the_newest_program_and_copies_it(panel, window) -> None:
+    editor(panel).late = {"blocks": {"blocks": [{"type": "late"}]}}
+    panel.replaces_title().show()
+    press(button(panel.replaces_title(), "Python"))
+    assert ("edited", editor(panel).late) in window.session.calls  # the last 150 ms are not missing
+    assert panel.program.toPlainText() == PROGRAM
+    assert panel.program.isReadOnly()
+    press(button(panel.replaces_title(), "Copy the program"))
+    assert QGuiApplication.clipboard().text() == PROGRAM
+    assert window.toasts == ["Copied the program"]
+    window.session.document.source, window.session.document.edits = "pass\n", 99
+    panel.refresh()
+    assert panel.program.toPlainText() == "pass\n"
+
+
+def test_undo_and_redo_are_offered_when_there_is_something(panel, window) -> None:
+    title = panel.replaces_title()
+    title.show()
+    undo, redo = button(title, "Undo"), button(title, "Redo")
+    assert not undo.isEnabled()
+    editor(panel).history_changed.emit(True, False)
+    assert (undo.isEnabled(), redo.isEnabled()) == (True, False)
+    press(undo)
+    assert editor(panel).count("undo") == 1
+
+
+def test_function_keys_in_the_page_are_the_windows_commands(panel, window) -> None:
+    for key in ("F12", "F5", "F1"):
+        editor(panel).key_pressed.emit(key)
+    assert window.commands == ["run.stop", "run.run"]
+
+
+def test_the_title_names_the_behaviour_and_says_whether_it_is_saved(panel, window) -> None:
+    tab = panel._bar.tab
+    assert tab.accessibleName() == "Greeting"
+    window.session.document.dirty = True
+    panel.refresh()
+    assert tab.accessibleName() == "Greeting, not saved"
+
+
+def test_a_change_of_theme_reaches_the_page(panel, window) -> None:
+    window.theme.set_mode("dark")
+    assert [call for call in editor(panel).told if call[0] == "set_theme"][-1][2] is True
+
+
+def test_over_an_empty_workspace_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
+    window = Window(Session())
+    panel = window.make(PANEL, (1032, 600))
+    qtbot.addWidget(panel)
+    assert isinstance(panel, BehaviourPanel)
+    qtbot.addWidget(panel.replaces_title())
+    assert panel.empty.isVisible()
+    assert panel.empty.x() > 196  # beside the toolbox, which stays in reach
+    press(button(panel.empty, "Use the virtual robot"))
+    assert window.commands == ["robots.virtual"]
+    window.session.fleet.join(RobotLink("Pepper", pepper()))
+    panel.refresh()
+    assert not panel.empty.isVisible()
+
+
+def test_the_first_block_takes_the_offer_away(qtbot, qapp) -> None:
+    window = Window(Session())
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, BehaviourPanel)
+    qtbot.addWidget(panel.replaces_title())
+    editor(panel).changed.emit({"blocks": {"blocks": [{"type": "events_started"}]}})
+    panel.refresh()
+    assert not panel.empty.isVisible()
+
+
+def test_showing_a_block_comes_back_from_python(panel) -> None:
+    panel.restore_state({"mode": "python"})
+    assert panel.save_state() == {"mode": "python"}
+    panel.show_block("b3")
+    assert panel.mode == "blocks"
+    assert editor(panel).last("show_block") == "b3"
+
+
+def test_the_program_is_coloured(qtbot, qapp) -> None:
+    view = ProgramView(Theme("light"))
+    qtbot.addWidget(view)
+    view.show_program(PROGRAM)
+    block = view.document().findBlockByNumber(view.line_with("# Say hello") - 1)
+    colours = [one.format.foreground().color().name() for one in block.layout().formats()]
+    assert colours == [Theme("light").colour("textTertiary").name()]  # nothing inside a comment
+    block = view.document().findBlockByNumber(view.line_with("for _ in range(3)") - 1)
+    assert len(block.layout().formats()) == 3  # for, in, 3

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.blocks import Problem
+from app.ui.panels.problems import PANEL, ProblemsPanel
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, press
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> ProblemsPanel:
+    made = window.make(PANEL, (900, 124))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, ProblemsPanel)
+    return made
+
+
+def test_each_problem_with_its_sentence_and_what_mends_it(panel, window) -> None:
+    assert [row.problem.subject for row in panel.rows] == ["wave", "wait until"]
+    assert panel.rows[0].accessibleName() == "warning: NAO is not connected, so wave will be skipped."
+    assert (panel.chip.text, panel.chip.status) == ("2", "warn")
+    press(panel.rows[1].button)
+    assert window.commands == ["add_time_limit"]
+
+
+def test_a_press_or_return_shows_the_block(panel, window) -> None:
+    QTest.mouseClick(panel.rows[0], Qt.MouseButton.LeftButton, pos=QPoint(200, 15))
+    QTest.keyClick(panel.rows[1], Qt.Key.Key_Return)
+    assert window.commands == ["block:b8", "block:b3"]
+
+
+def test_it_is_checked_only_when_the_behaviour_changed(panel, window) -> None:
+    rows = list(panel.rows)
+    document = window.session.document
+    panel.refresh()
+    document.edits += 1
+    panel.refresh()
+    assert panel.rows == rows  # the same problems: the same rows
+    document.found = (Problem("error", None, None, "x", "x is not known."), *document.found)
+    panel.refresh()
+    assert len(panel.rows) == 2  # nothing was edited
+    document.edits += 1
+    panel.refresh()
+    assert len(panel.rows) == 3
+    assert panel.chip.status == "error"
+    assert not panel.rows[0].button.isVisibleTo(panel)
+
+
+def test_with_nothing_to_mend_it_says_so(qtbot, qapp) -> None:
+    window = Window(Session())
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    for widget in panel.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(panel, ProblemsPanel)
+    assert panel.nothing.isVisible()
+    assert (panel.chip.text, panel.chip.status) == ("none", "ok")

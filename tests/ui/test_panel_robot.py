@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.ui.panels.robot import PANEL, RobotPanel
+from tests.ui.fakes import RobotLink, Session, drawing, pepper
+from tests.ui.panel_case import Window, button, press
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> RobotPanel:
+    made = window.make(PANEL, (384, 288))
+    qtbot.addWidget(made)
+    for widget in made.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(made, RobotPanel)
+    return made
+
+
+def point(panel: RobotPanel, part: str):
+    place = panel.view.place_of(part)
+    assert place is not None
+    return place.toPoint()
+
+
+def test_it_is_drawn_from_its_state_with_its_name_and_its_chip(panel, window) -> None:
+    assert (panel.title(), panel.chip.text, panel.chip.status) == ("Pepper", "virtual, ready", "ok")
+    before = panel.view.grab().toImage()
+    link = window.session.fleet.links[0]
+    link.drawing = drawing(theta_deg=90.0)
+    link.state, link.chip = "silent", "virtual, silent for 4 s"
+    panel.refresh()
+    assert panel.view.grab().toImage() != before
+    assert panel.chip.status == "warn"
+    assert window.session.fleet.looked_at == ["Pepper"]
+
+
+def test_the_same_state_is_not_painted_again(panel, window, monkeypatch) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr(panel.view, "update", lambda: asked.append(1))
+    link = window.session.fleet.links[0]
+    link.drawing = dict(link.drawing)  # another message that says the same
+    panel.refresh()
+    assert asked == []
+    link.drawing = drawing(x=1.0)
+    panel.refresh()
+    assert asked == [1]
+
+
+@pytest.mark.parametrize("part", ["head", "left_hand", "right_hand"])
+def test_pressing_a_part_touches_it_and_letting_go_ends_it(panel, window, part) -> None:
+    QTest.mousePress(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
+    assert window.session.calls == [("world", "Pepper", {"touch": part, "down": True})]
+    QTest.mouseRelease(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
+    assert window.session.calls[1:] == [("world", "Pepper", {"touch": part, "down": False})]
+
+
+def test_the_keyboard_can_touch_it_too(panel, window) -> None:
+    QTest.keyPress(panel.view, Qt.Key.Key_H)
+    QTest.keyRelease(panel.view, Qt.Key.Key_H)
+    assert [call[2]["down"] for call in window.session.calls] == [True, False]
+
+
+def test_the_ball_is_dragged_over_the_floor(panel, window) -> None:
+    start = point(panel, "ball")
+    QTest.mousePress(panel.view, Qt.MouseButton.LeftButton, pos=start)
+    end = start + (point(panel, "head") - start) * 0.2
+    end.setY(start.y() + 8)
+    QTest.mouseMove(panel.view, end)
+    QTest.mouseRelease(panel.view, Qt.MouseButton.LeftButton, pos=end)
+    moves = [call[2] for call in window.session.calls]
+    assert moves
+    assert moves[-1]["move"] == "ball"
+    assert moves[-1]["y"] > -1.65  # to the right
+    assert -3 <= moves[-1]["x"] <= 3
+
+
+def test_a_press_beside_everything_does_nothing(panel, window) -> None:
+    QTest.mouseClick(panel.view, Qt.MouseButton.LeftButton, pos=panel.view.rect().topLeft())
+    assert window.session.calls == []
+
+
+def test_reset_puts_everything_back(panel, window) -> None:
+    panel.reset.show()
+    press(panel.reset)
+    assert window.session.calls == [("world", "Pepper", {"reset": True})]
+
+
+def test_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
+    window = Window(Session())
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    press(button(panel, "Use the virtual robot"))
+    assert window.commands == ["robots.virtual"]
+    window.session.fleet.join(RobotLink("Ada", pepper("Ada")))
+    panel.refresh()
+    assert panel.title() == "Ada"
+
+
+def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> None:
+    window = Window(Session())
+    window.session.fleet.join(RobotLink("Turtle", pepper("Turtle"), virtual=False))
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, RobotPanel)
+    assert not panel.reset.isVisibleTo(panel)
+    press(button(panel, "Show its actions"))
+    assert window.commands == ["panel.robots"]
+    panel.shut()
+    assert window.session.fleet.looked_at == []

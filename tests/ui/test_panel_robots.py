@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit
+
+from app.robots.parts import Field
+from app.ui.action_card import feedback_words
+from app.ui.panels.robots import PANEL, RobotsPanel
+from tests.ui.fakes import ACTIONS, Invocation, RobotLink, Session, pepper
+from tests.ui.panel_case import Window, button, press
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> RobotsPanel:
+    made = window.make(PANEL, (1032, 800))
+    qtbot.addWidget(made)
+    assert isinstance(made, RobotsPanel)
+    return made
+
+
+def test_every_action_but_the_stop_is_a_card(panel) -> None:
+    assert list(panel.cards) == [action.name for action in ACTIONS if action.name != "stop"]
+    assert (panel.name.text(), panel.chip.text, panel.about.text()) == (
+        "Pepper",
+        "ready",
+        "virtual, 6 actions",
+    )
+    assert panel.cards["walk"].risk.text == "moves the robot"
+
+
+def test_trying_sends_what_the_form_says(panel, window) -> None:
+    panel.cards["turn"].form.set_input({"angle": -45.0})
+    press(panel.cards["turn"].try_button)
+    assert window.session.calls == [("invoke", "Pepper", "turn", {"angle": -45.0, "speed": 40.0})]
+
+
+def test_a_refused_input_stands_below_its_row(panel, window) -> None:
+    card = panel.cards["say"]
+    field = card.findChild(QLineEdit)
+    assert field is not None
+    field.clear()
+    press(card.try_button)
+    assert "not be empty" in card.form._sentences["text"].text()
+    assert field.property("wrong") == "true"
+    assert window.session.fleet.links[0].invocations == {}
+
+
+@pytest.mark.parametrize(
+    ("state", "error", "chip", "status", "sentence"),
+    [
+        ("succeeded", None, "done in 1.4 s", "ok", ""),
+        ("canceled", None, "stopped after 1.4 s", "off", ""),
+        ("failed", "the way is blocked", "not done", "error", "The way is blocked."),
+        ("failed", None, "not done", "error", "The robot did not say why."),
+    ],
+)
+def test_how_it_ended_is_said(panel, window, state, error, chip, status, sentence) -> None:
+    link = window.session.fleet.links[0]
+    link.invocations["turn"] = Invocation("1", "turn", state, error=error, elapsed_s=1.4)
+    panel.refresh()
+    card = panel.cards["turn"]
+    assert (card.result.text, card.result.status, card.error.text()) == (chip, status, sentence)
+    assert card.try_button.text() == "Try"
+
+
+def test_while_it_runs_it_shows_its_progress_and_can_be_cancelled(panel, window) -> None:
+    link = window.session.fleet.links[0]
+    made = link.invocations["walk"] = Invocation("1", "walk", "running", {"progress": 0.4}, elapsed_s=0.6)
+    panel.refresh()
+    card = panel.cards["walk"]
+    assert card.progress.isVisible()
+    assert card.progress.fraction == pytest.approx(0.4)
+    assert card.words.text() == "for 0.6 s"
+    press(card.try_button)
+    assert window.session.calls == [("cancel", "Pepper", "walk")]
+    made.state = "canceled"
+    panel.refresh()
+    assert not card.progress.isVisible()
+    assert card.words.text() == ""
+
+
+def test_what_cannot_be_cancelled_waits_for_its_end(panel, window) -> None:
+    window.session.fleet.links[0].invocations["light"] = Invocation("1", "light", "running")
+    panel.refresh()
+    assert not panel.cards["light"].try_button.isEnabled()
+
+
+def test_feedback_is_said_in_the_words_of_the_description() -> None:
+    walk = next(action for action in ACTIONS if action.name == "walk")
+    described = replace(walk, feedback=(Field("moved", "moved", "number", "m"),))
+    assert feedback_words(described, {"moved": 0.2, "progress": 0.5, "other": 1}) == "moved 0.20 m"
+
+
+def test_one_try_is_filled_the_one_with_the_focus(qtbot, panel) -> None:
+    kinds = {name: card.try_button.kind for name, card in panel.cards.items()}
+    assert [name for name, kind in kinds.items() if kind == "primary"] == ["say"]
+    panel.activateWindow()
+    panel.cards["turn"].try_button.setFocus(Qt.FocusReason.TabFocusReason)
+    qtbot.waitUntil(lambda: panel.cards["turn"].try_button.kind == "primary")
+    assert panel.cards["say"].try_button.kind == "plain"
+
+
+def test_finding_an_action(panel) -> None:
+    QTest.keyClicks(panel.finder, "lights")  # the category of two
+    assert [name for name, card in panel.cards.items() if card.isVisibleTo(panel)] == ["light", "emotion"]
+    panel.finder.setText("fly")
+    assert panel.none.isVisible()
+
+
+def test_later_cards_are_folded_and_say_their_values(panel) -> None:
+    card = panel.cards["emotion"]
+    assert not card.form.isVisibleTo(card)
+    assert card.summary.text() == "happy, for 2 s"
+    press(card.fold)
+    assert card.form.isVisibleTo(card)
+
+
+def test_stop_is_the_windows_stop(panel, window) -> None:
+    press(panel.stop)
+    assert window.commands == ["run.stop"]
+
+
+def test_another_robot_can_be_chosen_and_only_it_is_looked_at(panel, window) -> None:
+    window.session.fleet.join(RobotLink("Turtle", pepper("Turtle"), virtual=False, state="busy"))
+    panel.refresh()
+    press(panel.items["Turtle"])
+    assert panel.name.text() == "Turtle"
+    assert window.session.fleet.looked_at == ["Turtle"]
+    panel.refresh()
+    assert panel.items["Turtle"].chip.text == "busy"
+    panel.shut()
+    assert window.session.fleet.looked_at == []
+
+
+def test_forms_keep_what_was_typed_while_other_robots_come(panel, window) -> None:
+    panel.cards["say"].form.set_input({"text": "half a sentence"})
+    window.session.fleet.join(RobotLink("Turtle", pepper("Turtle")))
+    panel.refresh()
+    assert panel.cards["say"].form.input()["text"] == "half a sentence"
+
+
+def test_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
+    window = Window(Session())
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    press(button(panel, "Use the virtual robot"))
+    assert window.commands == ["robots.virtual"]

@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import pytest
+
+from app.robots.inputs import Choice
+from app.robots.parts import Field, Sensor
+from app.ui.panels import sensors
+from app.ui.panels.sensors import PANEL, SensorsPanel
+from app.ui.sensor_words import Reading, number_words, reading_of
+from tests.ui.fakes import RobotLink, Session, pepper
+from tests.ui.panel_case import Window
+
+POSE = Sensor("pose", "position", "object", "/p", fields=(
+    Field("x", "x", "number", "m"), Field("y", "y", "number", "m"), Field("theta", "facing", "number", "°")))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("sensor", "value", "reading"),
+    [
+        (Sensor("t", "touch", "boolean", "/t"), True, Reading("yes")),
+        (Sensor("t", "touch", "boolean", "/t"), False, Reading("no")),
+        (Sensor("t", "touch", "boolean", "/t"), None, Reading()),
+        (Sensor("d", "d", "number", "/d", "m", 0, 2), 0.82, Reading("0.82 m", share=0.41)),
+        (Sensor("d", "d", "number", "/d", "m", 0, 2), 7.0, Reading("7 m", share=1.0)),
+        (Sensor("d", "d", "number", "/d", "dB"), 34.04, Reading("34.0 dB")),
+        (Sensor("b", "b", "integer", "/b", "%", 0, 100), 84, Reading("84 %", share=0.84)),
+        (Sensor("w", "word", "text", "/w"), "hello", Reading("“hello”")),
+        (Sensor("w", "word", "text", "/w"), "", Reading("")),
+        (Sensor("c", "c", "choice", "/c", choices=(Choice("en", "English"),)), "en", Reading("English")),
+        (POSE, {"x": 1.284, "y": -0.307, "theta": 31.2}, Reading("1.3, \u22120.3 m", "facing 31°")),
+        (POSE, {}, Reading("", "")),
+        (Sensor("f", "faces", "detections", "/f"), {"count": 1, "name": "Aiko", "items": []}, Reading("1", "Aiko")),
+        (Sensor("f", "faces", "detections", "/f"), {"items": [{"name": "a"}, {"name": "b"}]}, Reading("2", "a, b")),
+        (Sensor("l", "list", "list", "/l"), ["x", "y"], Reading("2", "x, y")),
+    ],
+)  # fmt: skip
+def test_a_sensor_in_words(sensor: Sensor, value: object, reading: Reading) -> None:
+    found = reading_of(sensor, value)
+    assert (found.value, found.beside) == (reading.value, reading.beside)
+    assert found.share == (pytest.approx(reading.share) if reading.share is not None else None)
+
+
+def test_numbers_have_as_many_decimals_as_matter() -> None:
+    assert [number_words(value, "m") for value in (1.0, -0.3, 12.34, 123.4)] == [
+        "1 m",
+        "\u22120.30 m",
+        "12.3 m",
+        "123 m",
+    ]
+    assert number_words(31, "°") == "31°"
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+def test_one_row_for_each_sensor_but_pictures(qtbot, window) -> None:
+    panel = window.make(PANEL, (384, 300))
+    qtbot.addWidget(panel)
+    assert isinstance(panel, SensorsPanel)
+    shown = {row.title: row.reading.value for row in panel.rows}
+    assert "Camera" not in shown
+    assert shown["Head touch"] == "no"
+    assert shown["Distance"] == "0.82 m"
+    assert shown["Position"] == "1.3, \u22120.3 m"
+    assert window.session.fleet.looked_at == ["Pepper"]
+    panel.shut()
+    assert window.session.fleet.looked_at == []
+
+
+def test_values_follow_and_the_last_yes_is_remembered(qtbot, window, monkeypatch) -> None:
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, SensorsPanel)
+    now = [100.0]
+    monkeypatch.setattr(sensors.time, "monotonic", lambda: now[0])
+    values = window.session.fleet.links[0].values
+    touch = panel.rows[0]
+    values["head_touched"] = True
+    panel.refresh()
+    assert touch.reading == Reading("yes")
+    values["head_touched"] = False
+    now[0] = 114.3
+    panel.refresh()
+    assert touch.reading == Reading("no", "14 s ago")
+    assert touch.accessibleDescription() == "no 14 s ago"
+
+
+def test_the_rows_are_painted_otherwise_when_values_differ(qtbot, window) -> None:
+    panel = window.make(PANEL, (384, 300))
+    qtbot.addWidget(panel)
+    before = panel.grab().toImage()
+    window.session.fleet.links[0].values["battery"] = 12
+    panel.refresh()
+    assert panel.grab().toImage() != before
+
+
+def test_with_no_robot_it_says_so_and_another_description_makes_other_rows(qtbot, qapp) -> None:
+    window = Window(Session())
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, SensorsPanel)
+    assert panel.empty.isVisible()
+    link = window.session.fleet.join(RobotLink("Pepper", pepper()))
+    panel.refresh()
+    count = len(panel.rows)
+    link.robot = type(link.robot)(**{**vars(link.robot), "sensors": link.robot.sensors[:2]})
+    window.session.fleet.revision += 1
+    panel.refresh()
+    assert (count, len(panel.rows)) == (8, 2)
+    assert window.session.fleet.looked_at == ["Pepper"]

@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QSignalSpy, QTest
+
+from app.ui.panels.topics import PANEL, TopicsPanel, age_cell, loss_cell, name_cell
+from app.ui.table import CELL_ROLE
+from tests.ui.fakes import Session, Topic
+from tests.ui.panel_case import Window, button, press, ticks
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(qtbot, window) -> TopicsPanel:
+    made = window.make(PANEL)
+    qtbot.addWidget(made)
+    for widget in made.header:
+        qtbot.addWidget(widget)
+    assert isinstance(made, TopicsPanel)
+    return made
+
+
+def row(panel: TopicsPanel, name: str) -> list[str]:
+    place = panel.model.index_of(name).row()
+    return [panel.model.data(panel.model.index(place, column)) for column in range(7)]  # type: ignore[misc]
+
+
+def test_every_topic_with_its_figures(panel) -> None:
+    assert panel.model.rowCount() == 13
+    assert row(panel, "/robot/depth") == ["/robot/depth", "image", "1", "60.0", "5.1 MB/s", "21 ms", "0.4 %"]
+    assert row(panel, "/speech/words")[:5] == ["/speech/words", "string", "2", "0.2", "14 B/s"]
+    assert row(panel, "/lidar/scan") == ["/lidar/scan", "bytes", "0", "", "", "gone 4 s", ""]
+    assert panel.count.text() == "13 topics, 7 nodes"
+
+
+def test_nothing_is_subscribed(panel, window) -> None:
+    ticks(window, panel, 10)
+    assert window.session.watched == []
+
+
+def test_what_is_not_known_is_blank(panel, window) -> None:
+    window.session.topics.put(Topic("/x", rate_hz=None, lost=None))
+    panel.refresh()
+    assert row(panel, "/x") == ["/x", "json", "1", "", "", "", ""]
+
+
+def test_new_ones_are_bold_until_somebody_looks(panel, window) -> None:
+    index = panel.model.index_of("/speech/words")
+    cell = panel.model.data(index, CELL_ROLE)
+    assert (cell.bold, cell.chip) == (True, "new")
+    panel.table.opened.emit("/speech/words")
+    panel.refresh()
+    cell = panel.model.data(panel.model.index_of("/speech/words"), CELL_ROLE)
+    assert (cell.bold, cell.chip) == (False, None)
+    assert window.opened == ["/speech/words"]
+
+
+def test_vanished_ones_are_struck_through_and_say_since_when() -> None:
+    gone = Topic("/x", gone_s=4.7, new=True)
+    assert name_cell(gone).struck
+    assert name_cell(gone).chip is None
+    assert age_cell(gone).text == "gone 4 s"
+    assert loss_cell(gone).text == ""
+    assert loss_cell(Topic("/y", lost=3, loss_ratio=None)).text == "3"
+
+
+def test_the_filter_is_reached_by_the_slash_and_finds_names_types_and_nodes(qtbot, panel, window) -> None:
+    panel.filter.show()
+    QTest.keyClicks(panel.table, "/")
+    panel.filter.setText("IMAGE depth")
+    assert panel.model.rowCount() == 1
+    assert panel.count.text() == "1 of 13 topics, 7 nodes"
+    panel.filter.setText("pepper_driver")
+    assert panel.model.rowCount() == 13
+    panel.filter.setText("nothing like this")
+    assert panel.model.rowCount() == 0
+    press(button(panel.empty, "Clear the filter"))
+    assert panel.model.rowCount() == 13
+
+
+def test_sorting_keeps_the_chosen_topic_and_figures_that_move_are_sorted_once_a_second(panel, window) -> None:
+    panel.show_topic("/odom")
+    panel.table.horizontalHeader().sectionClicked.emit(3)  # rate: the largest first
+    assert panel.model.data(panel.model.index(0, 0)) == "/robot/depth"
+    assert panel.table.chosen_key() == "/odom"
+    moved = QSignalSpy(panel.model.layoutChanged)
+    window.session.topics["/touch"].rate_hz = 500.0
+    ticks(window, panel, 28)
+    assert moved.count() == 0
+    ticks(window, panel, 1)
+    assert moved.count() == 1
+    assert panel.model.data(panel.model.index(0, 0)) == "/touch"
+
+
+def test_ten_thousand_topics_cost_one_signal_over_the_visible_rows_each_third_tick(qtbot, qapp) -> None:
+    window = Window(Session())
+    for number in range(10_000):
+        window.session.topics.put(Topic(f"/t{number:05}", rate_hz=10.0, age_s=0.1))
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, TopicsPanel)
+    told, moved = QSignalSpy(panel.model.dataChanged), QSignalSpy(panel.model.layoutChanged)
+    inserted = QSignalSpy(panel.model.rowsInserted)
+    ticks(window, panel, 30)
+    assert told.count() == 10
+    assert moved.count() == inserted.count() == 0
+    rows = {(told.at(place)[0].row(), told.at(place)[1].row()) for place in range(10)}
+    assert len(rows) == 1
+    first, last = rows.pop()
+    assert last - first < 30
+
+
+def test_enter_opens_and_the_arrows_move(panel, window) -> None:
+    panel.table.setFocus(Qt.FocusReason.TabFocusReason)
+    panel.table.choose("/odom")
+    QTest.keyClick(panel.table, Qt.Key.Key_Down)
+    QTest.keyClick(panel.table, Qt.Key.Key_Return)
+    assert window.opened == ["/joint_states"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "pressed", "call"),
+    [
+        ("none", "No master is running", "Start a master here", ("ensure_master",)),
+        ("connected", "No topics yet", "Use the virtual robot", "robots.virtual"),
+        ("searching", "Looking for a master", None, None),
+    ],
+)
+def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed, call) -> None:
+    window = Window(Session())
+    window.session.master.kind = kind
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, TopicsPanel)
+    assert panel.empty.isVisible()
+    assert panel.empty._title.text() == words
+    if pressed is not None:
+        press(button(panel.empty, pressed))
+        assert call in window.session.calls + window.commands
+
+
+def test_the_order_comes_back_with_the_layout(qtbot, panel, window) -> None:
+    panel.table.horizontalHeader().sectionClicked.emit(5)
+    again = window.make(PANEL)
+    qtbot.addWidget(again)
+    again.restore_state(panel.save_state())
+    assert isinstance(again, TopicsPanel)
+    assert again.table.order.column is panel.table.order.column
+    again.restore_state({"sort": "nonsense"})
+    assert again.table.order.column is None

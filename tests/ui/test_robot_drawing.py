@@ -1,0 +1,133 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtGui import QColor, QImage, QPainter
+
+from app.ui.robot_drawing import PREVIEW, RobotDrawing
+from app.ui.robot_face import EMOTIONS
+from app.ui.robot_room import Stage
+from app.ui.robot_state import RobotState, Room, Thing
+from tests.ui.fakes import drawing
+
+AREA = QRectF(0, 0, 382, 286)
+
+
+def painted(state: RobotState, area: QRectF = AREA, *, dark: bool = False) -> QImage:
+    image = QImage(area.size().toSize(), QImage.Format.Format_RGB32)
+    image.fill(QColor("magenta"))
+    painter = QPainter(image)
+    RobotDrawing().paint(painter, area, state, dark=dark)
+    painter.end()
+    return image
+
+
+def differing(first: QImage, second: QImage) -> int:
+    """How many of every third pixel differ."""
+    return sum(
+        first.pixel(x, y) != second.pixel(x, y)
+        for x in range(0, first.width(), 3)
+        for y in range(0, first.height(), 3)
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"x": 1.5}, {"y": 1.0}, {"theta_deg": 30.0}, {"theta_deg": 90.0}, {"theta_deg": 180.0},
+        {"head_yaw_deg": 40.0}, {"head_pitch_deg": 20.0}, {"speech": "Hello"}, {"eyes": "#ff0000"},
+        {"shoulders": "#00ff00"}, {"arm_left_deg": 90.0}, {"arm_right_deg": 180.0}, {"moving": True},
+        {"touched": ("head",)}, {"objects": (Thing("ball", 0, 1),)}, {"objects": (Thing("person", -2, 1, "Aiko"),)},
+        {"objects": (Thing("person", 2, 0, "Aiko"),)}, {"objects": (Thing("marker", -2, 1),)},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_each_part_of_the_state_is_seen(qapp, change) -> None:
+    plain = RobotState()
+    assert differing(painted(plain), painted(replace(plain, **change))) > 0
+
+
+def test_each_emotion_has_its_own_face(qapp) -> None:
+    faces = {}
+    for emotion in ("neutral", "happy", "sad", "surprised", "angry", "thinking", "sleepy"):
+        assert emotion in EMOTIONS
+        image = painted(RobotState(emotion=emotion))
+        faces[emotion] = bytes(image.constBits())
+    assert len(set(faces.values())) == len(faces)
+    assert painted(RobotState(emotion="a word nobody knows")) == painted(RobotState())
+
+
+def test_the_same_state_is_the_same_picture(qapp) -> None:
+    assert painted(PREVIEW) == painted(PREVIEW)
+
+
+@pytest.mark.parametrize("size", [(382, 286), (900, 200), (200, 700), (40, 30)])
+def test_it_fills_any_area(qapp, size) -> None:
+    image = painted(PREVIEW, QRectF(0, 0, *size))
+    corners = [(0, 0), (size[0] - 1, 0), (0, size[1] - 1), (size[0] - 1, size[1] - 1)]
+    assert all(image.pixelColor(x, y) != QColor("magenta") for x, y in corners)
+
+
+def test_it_is_dimmed_in_a_dark_theme(qapp) -> None:
+    light, dark = painted(PREVIEW), painted(PREVIEW, dark=True)
+    assert dark.pixelColor(5, 5).lightness() < light.pixelColor(5, 5).lightness()
+
+
+def test_the_robot_turns_to_its_left_which_is_the_persons_right(qapp) -> None:
+    """The eyes' colour wanders with the heading, and is hidden from behind."""
+
+    def eyes(theta_deg: float) -> list[int]:
+        image = painted(RobotState(theta_deg=theta_deg, eyes="#ff00ff", shoulders="#ffffff"))
+        return [
+            x
+            for x in range(image.width())
+            for y in range(image.height())
+            if image.pixelColor(x, y) == QColor("#ff00ff")
+        ]
+
+    front, left, right = eyes(0), eyes(40), eyes(-40)
+    assert sum(left) / len(left) > sum(front) / len(front) > sum(right) / len(right)
+    assert eyes(180) == []
+
+
+@pytest.mark.parametrize("part", ["head", "left_hand", "right_hand", "ball"])
+@pytest.mark.parametrize("size", [(382, 286), (700, 300)])
+def test_parts_are_found_where_they_are_drawn(qapp, part, size) -> None:
+    area, pen = QRectF(0, 0, *size), RobotDrawing()
+    state = replace(PREVIEW, arm_left_deg=100.0)
+    place = pen.place_of(part, area, state)
+    assert place is not None
+    assert pen.part_at(place, area, state) == part
+    assert pen.part_at(QPointF(2, 2), area, state) is None
+    assert pen.place_of("nobody", area, state) is None
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (-2.0, 1.5), (2.4, -2.0), (1.2, 0.3)])
+def test_the_floor_is_found_again(place) -> None:
+    stage = Stage(AREA, Room())
+    spot = stage.spot(*place)
+    x, y = stage.floor(stage.origin + QPointF(spot.u, spot.v) * stage.scale)
+    assert (x, y) == (pytest.approx(place[0]), pytest.approx(place[1]))
+
+
+def test_what_is_nearer_is_lower_and_larger() -> None:
+    stage = Stage(AREA, Room())
+    far, near = stage.spot(-2, 0), stage.spot(2, 0)
+    assert near.v > far.v
+    assert near.scale > far.scale
+    assert stage.spot(0, 2).u > stage.spot(0, -2).u
+
+
+def test_a_message_becomes_a_state_and_damaged_parts_keep_their_defaults() -> None:
+    state = RobotState.parse(drawing(x=1.5, touched=["head"], speech="  "))
+    assert (state.x, state.touched, state.speech) == (1.5, ("head",), None)
+    assert state.objects[0].kind == "ball"
+    assert state.room == Room(-3, 3, -2.5, 2.5)
+    broken = RobotState.parse(
+        {"x": "far", "eyes": "blue", "objects": "none", "room": {"width": 0}, "emotion": None}
+    )
+    assert broken == RobotState()
+    room = RobotState.parse({"room": {"x_min": -1, "x_max": 3, "y_min": -2, "y_max": 2}}).room
+    assert room == Room(-1, 3, -2, 2)

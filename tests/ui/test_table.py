@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+from PySide6.QtCore import QModelIndex, QPoint, Qt
+from PySide6.QtTest import QSignalSpy, QTest
+
+from app.ui.table import CELL_ROLE, Cell, Column, Order, TableModel
+from app.ui.table_view import TableView
+from app.ui.theme import Theme
+
+
+@dataclass
+class Row:
+    name: str
+    rate: float | None = None
+
+
+COLUMNS = (
+    Column("name", "Name", 100, lambda row: Cell(row.name, mono=True), lambda row: row.name, stretch=True),
+    Column("rate", "Rate", 60, lambda row: Cell("" if row.rate is None else f"{row.rate:.1f}"),
+           lambda row: row.rate, figures=True, tip=lambda row: f"{row.rate} a second"),
+)  # fmt: skip
+
+
+@pytest.fixture
+def model() -> TableModel[Row]:
+    made: TableModel[Row] = TableModel(COLUMNS, lambda row: row.name)
+    made.set_rows([Row("b", 2.0), Row("a", 1.0), Row("c")])
+    return made
+
+
+def names(model: TableModel[Row]) -> list[str]:
+    return [model.data(model.index(row, 0)) for row in range(model.rowCount())]  # type: ignore[misc]
+
+
+def test_the_model_keeps_all_of_qts_rules_while_rows_come_go_and_move(qtmodeltester, model) -> None:
+    qtmodeltester.check(model)
+    for wanted in (["c", "a", "d", "b"], ["a"], [], ["x", "y", "z"], ["z", "y", "x"], ["y", "q"]):
+        model.set_rows([Row(name) for name in wanted])
+        assert names(model) == wanted
+        qtmodeltester.check(model)
+
+
+def test_many_removed_rows_at_once_are_one_reset(qtbot, model) -> None:
+    model.set_rows([Row(f"{number:05}") for number in range(2000)])
+    removed = QSignalSpy(model.rowsRemoved)
+    with qtbot.waitSignal(model.modelReset):
+        model.set_rows([Row(f"{number:05}") for number in range(0, 2000, 2)])
+    assert removed.count() == 0
+    assert model.rowCount() == 1000
+
+
+def test_a_cell_tells_what_a_delegate_a_tooltip_and_a_screen_reader_need(model) -> None:
+    rate = model.index(0, 1)
+    assert model.data(rate) == "2.0"
+    assert model.data(rate, CELL_ROLE) == Cell("2.0")
+    assert model.data(rate, Qt.ItemDataRole.ToolTipRole) == "2.0 a second"
+    assert model.data(rate, Qt.ItemDataRole.AccessibleTextRole) == "Rate, 2.0"
+    assert model.data(QModelIndex()) is None
+    assert int(model.data(rate, Qt.ItemDataRole.TextAlignmentRole)) & int(Qt.AlignmentFlag.AlignRight)
+
+
+def test_what_is_not_known_is_sorted_last_in_both_directions() -> None:
+    rows = [Row("none"), Row("two", 2.0), Row("one", 1.0)]
+    rising, falling = Order(COLUMNS[1]), Order(COLUMNS[1], falling=True)
+    assert [row.name for row in rising.sort(rows)] == ["one", "two", "none"]
+    assert [row.name for row in falling.sort(rows)] == ["two", "one", "none"]
+    assert [row.name for row in Order().sort(rows)] == ["none", "two", "one"]
+
+
+@pytest.fixture
+def view(qtbot, model) -> TableView[Row]:
+    made: TableView[Row] = TableView(Theme("light"), model)
+    qtbot.addWidget(made)
+    made.resize(300, 200)
+    made.show()
+    return made
+
+
+def test_the_chosen_row_stays_chosen_when_others_come_and_the_order_changes(view, model) -> None:
+    view.choose("a")
+    model.set_rows([Row("0"), Row("b"), Row("a"), Row("c")])
+    assert view.chosen_key() == "a"
+    model.set_rows([Row("c"), Row("b"), Row("a")])
+    assert view.chosen_key() == "a"
+
+
+def test_a_press_and_return_open_a_row_and_the_slash_asks_for_the_filter(qtbot, view) -> None:
+    opened: list[str] = []
+    view.opened.connect(opened.append)
+    QTest.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(40, 26 + 13))
+    QTest.keyClick(view, Qt.Key.Key_Down)
+    QTest.keyClick(view, Qt.Key.Key_Return)
+    assert opened == ["a", "c"]
+    with qtbot.waitSignal(view.filter_wanted):
+        QTest.keyClicks(view, "/")
+
+
+def test_pressing_a_head_sorts_and_pressing_it_again_turns_the_order(qtbot, view) -> None:
+    with qtbot.waitSignal(view.order_changed):
+        view.horizontalHeader().sectionClicked.emit(1)
+    assert (view.order.column, view.order.falling) == (COLUMNS[1], True)  # figures: the largest first
+    view.horizontalHeader().sectionClicked.emit(1)
+    assert view.order.falling is False
+
+
+def test_only_rows_that_can_be_seen_are_told_with_one_signal(qapp, view, model) -> None:
+    model.set_rows([Row(f"{number:05}", 1.0) for number in range(10_000)])
+    qapp.processEvents()  # the view lays out its rows
+    told = QSignalSpy(model.dataChanged)
+    view.scrollTo(model.index(5000, 0))
+    view.tell_visible_changed()
+    assert told.count() == 1
+    first, last = told.at(0)[0], told.at(0)[1]
+    assert 4990 <= first.row() <= last.row() <= 5020
+
+
+def test_the_stretching_column_takes_what_is_left(view) -> None:
+    assert view.columnWidth(0) == view.viewport().width() - view.columnWidth(1)
+    view.resize(150, 200)
+    assert view.columnWidth(0) == 100  # never narrower than its own width
+
+
+def test_row_height_follows_the_density(view) -> None:
+    view.set_row_height(36, large=True)
+    assert view.rowHeight(0) == 36
+    assert view.cell_font(Cell("x")).pixelSize() == 14
