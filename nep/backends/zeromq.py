@@ -59,11 +59,12 @@ class ZeromqCarrier:
             return self._direct_publisher(spec, spec.configuration)
         link = self._link(spec.configuration.master)
         socket = self._xpub()
-        with _closed_on_error(socket):
-            endpoint = bind_free_port(socket, host_towards(link.address))
+        # Made before the socket is bound: what it sets applies to connections of later binds only.
         outlet = NativeOutlet(
             socket, spec, self._outlet_closer(lambda: link.remove_publisher(spec.id, outlet.count))
         )
+        with _closed_on_error(socket):
+            endpoint = bind_free_port(socket, host_towards(link.address))
         self._hold(outlet)
         record = PublisherRecord(
             spec.id, spec.topic, spec.msg_type, spec.codec.name, (endpoint,), spec.is_latched

@@ -17,12 +17,9 @@ from nep.message import Message
 from nep.native.framing import from_frame, to_frame
 from nep.native.io import Rest
 from nep.native.reading import SocketInlet
-from nep.native.sockets import Budget, Socket, bind, connect, wait_until
+from nep.native.sockets import SendMark, Socket, bind, connect, receive_mark, wait_until
 
 __all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach"]
-
-_QUEUE_BYTES = 256 * 2**20
-_QUEUE_MESSAGES = 10_000
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
@@ -54,8 +51,7 @@ class OriginalOutlet:
         self._filters = 0
         self._is_closed = False
         self._linger_ms = 0
-        self._budget = Budget(zmq.SNDHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=8)
-        self._budget.begin(socket)
+        self._mark = SendMark(socket)
         self._changed = threading.Condition(threading.Lock())
         socket.setsockopt(zmq.XPUB_VERBOSER, 1)  # so that filters can be counted: one a subscriber
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -84,7 +80,7 @@ class OriginalOutlet:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.count += 1
-            self._budget.note(self._socket, len(frame))
+            self._mark.sending(len(frame))
             self._socket.send(frame, zmq.DONTWAIT, copy=len(frame) < 65_536)
             self._read_filters()
 
@@ -117,6 +113,7 @@ class OriginalOutlet:
         while not self._socket.closed and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
             event = self._socket.recv_multipart(zmq.DONTWAIT)[0]
             self._filters += {b"\x01": 1, b"\x00": -1}.get(event[:1], 0)
+            self._mark.greeted()
             self._changed.notify_all()
 
 
@@ -131,8 +128,7 @@ class OriginalSub:
         self._socket = socket
         self._spec = spec
         self._codec = codec_for(spec.msg_type)
-        self._budget = Budget(zmq.RCVHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=8)
-        self._budget.begin(socket)
+        socket.setsockopt(zmq.RCVHWM, receive_mark(self._codec.name))
         socket.setsockopt(zmq.SUBSCRIBE, b"")
 
     @property
@@ -150,7 +146,6 @@ class OriginalSub:
             if len(parts) != 1:
                 self.problem = f"a message of the original NEP has one part, this one has {len(parts)}"
                 continue
-            self._budget.note(self._socket, len(parts[0]))
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec.name, parts[0])
             except WireError as error:

@@ -17,7 +17,7 @@ from nep.backends.base import PublisherSpec
 from nep.encoded import Encoded
 from nep.errors import ClosedError
 from nep.native.io import Rest
-from nep.native.sockets import Budget, Socket, wait_until
+from nep.native.sockets import SendMark, Socket, wait_until
 from nep.records import Expected, PublisherCount
 from nep.wire import BYE, LATCHED, Header, extension_part, hello_part, parse_hello, topic_part
 from nep.wire import EXTENSION as EXTENSION_FLAG
@@ -26,8 +26,6 @@ __all__ = ["NativeOutlet"]
 
 _logger = logging.getLogger("nep")
 
-_QUEUE_BYTES = 256 * 2**20
-_QUEUE_MESSAGES = 50_000
 _NO_COPY_BYTES = 65_536
 _BYE_AGAIN_S = 0.05
 
@@ -49,8 +47,7 @@ class NativeOutlet:
         self._waited: set[int] = set()
         self._latched: tuple[bytes | memoryview, ...] | None = None
         self._topic = topic_part(spec.topic)
-        self._budget = Budget(zmq.SNDHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=8)
-        self._budget.begin(socket)
+        self._mark = SendMark(socket)
         self._changed = threading.Condition(threading.Lock())
         self._is_closed = False
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -117,7 +114,7 @@ class NativeOutlet:
             tail = (header, data) if extension is None else (header, data, extension)
             if self.spec.is_latched:
                 self._latched = tail
-            self._budget.note(self._socket, len(data))
+            self._mark.sending(len(data))
             self._send_parts(self._topic, tail)
             self._read_subscriptions()
 
@@ -154,6 +151,7 @@ class NativeOutlet:
     def _greet(self, subscriber: int) -> None:
         """What was latched, then the echo: from here on the subscriber counts."""
         own = hello_part(subscriber, self.spec.topic)
+        self._mark.greeted()
         if self._latched is not None:
             self._send_parts(own, self._latched)
         self._send_parts(own, (self._notice(0),))

@@ -12,40 +12,47 @@ import zmq
 from nep.addresses import endpoint_of, host_of, is_loopback
 from nep.errors import AddressInUseError
 
-__all__ = ["Budget", "bind", "bind_free_port", "connect", "host_towards", "wait_until"]
+__all__ = ["SendMark", "bind", "bind_free_port", "connect", "host_towards", "receive_mark", "wait_until"]
 
 Socket = zmq.Socket[bytes]
 
 _SLICE_S = 0.1
+_QUEUE_BYTES = 256 * 2**20
+_MOST = 50_000
+_LEAST = 32
 _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 """Ports that programs of the original NEP expect to find something else on."""
 
 
-class Budget:
-    """Keeps a ZeroMQ queue within a number of bytes: libzmq only counts messages.
+class SendMark:
+    """Keeps what is queued for each subscriber within bytes, though libzmq counts messages only.
 
-    The high-water mark `option` is lowered when messages turn out large; it acts on open connections too.
+    The high-water mark is chosen once, at the first message, for streams of messages like it: 256 MB, with
+    room for four times its size. It cannot be lowered later: libzmq tells the sender of what was read in
+    portions of half a mark, and a sender whose new mark is below what is still untold waits for ever. A
+    connection has the mark of when the socket was bound; `greeted` lowers it before anything is sent on it.
     """
 
-    def __init__(self, option: int, max_bytes: int, most: int, least: int) -> None:
-        self._option = option
-        self._max_bytes = max_bytes
-        self._most = most
-        self._least = least
-        self._fits = 0
-        """Messages up to this size are within the budget already."""
+    def __init__(self, owner: Socket) -> None:
+        self._owner = owner
+        self._mark = 0
+        owner.setsockopt(zmq.SNDHWM, _MOST)
 
-    def begin(self, owner: Socket) -> None:
-        """Set the mark for small messages."""
-        owner.setsockopt(self._option, self._most)
-        self._fits = max(1024, self._max_bytes // self._most)
+    def sending(self, size_bytes: int) -> None:
+        """A message of this size is about to be sent."""
+        if not self._mark:
+            self._mark = min(_MOST, max(_LEAST, _QUEUE_BYTES // (4 * size_bytes + 1)))
+            self._owner.setsockopt(zmq.SNDHWM, self._mark)
 
-    def note(self, owner: Socket, size_bytes: int) -> None:
-        """A message of this size is about to be queued, or was."""
-        if size_bytes > self._fits:
-            self._fits = 1 << (size_bytes - 1).bit_length()
-            mark = min(self._most, max(self._least, self._max_bytes // self._fits))
-            owner.setsockopt(self._option, mark)
+    def greeted(self) -> None:
+        """A subscriber has connected."""
+        if self._mark:
+            self._owner.setsockopt(zmq.SNDHWM, self._mark)
+
+
+def receive_mark(codec: str) -> int:
+    """The high-water mark of a subscriber. The node's thread empties its socket, so a small one will do."""
+    return _LEAST if codec == "image" else 1000
 
 
 def bind_free_port(owner: Socket, host: str) -> str:

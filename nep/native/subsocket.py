@@ -10,18 +10,16 @@ import errno
 import zmq
 
 from nep.backends.base import SubscriberSpec
-from nep.codecs import codec_numbered
+from nep.codecs import codec_for, codec_numbered
 from nep.errors import WireError
 from nep.message import Message
-from nep.native.sockets import Budget, Socket
+from nep.native.sockets import Socket, receive_mark
 from nep.native.sources import Sources
 from nep.records import RemotePublisher
 from nep.wire import BYE, EXTENSION, LATCHED, Header, hello_part, read_extension, read_header, topic_part
 
 __all__ = ["SubSocket"]
 
-_QUEUE_BYTES = 64 * 2**20
-_QUEUE_MESSAGES = 10_000
 _NO_COPY_BYTES = 65_536
 
 
@@ -36,8 +34,7 @@ class SubSocket:
         self._spec = spec
         self._topic = topic_part(spec.topic)
         self._hello = hello_part(spec.id, spec.topic)
-        self._budget = Budget(zmq.RCVHWM, _QUEUE_BYTES, _QUEUE_MESSAGES, least=4)
-        self._budget.begin(socket)
+        socket.setsockopt(zmq.RCVHWM, receive_mark(codec_for(spec.msg_type).name))
         socket.setsockopt(zmq.SNDHWM, 0)  # libzmq silently drops filters beyond 1000 otherwise
         socket.setsockopt(zmq.SUBSCRIBE, self._topic)
         socket.setsockopt(zmq.SUBSCRIBE, self._hello)
@@ -136,7 +133,6 @@ class SubSocket:
             return None
         payload = rest[1]
         size = len(payload)
-        self._budget.note(self._socket, size)
         source = self.sources.get(header.publisher)
         message = Message(
             self._spec.topic,

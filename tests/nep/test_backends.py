@@ -1,0 +1,330 @@
+"""The contract of back ends: the same tests over every one of them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from itertools import count
+
+import pytest
+
+import nep
+from nep.masters import Master
+
+_names = count()
+
+
+@pytest.fixture(params=["memory", "zeromq"])
+def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Callable[[str], nep.Node]]:
+    """Makes nodes that can meet; closes them."""
+    made: list[nep.Node] = []
+    where = master.address if request.param == "zeromq" else f"contract-{next(_names)}"
+
+    def new(name: str) -> nep.Node:
+        node = nep.node(name, request.param, master=where)
+        made.append(node)
+        return node
+
+    yield new
+    for node in made:
+        node.close()
+
+
+Make = Callable[[str], nep.Node]
+
+
+def test_a_message_arrives_with_all_that_is_known_of_it(make: Make) -> None:
+    sub = make("b").new_sub("topic", "json")
+    pub = make("a").new_pub("topic", "json")
+    pub.publish({"message": "hello"})
+    message = sub.receive(2.0)
+    assert message is not None
+    assert (message.topic, message.codec, message.msg_type) == ("topic", "json", "json")
+    assert (message.payload, message.seq, message.publisher) == ({"message": "hello"}, 1, pub.id)
+    assert message.stamp_ns is not None
+    assert message.data.readonly
+    assert message.size_bytes == len(b'{"message":"hello"}')
+
+
+def test_the_paper_s_listing_polls(make: Make) -> None:
+    sub = make("b").new_sub("example", "json")
+    pub = make("a").new_pub("example", "json")
+    assert sub.listen() == (False, {})
+    pub.publish({"n": 1})
+    assert sub.listen(timeout_s=2.0) == (True, {"n": 1})
+    assert sub.listen() == (False, {})
+
+
+@pytest.mark.parametrize(
+    ("msg_type", "payload"),
+    [("json", [1, {"a": None}]), ("string", "grüß"), ("bytes", b"\0\xff"), ("msgpack", {"b": b"x", "1": 2})],
+)
+def test_every_type_arrives_as_it_was(make: Make, msg_type: str, payload: object) -> None:
+    sub = make("b").new_sub("topic", msg_type)
+    make("a").new_pub("topic", msg_type).publish(payload)
+    assert sub.listen(timeout_s=2.0) == (True, payload)
+
+
+@pytest.mark.parametrize("topic", ["test", "/a/b", "ü"])
+def test_a_topic_that_begins_alike_is_another(make: Make, topic: str) -> None:
+    sub, node = make("b").new_sub(topic), make("a")
+    node.new_pub(topic + "2").publish(1)
+    node.new_pub(topic).publish(2)
+    assert sub.listen(timeout_s=2.0) == (True, 2)
+    assert sub.listen() == (False, {})
+
+
+def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
+    sub = make("b").new_sub("topic")
+    pub = make("a").new_pub("topic")
+    for n in range(5000):
+        pub.publish(n)
+    assert [sub.listen(timeout_s=2.0)[1] for _ in range(5000)] == list(range(5000))
+    assert (sub.received, sub.lost) == (5000, 0)
+
+
+def test_many_to_many(make: Make) -> None:
+    subs = [make(f"s{n}").new_sub("topic") for n in range(3)]
+    pubs = [make(f"p{n}").new_pub("topic") for n in range(3)]
+    for n, pub in enumerate(pubs):
+        assert pub.subscribers == 3
+        pub.publish(n)
+    for sub in subs:
+        assert sorted(sub.listen(timeout_s=2.0)[1] for _ in range(3)) == [0, 1, 2]  # type: ignore[type-var]
+
+
+def test_the_next_message_reaches_a_new_subscriber(make: Make) -> None:
+    pubs = [make(f"p{n}").new_pub("topic") for n in range(3)]
+    sub = make("s").new_sub("topic")
+    for n, pub in enumerate(pubs):
+        pub.publish(n)
+    assert sorted(sub.listen(timeout_s=2.0)[1] for _ in pubs) == [0, 1, 2]  # type: ignore[type-var]
+
+
+def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
+    pub = make("a").new_pub("/robot/description", "robot/description", latched=True)
+    early = make("early").new_sub("/robot/description", "robot/description")
+    pub.publish({"v": 1})
+    pub.publish({"v": 2})
+    late = make("late").new_sub("/robot/description", "robot/description")
+    message = late.receive(2.0)
+    assert message is not None
+    assert (message.payload, message.is_latched, message.seq) == ({"v": 2}, True, 2)
+    assert late.listen() == (False, {})
+    assert [early.listen(timeout_s=2.0)[1] for _ in range(2)] == [{"v": 1}, {"v": 2}]
+    assert early.listen(timeout_s=0.05) == (False, {})
+    assert (early.lost, late.lost) == (0, 0)
+
+
+def test_nobody_listening_means_nothing_is_encoded(make: Make) -> None:
+    pub = make("a").new_pub("topic")
+    pub.publish(object())  # would be an EncodeError
+    assert (pub.subscribers, pub.count) == (0, 1)
+    sub = make("b").new_sub("topic")
+    assert pub.subscribers == 1
+    with pytest.raises(nep.EncodeError, match="cannot encode a 'object' as 'json'"):
+        pub.publish(object())
+    pub.publish(1)
+    assert sub.listen(timeout_s=2.0) == (True, 1)
+    assert sub.lost == 0
+
+
+def test_keep_latest(make: Make) -> None:
+    sub = make("b").new_sub("topic", keep="latest")
+    other = make("c").new_sub("topic")
+    pub = make("a").new_pub("topic")
+    for n in range(100):
+        pub.publish(n)
+    while other.listen(timeout_s=2.0)[1] != 99:
+        pass
+    last: object = None
+    while last != 99:  # the two connections are not in step
+        ok, last = sub.listen(timeout_s=2.0)
+        assert ok
+    assert sub.listen() == (False, {})
+    assert sub.lost == 0
+
+
+def test_a_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
+    sub = make("b").new_sub("topic", max_messages=10)
+    pub = make("a").new_pub("topic")
+    other = make("c").new_sub("topic")
+    for n in range(100):
+        pub.publish(n)
+    while other.listen(timeout_s=2.0)[1] != 99:
+        pass
+    # Nobody reads: the node's thread moves messages into the inbox.
+    deadline = threading.Event()
+    while sub.received + (sub.lost or 0) < 100 and not deadline.wait(0.01):
+        pass
+    assert [sub.listen()[1] for _ in range(10)] == list(range(90, 100))
+    assert (sub.received, sub.lost) == (10, 90)
+
+
+def test_callbacks_run_in_the_thread_that_spins(make: Make) -> None:
+    node, pub = make("b"), make("a").new_pub("example")
+    got: list[tuple[object, str]] = []
+
+    def callback(message: dict[str, int]) -> None:
+        got.append((message, threading.current_thread().name))
+        if len(got) == 1:
+            node.new_pub("made/in/callback").publish(1)
+        if len(got) == 3:
+            node.stop_spin()
+
+    node.new_callback("example", "json", callback)
+    for n in range(3):
+        pub.publish({"n": n})
+    node.spin(5.0)
+    assert got == [({"n": n}, threading.current_thread().name) for n in range(3)]
+
+
+def test_what_a_callback_raises_comes_out_of_spin(make: Make) -> None:
+    node, pub = make("b"), make("a").new_pub("example")
+
+    def callback(_message: object) -> None:
+        raise ZeroDivisionError
+
+    node.new_callback("example", "json", callback)
+    pub.publish(1)
+    with pytest.raises(ZeroDivisionError):
+        node.spin(5.0)
+
+
+def test_spin_ends_after_its_time_and_when_told(make: Make) -> None:
+    node = make("b")
+    node.new_callback("example", "json", lambda _: None)
+    node.spin(0.05)
+    thread = threading.Thread(target=node.spin)
+    thread.start()
+    node.stop_spin()
+    thread.join(2.0)
+    assert not thread.is_alive()
+
+
+def test_a_sink_gets_batches_in_a_thread_of_the_node(make: Make) -> None:
+    batches: list[list[object]] = []
+    done = threading.Event()
+    names: set[str] = set()
+
+    def sink(messages: object) -> None:
+        batches.append([message.payload for message in messages])  # type: ignore[attr-defined]
+        names.add(threading.current_thread().name)
+        if sum(map(len, batches)) == 2000:
+            done.set()
+
+    make("b").new_sub("topic", sink=sink)
+    pub = make("a").new_pub("topic")
+    for n in range(2000):
+        pub.publish(n)
+    assert done.wait(5.0)
+    assert [n for batch in batches for n in batch] == list(range(2000))
+    assert all(name.startswith("nep-") for name in names)
+    assert len(batches) < 1000
+
+
+def test_bad_bytes_are_skipped_by_listen_and_become_an_alert(make: Make) -> None:
+    sub, node = make("b").new_sub("topic"), make("a")
+    pub = node.new_pub("topic")
+    pub.publish_bytes(b"{no json")
+    pub.publish({"fine": 1})
+    message = sub.receive(2.0)
+    assert message is not None
+    with pytest.raises(nep.DecodeError, match="cannot decode 8 bytes as 'json'"):
+        _ = message.payload
+    pub.publish_bytes(b"{no json")
+    assert sub.listen(timeout_s=2.0) == (True, {"fine": 1})
+    assert sub.listen(timeout_s=0.1) == (False, {})
+
+
+def test_closing(make: Make) -> None:
+    node = make("b")
+    sub, pub = node.new_sub("topic"), make("a").new_pub("topic")
+    sub.close()
+    sub.close()
+    with pytest.raises(nep.ClosedError, match="subscriber 'topic' is closed"):
+        sub.listen()
+    pub.close()
+    pub.close()
+    with pytest.raises(nep.ClosedError, match="publisher 'topic' is closed"):
+        pub.publish(1)
+    assert "topic" not in node.graph().topics
+    node.close()
+    with pytest.raises(nep.ClosedError, match="node 'b' is closed"):
+        node.new_sub("topic")
+
+
+def test_a_reader_in_another_thread_is_released_by_closing(make: Make) -> None:
+    node = make("b")
+    sub = node.new_sub("topic")
+    ended: list[str] = []
+
+    def read() -> None:
+        with pytest.raises(nep.ClosedError):
+            sub.listen(True)
+        ended.append("raised")
+        for _ in sub:
+            pass
+        ended.append("stopped")
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    node.close()
+    thread.join(3.0)
+    assert ended == ["raised", "stopped"]
+
+
+def test_the_graph_knows_everybody(make: Make) -> None:
+    node, other = make("a"), make("b")
+    pub = node.new_pub("topic", "robot/description", latched=True)
+    sub = other.new_sub("topic", "robot/description")
+    view = node.graph()
+    assert {each.name for each in view.nodes.values()} == {"a", "b"}
+    topic = view.topics["topic"]
+    assert (topic.msg_type, topic.codec) == ("robot/description", "json")
+    assert [(each.id, each.node_id, each.latched) for each in topic.publishers] == [(pub.id, node.id, True)]
+    assert [(each.id, each.node_id) for each in topic.subscribers] == [(sub.id, other.id)]
+    sub.close()
+    assert node.graph().topics["topic"].subscribers == ()
+    other.close()
+    view = node.graph()
+    assert {each.name for each in view.nodes.values()} == {"a"}
+
+
+def test_two_types_on_a_topic_and_two_nodes_of_a_name_are_alerts(make: Make) -> None:
+    first, second = make("twin"), make("twin")
+    first.new_pub("topic", "json")
+    second.new_pub("topic", "string")
+    ids = {alert.id: alert.sentence for alert in first.graph().alerts}
+    assert set(ids) == {"name:twin", "type:topic"}
+    assert "two types" in ids["type:topic"]
+    second.close()
+    assert first.graph().alerts == ()
+
+
+def test_publishing_from_many_threads(make: Make) -> None:
+    sub = make("b").new_sub("topic")
+    pub = make("a").new_pub("topic")
+
+    def work(start: int) -> None:
+        for n in range(start, start + 250):
+            pub.publish(n)
+
+    threads = [threading.Thread(target=work, args=(1000 * n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    got = [sub.listen(timeout_s=2.0)[1] for _ in range(1000)]
+    for thread in threads:
+        thread.join()
+    assert sorted(got) == sorted(1000 * n + m for n in range(4) for m in range(250))  # type: ignore[type-var]
+    assert sub.lost == 0
+
+
+def test_what_can_still_be_changed_is_copied(make: Make) -> None:
+    sub, pub = make("b").new_sub("topic", "bytes"), make("a").new_pub("topic", "bytes")
+    data = bytearray(100_000)
+    pub.publish(data)
+    pub.publish_bytes(memoryview(data))
+    data[:] = b"\1" * 100_000
+    assert sub.listen(timeout_s=2.0) == (True, bytes(100_000))
+    assert sub.listen(timeout_s=2.0) == (True, bytes(100_000))
