@@ -34,6 +34,11 @@ def test_parts_of_the_file_that_are_not_blocks_are_kept(person):
     assert person(state=state).newest() == state
 
 
+def test_a_damaged_file_is_kept_as_it_is(person):
+    damaged = {**workspace({"id": "no type", "x": 0, "y": 0}), "variables": {"not": "a list"}}
+    assert person(state=damaged).newest() == damaged
+
+
 def test_before_the_page_exists_the_view_knows_its_program(qtbot, view):
     got: list[dict] = []
     view.load(PICTURE)

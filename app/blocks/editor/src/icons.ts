@@ -20,9 +20,9 @@ const FILLED: Readonly<Record<string, string>> = {
 
 /** The name itself if there is such an icon, else the icon of the category (block style). */
 export function iconName(name: string, style: string): string {
-  if (name in lucide || name in FILLED) return name;
+  if (Object.hasOwn(lucide, name) || Object.hasOwn(FILLED, name)) return name;
   const fallback = categoryIcon(style);
-  return fallback in lucide ? fallback : 'circle-dot';
+  return Object.hasOwn(lucide, fallback) ? fallback : 'circle-dot';
 }
 
 /** Fills `group` with the icon, scaled to `size` units; colours come from CSS. */

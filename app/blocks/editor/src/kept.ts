@@ -122,7 +122,7 @@ function guessTop(state: BlockState): Shape {
 }
 
 function labelOf(state: BlockState): string {
-  const words = state.type.replace(/^robot_[^_]+_(do|get|when)_/, '').replace(/[_\s]+/g, ' ').trim();
+  const words = String(state.type ?? 'block').replace(/^robot_[^_]+_(do|get|when)_/, '').replace(/[_\s]+/g, ' ').trim();
   const values = Object.values(state.fields ?? {}).filter((each) => ['string', 'number'].includes(typeof each));
   return [words, ...values].join(' ').slice(0, 80);
 }

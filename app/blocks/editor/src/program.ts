@@ -101,19 +101,30 @@ export class Program {
 
   private replace(state: Json): void {
     const {blocks, ...others} = state;
-    const tops = ((blocks as {blocks?: BlockState[]} | undefined)?.blocks ?? []);
+    const tops = (blocks as {blocks?: unknown} | undefined)?.blocks;
     this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
       !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
     this.loading = true;
     Checker.lenient = true;
     Blockly.Events.disable();
     try {
-      Blockly.serialization.workspaces.load(others, this.workspace);
-      for (const top of tops) this.append(top);
+      this.loadOthers(others);
+      for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState);
     } finally {
       Blockly.Events.enable();
       Checker.lenient = false;
       this.loading = false;
+    }
+  }
+
+  /** Clears the workspace and loads what is beside the blocks (variables); what cannot be read is kept as it is. */
+  private loadOthers(others: Json): void {
+    try {
+      Blockly.serialization.workspaces.load(others, this.workspace);
+    } catch (error) {
+      console.warn(`kept unread: ${String(error)}`);
+      this.workspace.clear();
+      this.rest = others;
     }
   }
 

@@ -15,7 +15,7 @@ export class States {
   private stopped = new Set<string>();
   private errors = new Map<string, string>();
   private absent = new Set<string>();
-  private live: Record<string, string> = {};
+  private live = new Map<string, string>();
   private readonly outlined = new Set<string>();
   private readonly bubbles = new Map<string, SVGGElement>();
   private placing = 0;
@@ -47,7 +47,7 @@ export class States {
 
   /** Keys: a block's id, or `<robot>/<property>` for every block that reads this sensor. */
   setLive(values: Record<string, string>): void {
-    this.live = values;
+    this.live = new Map(Object.entries(values));
     this.showLive();
   }
 
@@ -103,7 +103,7 @@ export class States {
     const flyout = this.workspace.getFlyout()?.getWorkspace().getAllBlocks(false) ?? [];
     for (const block of [...this.workspace.getAllBlocks(false), ...flyout]) {
       for (const field of block.getFields()) {
-        if (field instanceof FieldLive) field.show(this.live[block.id] ?? this.live[sensorKey(block)] ?? '');
+        if (field instanceof FieldLive) field.show(this.live.get(block.id) ?? this.live.get(sensorKey(block)) ?? '');
       }
     }
   }
