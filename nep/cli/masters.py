@@ -33,7 +33,10 @@ def master(
         ),
     ] = None,
     gateway: Annotated[
-        bool, typer.Option("--gateway/--no-gateway", help="Join programs of the original NEP.")
+        bool,
+        typer.Option(
+            "--gateway/--no-gateway", envvar="NEP_GATEWAY", help="Join programs of the original NEP."
+        ),
     ] = True,
 ) -> None:
     """Run the master: it knows who publishes and who subscribes. Ctrl+C ends it.

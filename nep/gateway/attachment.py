@@ -20,6 +20,8 @@ from nep.nodes import Node
 from nep.requests import Reply, Request
 
 _WANTED_FILES = 8192
+_WAIT_S = 3.0
+"""A master that has just started keeps newcomers waiting for a second."""
 
 
 class GatewayAttachment:
@@ -39,7 +41,7 @@ class GatewayAttachment:
         address = master.address
 
         def make_node() -> Node:
-            return Node("gateway", master=address, generation="gateway")
+            return Node("gateway", master=address, generation="gateway", wait_s=_WAIT_S)
 
         def submit(request: Request) -> Reply | None:
             try:

@@ -44,6 +44,7 @@ class Census:
         self._pair_of = pair_of
         self._roles: dict[Registration, frozenset[Role]] = {}
         self._was_joined: set[Registration] = set()
+        self._openings: dict[Registration, int] = {}
 
     def look(self, lines: Iterable[Line] | None = None) -> None:
         """Find out who is joined to these lines (all, when none are named)."""
@@ -52,7 +53,7 @@ class Census:
             if chosen is None or registration.line in chosen:
                 roles = frozenset(self._roles_of(registration))
                 self._roles[registration] = roles
-                if roles:
+                if roles or self._was_briefly_joined(registration):
                     self._was_joined.add(registration)
 
     def forget_the_gone(self) -> bool:
@@ -63,6 +64,7 @@ class Census:
             self._was_joined -= gone
             for registration in gone:
                 self._roles.pop(registration, None)
+                self._openings.pop(registration, None)
         return bool(gone)
 
     def programs(self) -> tuple[Program, ...]:
@@ -133,6 +135,14 @@ class Census:
             if known is not None:
                 return known
         return registration.socket == end.role
+
+    def _was_briefly_joined(self, registration: Registration) -> bool:
+        """Whether somebody came to the line since this was asked, and left before we looked."""
+        pair = self._pair_of(registration.line)
+        if pair is None:
+            return False
+        before = self._openings.setdefault(registration, pair.openings)
+        return pair.openings > before and not any(pair.connections.values())
 
     def _is_gone(self, registration: Registration) -> bool:
         if registration.pid is not None and registration.started is not None:

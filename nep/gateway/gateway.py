@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from pathlib import Path
@@ -22,6 +23,8 @@ from nep.message import Message
 _LOOK_S = 1.0
 """How often programs that ended are looked for, and taken ports are tried again."""
 _MAX_SOCKETS = 8192
+_PAUSE_S = 0.2
+_logger = logging.getLogger("nep.gateway")
 
 
 class Outside(NativeSide, Alerts, Protocol):
@@ -98,12 +101,21 @@ class Gateway:
             self._show()
             self._ready.set()
             while not self._ending.is_set():
-                self._step()
+                self._step_safely()
         finally:
             self._relay.close()
             self._desk.close()
             self._outside.close()
             self._context.term()
+
+    def _step_safely(self) -> None:
+        """One step. A mistake of ours in one topic must not end all others: it is logged."""
+        try:
+            self._step()
+        except Exception:
+            _logger.exception("the gateway made a mistake")
+            self._poller = None
+            self._ending.wait(_PAUSE_S)
 
     def _step(self) -> None:
         if self._poller is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
@@ -16,6 +17,8 @@ from nep.message import Message
 from nep.nodes import Node
 from nep.pubsub import Publisher, Subscriber
 
+_AGAIN_S = 1.0
+"""A topic that could not be joined is tried again after this: trying costs the gateway's thread time."""
 _Made = TypeVar("_Made", Publisher, Subscriber)
 _READABLE = frozenset({"jpeg", "png", None})
 """Encodings of pictures that the originals read; without one, the bytes are a file that says it itself."""
@@ -43,6 +46,7 @@ class Native:
         self._subscribers: dict[Key, Subscriber] = {}
         self._own: frozenset[int] = frozenset()
         self._alerts: dict[str, Alert] = {}
+        self._again_at: dict[str, float] = {}
         self._dropped = 0
 
     # ---- the network
@@ -69,11 +73,13 @@ class Native:
         if publisher is not None:
             publisher.close()
 
-    def subscribe(self, topic: str, codec: str) -> None:
+    def subscribe(self, topic: str, codec: str) -> bool:
         """See `NativeSide`."""
         subscriber = self._try(topic, lambda node: node.new_sub(topic, codec, sink=self._arrived))
-        if subscriber is not None:
-            self._subscribers[topic, codec] = subscriber
+        if subscriber is None:
+            return False
+        self._subscribers[topic, codec] = subscriber
+        return True
 
     def unsubscribe(self, topic: str, codec: str) -> None:
         """See `NativeSide`."""
@@ -103,18 +109,20 @@ class Native:
     def _try(self, topic: str, make: Callable[[Node], _Made]) -> _Made | None:
         """Something native for a topic of the originals; what cannot be becomes an alert."""
         id = f"topic:{topic}"
+        if time.monotonic() < self._again_at.get(topic, 0.0):
+            return None
         try:
             if self._node is None:
                 self._node = self._make_node()
             made = make(self._node)
-        except BadTopicError as error:
-            self.tell(
-                id, f"“{topic}” stays among original programs: {error.reason}", "Give the topic another name."
-            )
-            return None
         except NepError as error:
-            self.tell(id, f"“{topic}” could not be joined to native programs: {error}")
+            self._again_at[topic] = time.monotonic() + _AGAIN_S
+            why, hint = str(error), ""
+            if isinstance(error, BadTopicError):
+                why, hint = error.reason, "Give the topic another name."
+            self.tell(id, f"“{topic}” stays among programs of the original NEP: {why}", hint)
             return None
+        self._again_at.pop(topic, None)
         self.cure(id)
         return made
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import zmq
@@ -15,7 +15,7 @@ from nep.gateway.framing import Shape, shield_csharp, shield_javascript
 from nep.gateway.portmap import Line
 from nep.gateway.requests import LOOPBACK, Role
 
-_OPENED = zmq.EVENT_HANDSHAKE_SUCCEEDED
+_OPENED = zmq.EVENT_ACCEPTED | zmq.EVENT_CONNECTED
 _CLOSED = zmq.EVENT_DISCONNECTED
 _QUEUE = 1000
 _QUEUE_OF_PICTURES = 20
@@ -70,7 +70,8 @@ class Pair:
         self.shape = Shape(line.topic, line.framing, line.codec)
         self.ends = ends_of(line, base)
         self.filters: set[bytes] = set()
-        self.connections: dict[Role, int] = {"publisher": 0, "subscriber": 0}
+        self.openings = 0
+        self._open_handles: dict[Role, set[int]] = {"publisher": set(), "subscriber": set()}
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
         self.languages: frozenset[str] = frozenset()
         with contextlib.ExitStack() as undo:
@@ -99,6 +100,11 @@ class Pair:
         else:
             opened.bind(address)
         return opened
+
+    @property
+    def connections(self) -> Mapping[Role, int]:
+        """How many programs are connected on each side."""
+        return {role: len(handles) for role, handles in self._open_handles.items()}
 
     @property
     def wanted(self) -> bool:
@@ -137,8 +143,14 @@ class Pair:
         happened = False
         for role, monitor in self.monitors.items():
             while monitor.poll(0):
-                event = parse_monitor_message(monitor.recv_multipart())["event"]
-                self.connections[role] = max(0, self.connections[role] + (1 if event == _OPENED else -1))
+                event = parse_monitor_message(monitor.recv_multipart())
+                handles = self._open_handles[role]
+                # By handle: a visitor that does not speak ZeroMQ is told of when it leaves, too.
+                if event["event"] & _OPENED:
+                    handles.add(event["value"])
+                    self.openings += 1
+                else:
+                    handles.discard(event["value"])
                 happened = True
         return happened
 

@@ -24,8 +24,11 @@ class NativeSide(Protocol):
     def stop_publishing(self, topic: str, codec: str) -> None:
         """No original publishes this topic any more."""
 
-    def subscribe(self, topic: str, codec: str) -> None:
-        """An original wants this topic: what native programs publish comes to `Relay.deliver` from now on."""
+    def subscribe(self, topic: str, codec: str) -> bool:
+        """An original wants this topic: what native programs publish comes to `Relay.deliver` from now on.
+
+        False when it could not be done now; it is tried again.
+        """
 
     def unsubscribe(self, topic: str, codec: str) -> None:
         """No original wants this topic any more."""
@@ -111,7 +114,7 @@ class Relay:
             pair.deliver(data)
 
     def look(self) -> None:
-        """A second has passed: frames that came after their publisher had left may have left something behind."""
+        """A second has passed: try again what failed, clear away what late frames of the gone have left."""
         for key in {(line.topic, line.codec) for line in self._pairs}:
             self.settle(key)
 
@@ -120,8 +123,8 @@ class Relay:
         pairs = self._of(key)
         wanted = any(pair.wanted for pair in pairs)
         if wanted and key not in self._subscribed:
-            self._subscribed.add(key)
-            self._native.subscribe(*key)
+            if self._native.subscribe(*key):
+                self._subscribed.add(key)
         elif not wanted and key in self._subscribed:
             self._subscribed.discard(key)
             self._native.unsubscribe(*key)

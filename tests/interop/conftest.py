@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+import psutil
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -288,4 +289,9 @@ def start_master(peers: Peers, address: str) -> Program:
     program = peers.run_native(["-m", "nep", "master"])
     if not is_running(address, LONG_S):
         raise AssertionError(f"the master does not answer\n{program.printed}")
+    bound = {each.laddr.port for each in psutil.Process(program.process.pid).net_connections("tcp")}
+    if not bound.issuperset(FIXED_PORTS):
+        pytest.fail(
+            "another program took port 7000 or 50000 meanwhile; close it and run the interop tests again"
+        )
     return program

@@ -51,6 +51,7 @@ class FakeNative:
 
     def subscribe(self, topic, codec):
         self._set(lambda: self.subscribed.add((topic, codec)))
+        return True
 
     def unsubscribe(self, topic, codec):
         self._set(lambda: self.subscribed.discard((topic, codec)))
@@ -300,6 +301,25 @@ def test_a_restarted_gateway_serves_the_same_ports_to_those_who_never_ask_again(
         second.wait(lambda: second.subscribed)
         second.wait(lambda: {program.name for program in second.programs} == {"other", "both"})
         assert original.ask("t", "subscriber")["port"] == port
+
+
+def test_a_visitor_who_does_not_speak_zeromq_harms_nobody(gateway, original, native):
+    port = original.ask("t", "subscriber")["port"]
+    with original.subscriber(port + 1, b"t") as subscriber, original.publisher(port) as publisher:
+        publish_until(publisher, b't {"n":1}', lambda: subscriber.poll(0))
+        for _ in range(3):
+            for visited in (port, port + 1, 7000):
+                with socket.create_connection(("127.0.0.1", visited)) as visitor:
+                    visitor.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        original.ask("other", node="other")
+        native.wait(
+            lambda: (
+                {link.role for each in native.programs for link in each.links} == {"publisher", "subscriber"}
+            )
+        )
+        publisher.send(b't {"n":2}')
+        while subscriber.recv() != b't {"n":2}':
+            pass
 
 
 def test_one2many_the_program_binds_and_the_gateway_connects(gateway, original, native):

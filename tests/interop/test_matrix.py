@@ -24,10 +24,18 @@ def text(kind, number):
     return f'{kind} {number} Grüße  aus 日本 😀 with  spaces and "quotes"'
 
 
+@pytest.fixture(autouse=True)
+def master_is_calm(peers, master):
+    """The master logs nothing while it serves."""
+    yield
+    assert "Traceback" not in master.printed, master.printed
+
+
 class Room:
     """Programs of several kinds on one topic, each once as publisher and once as subscriber."""
 
-    def __init__(self, peers, kinds, topic, msg_type):
+    def __init__(self, peers, kinds, topic, msg_type, master):
+        self.master = master
         self.subscribers = {kind: peers.start(kind, "subscriber", topic, msg_type) for kind in kinds}
         self.publishers = {kind: peers.start(kind, "publisher", topic, msg_type) for kind in kinds}
         for program in (*self.subscribers.values(), *self.publishers.values()):
@@ -42,8 +50,10 @@ class Room:
                     break
             else:
                 heard = {to: len(each.got) for to, each in self.subscribers.items()}
-                printed = {to: each.printed[-1500:] for to, each in self.subscribers.items()}
-                pytest.fail(f"{kind} is not heard by everybody: {heard} {printed} {publisher.printed}")
+                printed = [
+                    each.printed[-900:] for each in (self.master, publisher, *self.subscribers.values())
+                ]
+                pytest.fail(f"{kind} is not heard by everybody: {heard} {printed}")
 
     def publish(self, make, first=0, count=MESSAGES):
         """All publish in turn, each message when the one before was heard: originals keep the newest only."""
@@ -63,14 +73,14 @@ class Room:
 
 
 def test_json_in_every_direction(peers, master):
-    room = Room(peers, KINDS, "matrix", "json")
+    room = Room(peers, KINDS, "matrix", "json", master)
     room.warm_up(datum)
     room.publish(datum)
     room.assert_each_once(datum)
 
 
 def test_strings_in_every_direction(peers, master):
-    room = Room(peers, KINDS[:3], "words", "string")
+    room = Room(peers, KINDS[:3], "words", "string", master)
     room.warm_up(text)
     room.publish(text)
     room.assert_each_once(text)

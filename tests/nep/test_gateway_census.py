@@ -31,7 +31,9 @@ class FakeProcesses:
 def scene():
     known, processes = PortMap(None), FakeProcesses()
     known.give(LINE, 9000)
-    pair = SimpleNamespace(ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0})
+    pair = SimpleNamespace(
+        ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0
+    )
     census = Census(known, processes, lambda line: pair if line == LINE else None)
     return SimpleNamespace(known=known, processes=processes, pair=pair, census=census)
 
@@ -101,6 +103,14 @@ def test_a_program_without_a_process_number_lives_as_long_as_its_connection(scen
     scene.pair.connections["subscriber"] = 1
     assert roles(scene) == ["subscriber"]
     scene.pair.connections["subscriber"] = 0
+    scene.census.look()
+    assert scene.census.forget_the_gone()
+
+
+def test_a_program_that_left_before_anybody_looked_is_gone(scene):
+    register(scene)
+    scene.census.look()
+    scene.pair.openings = 1
     scene.census.look()
     assert scene.census.forget_the_gone()
 
