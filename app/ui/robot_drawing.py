@@ -100,6 +100,7 @@ class RobotDrawing:
             size = QSize(max(1, round(area.width() * ratio)), max(1, round(area.height() * ratio)))
             self._room = QPixmap(size)
             self._room.setDevicePixelRatio(ratio)
+            self._room.fill(QColor("#C4AA87"))  # edges between pixels are mixed with what is below
             room = QPainter(self._room)
             room.setRenderHint(QPainter.RenderHint.Antialiasing)
             room.translate(stage.origin - area.topLeft())

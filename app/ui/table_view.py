@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Generic, TypeVar
 
 from PySide6.QtCore import (
     QEvent,
     QModelIndex,
     QPersistentModelIndex,
-    QPointF,
-    QRect,
     QRectF,
-    QSize,
     Qt,
     Signal,
 )
 from PySide6.QtGui import (
     QFocusEvent,
     QFont,
-    QFontMetricsF,
     QKeyEvent,
     QPainter,
     QPaintEvent,
@@ -28,14 +25,11 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
-    QStyle,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
     QTableView,
 )
 
-from app.ui.icons import paint_icon
-from app.ui.table import CELL_ROLE, Cell, Column, Order, TableModel
+from app.ui.table import Cell, Column, Order, TableModel
+from app.ui.table_cells import CellDelegate, Head
 from app.ui.theme import Theme
 
 Row = TypeVar("Row")
@@ -51,124 +45,6 @@ KEYBOARD = frozenset(
         Qt.FocusReason.OtherFocusReason,
     }
 )
-
-
-def padded(rect: QRect, column: int, columns: int) -> QRectF:
-    """The inside of a cell: the outer columns keep further from the edge."""
-    left = EDGE if column == 0 else PADDING
-    right = EDGE if column == columns - 1 else PADDING
-    return QRectF(rect.adjusted(left, 0, -right, 0))
-
-
-class CellDelegate(QStyledItemDelegate):
-    """Paints a `Cell`."""
-
-    def __init__(self, theme: Theme, view: TableView[Row]) -> None:
-        super().__init__(view)
-        self._theme = theme
-        self._view = view
-
-    def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
-        return QSize(40, self._view.row_height)
-
-    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        cell = index.data(CELL_ROLE)
-        if not isinstance(cell, Cell):
-            return
-        theme, rect = self._theme, QRect(option.rect)
-        chosen = bool(option.state & QStyle.StateFlag.State_Selected)
-        painter.save()
-        if chosen:
-            painter.fillRect(rect, theme.colour("selected"))
-        elif self._view.hovered_row == index.row():
-            painter.fillRect(rect, theme.colour("hover"))
-        if chosen and index.column() == 0:
-            painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
-        figures = self._view.columns[index.column()].figures
-        inside = padded(rect, index.column(), len(self._view.columns))
-        role = "selectedText" if chosen and cell.role == "text" else cell.role
-        if chosen and role == "textTertiary":
-            role = "accentText"
-        self._paint_cell(painter, inside, cell, role, figures=figures)
-        painter.restore()
-
-    def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, figures: bool) -> None:
-        theme = self._theme
-        font = self._view.cell_font(cell)
-        metrics = QFontMetricsF(font)
-        colour = theme.colour(role)
-        taken = (ICON + 5.0 if cell.icon else 0.0) + (self._chip_width(cell.chip) + 8 if cell.chip else 0.0)
-        text = metrics.elidedText(cell.text, Qt.TextElideMode.ElideRight, max(0.0, box.width() - taken))
-        advance = metrics.horizontalAdvance(text)
-        x = box.right() - advance - taken if figures else box.left()
-        if cell.icon:
-            top = box.center().y() - ICON / 2
-            paint_icon(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
-            x += ICON + 5.0
-        painter.setFont(font)
-        painter.setPen(colour)
-        painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
-        if cell.chip:
-            self._paint_chip(painter, QPointF(x + advance + 8, box.center().y()), cell.chip)
-
-    def _chip_font(self) -> QFont:
-        return self._theme.font("caption")
-
-    def _chip_width(self, words: str) -> float:
-        return QFontMetricsF(self._chip_font()).horizontalAdvance(words) + 14
-
-    def _paint_chip(self, painter: QPainter, middle: QPointF, words: str) -> None:
-        box = QRectF(middle.x(), middle.y() - 9, self._chip_width(words), 18)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self._theme.colour("accentTint"))
-        painter.drawRoundedRect(box, 9, 9)
-        painter.setFont(self._chip_font())
-        painter.setPen(self._theme.colour("accentText"))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, words)
-
-
-class Head(QHeaderView):
-    """The head: small words, the sorted one in the text's colour with its arrow."""
-
-    def __init__(self, theme: Theme, view: TableView[Row]) -> None:
-        super().__init__(Qt.Orientation.Horizontal, view)
-        self._theme = theme
-        self._view = view
-        self.setHighlightSections(False)
-        self.setSectionsClickable(True)
-        self.setMinimumSectionSize(28)
-        self.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
-
-    def sizeHint(self) -> QSize:
-        return QSize(super().sizeHint().width(), self._view.row_height + 1)
-
-    def paintSection(self, painter: QPainter, rect: QRect, section: int) -> None:
-        columns = self._view.columns
-        if not rect.isValid() or section >= len(columns):
-            return
-        theme, column = self._theme, columns[section]
-        painter.save()
-        painter.fillRect(rect, theme.colour("panel"))
-        painter.setPen(theme.colour("border"))
-        painter.drawLine(rect.bottomLeft(), rect.bottomRight())
-        font = theme.font("small")
-        font.setWeight(QFont.Weight.Medium)
-        box = padded(rect, section, len(columns))
-        ordered = self._view.order.column is column
-        metrics = QFontMetricsF(font)
-        arrow = 16.0 if ordered else 0.0
-        text = metrics.elidedText(column.title, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
-        advance = metrics.horizontalAdvance(text)
-        x = box.right() - advance - arrow if column.figures else box.left()
-        painter.setFont(font)
-        painter.setPen(theme.colour("text" if ordered else "textTertiary"))
-        painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
-        if ordered:
-            name = "chevron-up" if self._view.order.falling else "chevron-down"
-            at = QRectF(x + advance + 3, box.center().y() - 6.5, 13, 13)
-            paint_icon(painter, at, name, theme.colour("textSecondary"))
-        painter.restore()
 
 
 class TableView(QTableView, Generic[Row]):
@@ -191,8 +67,8 @@ class TableView(QTableView, Generic[Row]):
         self._large = False
         self.setModel(model)
         self._model = model
-        self.setItemDelegate(CellDelegate(theme, self))
-        self.setHorizontalHeader(Head(theme, self))
+        self.setItemDelegate(CellDelegate(theme, self, self))
+        self.setHorizontalHeader(Head(theme, self, self))
         self.horizontalHeader().sectionClicked.connect(self._sort)
         self.verticalHeader().hide()
         self.setShowGrid(False)
@@ -208,6 +84,16 @@ class TableView(QTableView, Generic[Row]):
         self.set_row_height(26, large=False)
         for place, column in enumerate(self.columns):
             self.setColumnWidth(place, column.width)
+
+    @property
+    def shown_columns(self) -> Sequence[Column[Row]]:
+        """The columns."""
+        return self.columns
+
+    @property
+    def shown_order(self) -> Order[Row]:
+        """How it is sorted."""
+        return self.order
 
     def set_row_height(self, height: int, *, large: bool) -> None:
         """The height of all rows; ``large`` words for the comfortable density."""

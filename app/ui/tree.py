@@ -6,16 +6,15 @@ marked with the time of its change.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
 
+from app.ui.tree_values import is_container, keys_of, size_of, values_of, words_of
+
 Index = QModelIndex | QPersistentModelIndex
 PAGE = 500
-TEXT_LIMIT = 400
-SEARCH_LIMIT = 20_000
 NODE_ROLE = int(Qt.ItemDataRole.UserRole)
 _ROOT = QModelIndex()
 
@@ -46,53 +45,6 @@ class Node:
         if isinstance(self.key, int):
             return f"{above}[{self.key}]"
         return f"{above}.{self.key}" if above else self.key
-
-
-def is_container(value: object) -> bool:
-    """Objects and lists; text and bytes are values."""
-    if isinstance(value, Mapping):
-        return True
-    return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
-
-
-def keys_of(value: object, count: int) -> list[str | int]:
-    """The first ``count`` keys of a container."""
-    if isinstance(value, Mapping):
-        return [str(key) for key in islice(value, count)]
-    if is_container(value):
-        return list(range(min(count, len(value))))  # type: ignore[arg-type]
-    return []
-
-
-def values_of(value: object, count: int) -> list[object]:
-    """The first ``count`` values of a container."""
-    if isinstance(value, Mapping):
-        return list(islice(value.values(), count))
-    return list(islice(value, count)) if is_container(value) else []  # type: ignore[call-overload]
-
-
-def size_of(value: object) -> int:
-    """How many children a value has."""
-    return len(value) if is_container(value) else 0  # type: ignore[arg-type]
-
-
-def words_of(value: object) -> str:
-    """A value in one line: text in quotes, containers by their count, bytes by their first ones."""
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return f"{{{len(value)}}}" if value else "{}"
-    if isinstance(value, (bytes, bytearray, memoryview)):
-        start = bytes(value[:16]).hex(" ")
-        return f"{start}{' …' if len(value) > 16 else ''}  ({len(value)} bytes)"
-    if isinstance(value, str):
-        text = value if len(value) <= TEXT_LIMIT else f"{value[:TEXT_LIMIT]}…"
-        return '"' + text.replace("\n", "⏎").replace("\r", "").replace("\t", "⇥") + '"'
-    if is_container(value):
-        return f"[{size_of(value)}]" if size_of(value) else "[]"
-    return repr(value) if isinstance(value, float) else str(value)
 
 
 class TreeModel(QAbstractItemModel):
@@ -274,23 +226,6 @@ class TreeModel(QAbstractItemModel):
             self._load(node, max(keys.index(key) + 1, min(PAGE, len(keys))))
             node = (node.children or [])[keys.index(key)]
         return self.index_of(node)
-
-
-def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tuple[str | int, ...]]:
-    """Where a key or a value has these words (any case), in the tree's order, among ``limit`` values."""
-    wanted = words.casefold()
-    waiting: list[tuple[tuple[str | int, ...], object]] = [((), value)]
-    for _ in range(limit):
-        if not waiting:
-            return
-        path, here = waiting.pop()
-        if path and (
-            wanted in str(path[-1]).casefold()
-            or (not is_container(here) and wanted in words_of(here).casefold())
-        ):
-            yield path
-        inside = zip(keys_of(here, limit), values_of(here, limit), strict=False)
-        waiting.extend(((*path, key), below) for key, below in reversed(list(inside)))
 
 
 def _child(value: object, key: str | int) -> object:

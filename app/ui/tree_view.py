@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem, QTreeVi
 
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
-from app.ui.tree import NODE_ROLE, Node, TreeModel, words_of
+from app.ui.tree import NODE_ROLE, Node, TreeModel
+from app.ui.tree_values import words_of
 
 Index = QModelIndex | QPersistentModelIndex
 INDENT, LEFT_EDGE, CHEVRON, VALUE_EDGE = 14, 8, 14, 10

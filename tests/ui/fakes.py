@@ -1,4 +1,4 @@
-"""A session in memory, for tests and for looking at panels alone: the interface of `app.core.session.Session`.
+"""A session in memory, for tests and for looking at panels alone, with the interface of the real one.
 
 `Session.full()` has a master, thirteen topics, the virtual Pepper and a behaviour; `Session()` has nothing.
 `tick()` makes the figures move; what panels ask for is written down in `calls`.
@@ -347,10 +347,7 @@ class Session:
     def send(self, topic: str, payload: object) -> Message:
         """A message arrives on a topic, as it would for a watched one."""
         known = self.topics[topic]
-        if isinstance(payload, bytes):
-            data = payload
-        else:
-            data = json.dumps(payload).encode()
+        data = payload if isinstance(payload, bytes) else json.dumps(payload).encode()
         seq = (known.newest.seq or 0) + 1 if known.newest is not None else 18204
         message = Message(
             topic, data, known.codec, known.msg_type, stamp_ns=time.time_ns() - 600_000, seq=seq, publisher=1
@@ -485,8 +482,10 @@ def drawing(**changes: object) -> dict[str, object]:
         "speech": "Touch my head.", "eyes": "#35b0fa", "shoulders": "#3ab5ff", "emotion": "neutral",
         "arm_left_deg": 124.0, "arm_right_deg": 0.0, "moving": False, "touched": [],
         "objects": [
-            {"kind": "ball", "name": "ball", "x": 0.1, "y": -1.65, "z": 0.11, "radius": 0.11, "colour": "#d8403f"},
-            {"kind": "table", "x": -0.85, "y": 1.95, "width": 1.0, "depth": 0.6, "height": 0.7, "theta_deg": 0},
+            {"kind": "ball", "name": "ball", "x": 0.1, "y": -1.65, "z": 0.11, "radius": 0.11,
+                "colour": "#d8403f"},
+            {"kind": "table", "x": -0.85, "y": 1.95, "width": 1.0, "depth": 0.6, "height": 0.7,
+                "theta_deg": 0},
         ],
         "room": {"width": 6.0, "depth": 5.0, "height": 2.6, "openings": []},
     }  # fmt: skip
@@ -516,7 +515,8 @@ def _choices(*pairs: tuple[str, str]) -> tuple[Choice, ...]:
 
 ACTIONS = (
     _action("say", "say", "message-circle", [
-        Parameter("text", "text", "text", default="Nice to meet you, Aiko.", required=True, min_length=1, max_length=300),
+        Parameter("text", "text", "text", default="Nice to meet you, Aiko.", required=True, min_length=1,
+            max_length=300),
         Parameter("volume", "volume", "integer", 0, 100, 5, "%", 60),
         Parameter("language", "language", "choice", default="en",
                   choices=_choices(("en", "English"), ("fr", "French"), ("ja", "Japanese"))),
@@ -535,7 +535,8 @@ ACTIONS = (
     ], risk="moves", cancellable=True),
     _action("emotion", "show emotion", "smile", [
         Parameter("emotion", "emotion", "choice", default="happy", choices=_choices(
-            ("neutral", "neutral"), ("happy", "happy"), ("sad", "sad"), ("surprised", "surprised"), ("angry", "angry"))),
+            ("neutral", "neutral"), ("happy", "happy"), ("sad", "sad"), ("surprised", "surprised"),
+            ("angry", "angry"))),
         Parameter("seconds", "for", "number", 0, 60, 0.5, "s", 2, advanced=True),
         Parameter("gestures", "gestures", "boolean", default=True),
     ], category="Face and lights"),
@@ -556,7 +557,8 @@ SENSORS = (
     Sensor("sound", "sound", "number", "/Pepper/sound", "dB", 0, 150, icon="volume-2"),
     Sensor("heard_word", "heard word", "text", "/Pepper/heard_word", icon="ear"),
     Sensor("pose", "position", "object", "/Pepper/pose", icon="navigation", fields=(
-        Field("x", "x", "number", "m"), Field("y", "y", "number", "m"), Field("theta", "facing", "number", "°"))),
+        Field("x", "x", "number", "m"), Field("y", "y", "number", "m"),
+            Field("theta", "facing", "number", "°"))),
     Sensor("camera", "camera", "image", "/Pepper/camera", rate_hz=15, icon="camera"),
 )  # fmt: skip
 
@@ -576,6 +578,7 @@ def pepper(name: str = "Pepper") -> Robot:
     return Robot(
         name, "virtual-pepper", "Virtual Pepper", True, "native", ACTIONS, SENSORS, (touched,),
         SafeStop("stop", 1.0, 0.2, True, True, True), ("base",),
-        RobotTopics("/Pepper/description", "/Pepper/command", "/Pepper/answer", "/Pepper/state", "/Pepper/world"),
+        RobotTopics("/Pepper/description", "/Pepper/command", "/Pepper/answer", "/Pepper/state",
+            "/Pepper/world"),
         {"title": name},
     )  # fmt: skip

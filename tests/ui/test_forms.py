@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QLineEdit
 from app.robots.inputs import Choice as Option
 from app.robots.inputs import Parameter
 from app.robots.parts import Action
-from app.ui.forms import ActionForm, control_for
+from app.ui.controls import control_for
+from app.ui.forms import ActionForm
 from app.ui.theme import Theme
 from app.ui.widgets import Choice, ColourSwatches, Segments, SliderWithUnit, Switch
 from tests.ui.fakes import ACTIONS

@@ -28,6 +28,7 @@ def test_narrow_views_have_eight_bytes_in_a_line(qtbot, qapp) -> None:
     view = HexView(Theme("light"))
     qtbot.addWidget(view)
     view.resize(330, 200)
+    view.show()
     view.show_bytes(bytes(20))
     assert view.per_line() == 8
     assert view.text().splitlines()[2].startswith("0010")

@@ -11,7 +11,8 @@ from tests.ui.fakes import RobotLink, Session, pepper
 from tests.ui.panel_case import Window
 
 POSE = Sensor("pose", "position", "object", "/p", fields=(
-    Field("x", "x", "number", "m"), Field("y", "y", "number", "m"), Field("theta", "facing", "number", "°")))  # fmt: skip
+    Field("x", "x", "number", "m"), Field("y", "y", "number", "m"),
+        Field("theta", "facing", "number", "°")))  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -29,8 +30,10 @@ POSE = Sensor("pose", "position", "object", "/p", fields=(
         (Sensor("c", "c", "choice", "/c", choices=(Choice("en", "English"),)), "en", Reading("English")),
         (POSE, {"x": 1.284, "y": -0.307, "theta": 31.2}, Reading("1.3, \u22120.3 m", "facing 31°")),
         (POSE, {}, Reading("", "")),
-        (Sensor("f", "faces", "detections", "/f"), {"count": 1, "name": "Aiko", "items": []}, Reading("1", "Aiko")),
-        (Sensor("f", "faces", "detections", "/f"), {"items": [{"name": "a"}, {"name": "b"}]}, Reading("2", "a, b")),
+        (Sensor("f", "faces", "detections", "/f"), {"count": 1, "name": "Aiko", "items": []},
+        Reading("1", "Aiko")),
+        (Sensor("f", "faces", "detections", "/f"), {"items": [{"name": "a"}, {"name": "b"}]},
+        Reading("2", "a, b")),
         (Sensor("l", "list", "list", "/l"), ["x", "y"], Reading("2", "x, y")),
     ],
 )  # fmt: skip

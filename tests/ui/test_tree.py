@@ -5,7 +5,8 @@ from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtTest import QSignalSpy, QTest
 
 from app.ui.theme import Theme
-from app.ui.tree import TreeModel, search, words_of
+from app.ui.tree import TreeModel
+from app.ui.tree_values import search, words_of
 from app.ui.tree_view import TreeView
 
 FIRST = {"stamp": 1.5, "robots": {"Pepper": {"pose": {"x": 1, "y": 2}, "on": True}}, "list": [1, "two", None]}

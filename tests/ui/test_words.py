@@ -17,11 +17,13 @@ from app.ui.words import (
 @pytest.mark.parametrize(
     ("made", "words"),
     [
-        (rate_words(None), ""), (rate_words(0.4), "0.4"), (rate_words(59.96), "60.0"), (rate_words(1204), "1\u2009204"),
+        (rate_words(None), ""), (rate_words(0.4), "0.4"), (rate_words(59.96), "60.0"), (rate_words(1204),
+        "1\u2009204"),
         (bandwidth_words(None), ""), (bandwidth_words(92), "92 B/s"), (bandwidth_words(5.1e6), "5.1 MB/s"),
         (size_words(412), "412 B"), (size_words(1600), "1.6 kB"), (size_words(46_000), "46 kB"),
         (size_words(999_900), "1.0 MB"), (size_words(2.5e12), "2.5 TB"),
-        (age_words(None), ""), (age_words(0.012), "12 ms"), (age_words(0.4), "0.4 s"), (age_words(6.2), "6 s"),
+        (age_words(None), ""), (age_words(0.012), "12 ms"), (age_words(0.4), "0.4 s"), (age_words(6.2),
+        "6 s"),
         (age_words(125), "2 min"), (age_words(7200), "2 h"),
         (latency_words(0.0006), "0.6 ms"), (latency_words(0.041), "41 ms"), (latency_words(1.24), "1.2 s"),
         (grouped(18204), "18\u2009204"), (plural(1, "topic"), "1 topic"), (plural(0, "node"), "0 nodes"),

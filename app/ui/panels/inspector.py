@@ -13,7 +13,8 @@ from PySide6.QtWidgets import QHBoxLayout, QMenu, QStackedWidget, QVBoxLayout, Q
 from app.ui.hex_view import HexView
 from app.ui.inspector_parts import FindField, Foot, image_summary, message_facts, plain_words
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
-from app.ui.tree import Node, TreeModel, search, size_of
+from app.ui.tree import Node, TreeModel
+from app.ui.tree_values import search, size_of
 from app.ui.tree_view import TreeView
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton, Line, Segments, label
 from app.ui.words import size_words

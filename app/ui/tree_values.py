@@ -1,0 +1,73 @@
+"""Decoded values as the tree shows them: their keys, their words, and where a word is found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+
+TEXT_LIMIT = 400
+SEARCH_LIMIT = 20_000
+
+
+def is_container(value: object) -> bool:
+    """Objects and lists; text and bytes are values."""
+    if isinstance(value, Mapping):
+        return True
+    return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
+
+
+def keys_of(value: object, count: int) -> list[str | int]:
+    """The first ``count`` keys of a container."""
+    if isinstance(value, Mapping):
+        return [str(key) for key in islice(value, count)]
+    if is_container(value):
+        return list(range(min(count, len(value))))  # type: ignore[arg-type]
+    return []
+
+
+def values_of(value: object, count: int) -> list[object]:
+    """The first ``count`` values of a container."""
+    if isinstance(value, Mapping):
+        return list(islice(value.values(), count))
+    return list(islice(value, count)) if is_container(value) else []  # type: ignore[call-overload]
+
+
+def size_of(value: object) -> int:
+    """How many children a value has."""
+    return len(value) if is_container(value) else 0  # type: ignore[arg-type]
+
+
+def words_of(value: object) -> str:
+    """A value in one line: text in quotes, containers by their count, bytes by their first ones."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return f"{{{len(value)}}}" if value else "{}"
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        start = bytes(value[:16]).hex(" ")
+        return f"{start}{' …' if len(value) > 16 else ''}  ({len(value)} bytes)"
+    if isinstance(value, str):
+        text = value if len(value) <= TEXT_LIMIT else f"{value[:TEXT_LIMIT]}…"
+        return '"' + text.replace("\n", "⏎").replace("\r", "").replace("\t", "⇥") + '"'
+    if is_container(value):
+        return f"[{size_of(value)}]" if size_of(value) else "[]"
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tuple[str | int, ...]]:
+    """Where a key or a value has these words (any case), in the tree's order, among ``limit`` values."""
+    wanted = words.casefold()
+    waiting: list[tuple[tuple[str | int, ...], object]] = [((), value)]
+    for _ in range(limit):
+        if not waiting:
+            return
+        path, here = waiting.pop()
+        if path and (
+            wanted in str(path[-1]).casefold()
+            or (not is_container(here) and wanted in words_of(here).casefold())
+        ):
+            yield path
+        inside = zip(keys_of(here, limit), values_of(here, limit), strict=False)
+        waiting.extend(((*path, key), below) for key, below in reversed(list(inside)))
