@@ -16,7 +16,10 @@ MENUS = ("File", "Edit", "View", "Run", "Robots", "Help")
 
 @dataclass(frozen=True)
 class Row:
-    """One command. ``group`` makes it one of several choices; ``above`` puts a line over it."""
+    """One command. ``group`` makes it one of several choices; ``above`` puts a line over it.
+
+    ``check`` makes it something that is on or off, ``everywhere`` a key that works in all windows.
+    """
 
     name: str
     menu: str
@@ -26,6 +29,7 @@ class Row:
     group: str = ""
     above: bool = False
     everywhere: bool = False
+    check: bool = False
 
 
 TABLE: tuple[Row, ...] = (
@@ -48,6 +52,7 @@ TABLE: tuple[Row, ...] = (
     Row("text.larger", "View", "Larger text", "Ctrl++", "zoom-in", above=True),
     Row("text.smaller", "View", "Smaller text", "Ctrl+-", "zoom-out"),
     Row("text.normal", "View", "Normal text", "Ctrl+0"),
+    Row("theme.motion", "View", "Less motion", check=True),
     Row("run.run", "Run", "Run", "F5", "play"),
     Row("run.pause", "Run", "Pause", "F8", "pause"),
     Row("run.step", "Run", "Step", "F10", "step-forward"),
@@ -79,8 +84,8 @@ class Actions:
             action.setShortcut(QKeySequence(row.shortcut))
         if row.everywhere:
             action.setShortcutContext(Qt.ShortcutContext.ApplicationShortcut)
+        action.setCheckable(bool(row.group) or row.check)
         if row.group:
-            action.setCheckable(True)
             if row.group not in self._groups:
                 self._groups[row.group] = QActionGroup(window)
             self._groups[row.group].addAction(action)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, Qt, QTimer
-from PySide6.QtGui import QIcon
+from PySide6.QtGui import QGuiApplication, QIcon
 from PySide6.QtWidgets import QApplication
 
 from app import resources
@@ -43,6 +43,7 @@ def make_application() -> QApplication:
     if isinstance(existing, QApplication):
         return existing
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+    QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontShowIconsInMenus)
     register_scheme()
     application = QApplication(sys.argv[:1])
     application.setApplicationName("nep-studio")
@@ -63,6 +64,8 @@ def make_window(session: Session, options: Options) -> tuple[MainWindow, Command
     """The window with its commands, as it was left; nothing runs yet."""
     theme = Theme("light")
     window = MainWindow(session, theme, find_panels(), read_examples(resources.folder() / "examples"))
+    hints = QGuiApplication.styleHints().accessibility()
+    theme.high_contrast = hints.contrastPreference() == Qt.ContrastPreference.HighContrast
     window.state.apply_theme(theme)
     chosen = next((mode for mode in MODES if mode == options.theme), None)
     if chosen is not None:

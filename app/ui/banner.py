@@ -95,7 +95,10 @@ class Banner(QWidget):
         self._status = status
         self._words = (title, detail)
         self._write()
-        self.setAccessibleName(f"{title} {detail}".strip())
+        spoken = f"{title} {detail}".strip()
+        if spoken != self.accessibleName():
+            self.setAccessibleName(spoken)
+            paint.announce(self, spoken)
         for widget, text in ((self.button, button), (self.second, second)):
             widget.set_word(text or "")
             paint.show_when(widget, bool(text))

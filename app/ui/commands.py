@@ -92,6 +92,7 @@ class Commands:
             "theme.light": lambda: self._theme("light"),
             "theme.dark": lambda: self._theme("dark"),
             "theme.system": lambda: self._theme("system"),
+            "theme.motion": self._motion,
             "text.larger": lambda: self._text(window.theme.text_percent + TEXT_STEP),
             "text.smaller": lambda: self._text(window.theme.text_percent - TEXT_STEP),
             "text.normal": lambda: self._text(100),
@@ -129,6 +130,7 @@ class Commands:
             keys = QShortcut(QKeySequence(f"Ctrl+{number}"), window)
             keys.activated.connect(lambda number=number: window.panel_number(number))
         self.actions.choose(f"theme.{window.theme.mode}")
+        self.actions["theme.motion"].setChecked(window.theme.reduced_motion)
 
     # -- by name ----------------------------------------------------------------------------------
 
@@ -196,6 +198,10 @@ class Commands:
 
     def _theme(self, mode: Mode) -> None:
         self._window.theme.set_mode(mode)
+        self._window.state.keep_theme(self._window.theme)
+
+    def _motion(self) -> None:
+        self._window.theme.set_reduced_motion(self.actions["theme.motion"].isChecked())
         self._window.state.keep_theme(self._window.theme)
 
     def _text(self, percent: int) -> None:

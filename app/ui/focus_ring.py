@@ -8,6 +8,7 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QGuiApplication, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QAbstractScrollArea, QApplication, QMenu, QMenuBar, QWidget
+from shiboken6 import isValid
 
 from app.ui.theme import Theme
 from app.ui.widgets import paint
@@ -54,7 +55,8 @@ class FocusRing(QWidget):
 
     def _follow(self, target: QWidget | None) -> None:
         for widget in self._chain:
-            widget.removeEventFilter(self)
+            if isValid(widget):  # the focus also moves on because a widget is being deleted
+                widget.removeEventFilter(self)
         self._chain = []
         self._target = target
         if target is None:
@@ -65,13 +67,7 @@ class FocusRing(QWidget):
             step.installEventFilter(self)
             self._chain.append(step)
             step = step.parentWidget()
-        target.destroyed.connect(self._gone)
         self._place()
-
-    def _gone(self) -> None:
-        self._chain = []
-        self._target = None
-        self.hide()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in _MOVES:
@@ -80,7 +76,7 @@ class FocusRing(QWidget):
 
     def _place(self) -> None:
         target = self._target
-        if target is None or not target.isVisible():
+        if target is None or not isValid(target) or not target.isVisible():
             self.hide()
             return
         inset = int(target.property("focusInset") or 0)
@@ -105,7 +101,7 @@ class FocusRing(QWidget):
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        if self._target is None:
+        if self._target is None or not isValid(self._target):
             return
         width = self._theme.size("focusRing", "width")
         radius = int(self._target.property("focusRadius") or self._theme.radius("small"))

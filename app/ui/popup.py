@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
-from PySide6.QtCore import QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.theme import Theme
-from app.ui.widgets import label, paint
+from app.ui.widgets import IconButton, label, paint
+
+
+def spoken_key(shortcut: str) -> str:
+    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"."""
+    return re.sub(r"\+(?=.)", " ", shortcut)
 
 
 class KeyCap(QWidget):
@@ -36,15 +42,20 @@ class Sheet(QWidget):
     def __init__(
         self, theme: Theme, window: QWidget, title: str, lines: Sequence[tuple[str, str]], *, wide: int = 360
     ) -> None:
-        super().__init__(window, Qt.WindowType.Popup | Qt.WindowType.FramelessWindowHint)
+        super().__init__(window)
         self._theme = theme
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.setAttribute(Qt.WidgetAttribute.WA_TranslucentBackground)
         self.setAccessibleName(title)
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 16, 20, 18)
         column.setSpacing(10)
-        column.addWidget(label(title, "heading"))
+        head = QHBoxLayout()
+        head.addWidget(label(title, "heading"))
+        head.addStretch(1)
+        self._close = IconButton(theme, "x", "Close", "Esc")
+        self._close.clicked.connect(self.close)
+        head.addWidget(self._close)
+        column.addLayout(head)
         grid = QGridLayout()
         grid.setHorizontalSpacing(24)
         grid.setVerticalSpacing(6)
@@ -52,7 +63,7 @@ class Sheet(QWidget):
             shown = label(words, "body", role="text" if key else "textSecondary", wrap=not key)
             grid.addWidget(shown, row, 0, 1, 1 if key else 2)
             if key:
-                grid.addWidget(KeyCap(theme, key.replace("+", " ").strip() or key), row, 1)
+                grid.addWidget(KeyCap(theme, spoken_key(key)), row, 1)
         column.addLayout(grid)
         self.setMinimumWidth(wide)
 
@@ -62,8 +73,23 @@ class Sheet(QWidget):
         self.adjustSize()
         if window is not None:
             left = (window.width() - self.width()) // 2
-            self.move(window.mapToGlobal(QPoint(left, max(40, (window.height() - self.height()) // 3))))
+            self.move(left, max(8, (window.height() - self.height()) // 3))
         self.show()
+        self.raise_()
+        self._close.setFocus(Qt.FocusReason.PopupFocusReason)
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._focus_changed)
+
+    def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
+        if new is not None and not self.isAncestorOf(new):
+            self.close()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.close()
+        else:
+            super().keyPressEvent(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -141,6 +141,8 @@ class Result(QWidget):
         if (look, text) != (self._look, self._text):
             self._look, self._text = look, text
             self.setAccessibleName(text)
+            if look in {"ok", "error"}:
+                paint.announce(self, text)
             paint.show_when(self, bool(text))
             self.updateGeometry()
             self.update()

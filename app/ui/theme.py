@@ -106,6 +106,11 @@ class Theme(QObject):
         self._fonts.clear()
         self.apply()
 
+    def set_reduced_motion(self, reduced: bool) -> None:
+        """Whether nothing fades, glides or breathes."""
+        self.reduced_motion = reduced
+        self.changed.emit()
+
     @property
     def text_percent(self) -> int:
         """The size of text, 100 to 200."""

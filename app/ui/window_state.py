@@ -17,7 +17,7 @@ Saved = dict[str, object]
 
 
 class WindowState:
-    """Reads and writes the keys "window", "layout", "layouts", "theme" and "text_percent"."""
+    """Reads and writes the keys "window", "layout", "layouts", "theme", "text_percent" and "less_motion"."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -27,6 +27,7 @@ class WindowState:
         """Give the theme what was chosen before; it is applied once."""
         chosen = self._settings.get("theme", "system")
         mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
+        theme.reduced_motion = self._settings.get("less_motion", False)
         theme.set_text_percent(self._settings.get("text_percent", 100))
         theme.set_mode(mode)
 
@@ -34,6 +35,7 @@ class WindowState:
         """Keep what is chosen now."""
         self._set("theme", theme.mode)
         self._set("text_percent", theme.text_percent)
+        self._set("less_motion", theme.reduced_motion)
 
     def place(self, window: QMainWindow) -> bool:
         """Put the window where it was; False when it was nowhere yet."""

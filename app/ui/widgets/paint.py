@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
+from PySide6.QtGui import (
+    QAccessible,
+    QAccessibleAnnouncementEvent,
+    QColor,
+    QFont,
+    QFontMetricsF,
+    QPainter,
+    QPen,
+)
 from PySide6.QtWidgets import QWidget
 
 from app.ui.theme import Theme
@@ -74,6 +82,12 @@ def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: s
     box(painter, rect, theme.radius("key"), theme.colour("sunken"), theme.colour("borderStrong"))
     words(painter, rect, key, theme.font("caption"), theme.colour("textSecondary"), CENTRE)
     return rect
+
+
+def announce(widget: QWidget, words: str) -> None:
+    """Let a screen reader say something now: alerts, and that robots stopped; never figures that change."""
+    if QAccessible.isActive():
+        QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, words))
 
 
 def show_when(widget: QWidget, shown: bool) -> None:

@@ -1,0 +1,194 @@
+"""What lies over the window: toast, banner, focus ring, sheet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit, QScrollArea, QVBoxLayout, QWidget
+
+from app.ui.banner import BannerPlace
+from app.ui.focus_ring import FocusRing
+from app.ui.popup import Sheet, spoken_key
+from app.ui.theme import Theme
+from app.ui.toast import Toast
+from app.ui.widgets import Button
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@dataclass(frozen=True)
+class Said:
+    id: str
+    severity: str = "error"
+    title: str = "It is silent."
+    detail: str = ""
+    button: str | None = None
+    action: str | None = None
+
+
+@pytest.fixture
+def place(qtbot) -> QWidget:
+    made = QWidget()
+    made.resize(800, 500)
+    QVBoxLayout(made)
+    qtbot.addWidget(made)
+    made.show()
+    made.activateWindow()
+    qtbot.waitUntil(made.isActiveWindow)
+    return made
+
+
+def test_a_toast_goes_to_the_corner_and_follows_the_window(place: QWidget, theme: Theme) -> None:
+    toast = Toast(theme, place)
+    toast.say("Copied robots.Pepper.pose.y")
+    assert toast.isVisible()
+    assert not toast.button.isVisible()
+    right = place.width() - toast.geometry().right()
+    place.resize(600, 400)
+    assert place.width() - toast.geometry().right() == right
+
+
+def test_a_toast_undoes_what_it_says(place: QWidget, theme: Theme) -> None:
+    done: list[str] = []
+    toast = Toast(theme, place)
+    toast.say("Deleted 4 blocks", "Undo", lambda: done.append("undone"))
+    QTest.mouseClick(toast.button, Qt.MouseButton.LeftButton)
+    assert done == ["undone"]
+    assert not toast.isVisible()
+
+
+def test_a_toast_stays_while_it_has_the_focus(qtbot, place: QWidget, theme: Theme) -> None:
+    toast = Toast(theme, place)
+    toast.say("Deleted 4 blocks", "Undo", lambda: None)
+    toast.button.setFocus()
+    qtbot.waitUntil(toast.button.hasFocus)
+    toast._time_is_up()
+    assert toast.isVisible()
+    toast.button.clearFocus()
+    toast.setAttribute(Qt.WidgetAttribute.WA_UnderMouse, False)
+    toast._time_is_up()
+    assert not toast.isVisible()
+
+
+def test_an_offer_waits_for_its_answer_and_alerts_wait_behind_it(place: QWidget, theme: Theme) -> None:
+    banner = BannerPlace(theme)
+    place.layout().addWidget(banner)
+    done: list[str] = []
+    banner.offer(
+        "Put it back?",
+        "It was not saved.",
+        ("Yes", lambda: done.append("yes")),
+        ("No", lambda: done.append("no")),
+    )
+    banner.show_alerts([Said("a", title="Alert.")])
+    assert "Put it back?" in banner.banner.accessibleName()
+    QTest.mouseClick(banner.banner.second, Qt.MouseButton.LeftButton)
+    assert done == ["no"]
+    banner.show_alerts([Said("a", title="Alert.")])
+    assert banner.banner.accessibleName() == "Alert."
+    assert not banner.banner.second.isVisible()
+
+
+def test_words_of_an_alert_are_no_markup(place: QWidget, theme: Theme) -> None:
+    banner = BannerPlace(theme)
+    place.layout().addWidget(banner)
+    banner.show_alerts([Said("a", title="<b>/faces</b> & co.")])
+    assert "&lt;b&gt;/faces&lt;/b&gt; &amp; co." in banner.banner.words.text()
+
+
+def test_a_banner_grows_with_long_words(place: QWidget, theme: Theme) -> None:
+    banner = BannerPlace(theme)
+    place.layout().addWidget(banner)
+    banner.show_alerts([Said("a")])
+    QTest.qWait(1)
+    low = banner.banner.height()
+    assert low >= 52
+    banner.show_alerts([Said("a", detail="It means a lot. " * 30)])
+    QTest.qWait(20)
+    assert banner.banner.height() > low
+
+
+def test_the_ring_is_two_pixels_outside_and_follows(qtbot, place: QWidget, theme: Theme) -> None:
+    ring = FocusRing(theme, place)
+    first, second = Button(theme, "One"), Button(theme, "Two")
+    place.layout().addWidget(first)
+    place.layout().addWidget(second)
+    QTest.qWait(1)
+    second.setFocus(Qt.FocusReason.TabFocusReason)
+    qtbot.waitUntil(lambda: ring.target is second)
+    assert ring.isVisible()
+    assert ring.geometry() == second.geometry().adjusted(-4, -4, 4, 4)
+    place.resize(900, 300)
+    QTest.qWait(1)
+    assert ring.geometry() == second.geometry().adjusted(-4, -4, 4, 4)
+    second.hide()
+    qtbot.waitUntil(lambda: ring.target is first)
+    place.setFocus()
+    assert not ring.isVisible()
+
+
+def test_the_mouse_makes_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
+    ring = FocusRing(theme, place)
+    field, other = QLineEdit(), QLineEdit()
+    place.layout().addWidget(other)
+    place.layout().addWidget(field)
+    QTest.qWait(1)
+    QTest.mousePress(field, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
+    assert field.hasFocus()
+    assert not ring.isVisible()
+    QTest.mouseRelease(field, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
+    QTest.keyClick(field, Qt.Key.Key_Tab)
+    qtbot.waitUntil(lambda: ring.target is other)
+
+
+def test_the_ring_ends_where_a_scrolled_place_ends(qtbot, place: QWidget, theme: Theme) -> None:
+    ring = FocusRing(theme, place)
+    inside = QWidget()
+    inside.setFixedSize(300, 2000)
+    button = Button(theme, "Far down")
+    button.setParent(inside)
+    button.move(10, 1500)
+    area = QScrollArea()
+    area.setWidget(inside)
+    place.layout().addWidget(area)
+    QTest.qWait(1)
+    button.setFocus(Qt.FocusReason.TabFocusReason)
+    QTest.qWait(1)
+    area.verticalScrollBar().setValue(0)
+    QTest.qWait(1)
+    assert not ring.isVisible()
+
+
+def test_a_ring_outlives_its_widget(qtbot, place: QWidget, theme: Theme) -> None:
+    ring = FocusRing(theme, place)
+    button = Button(theme, "Brief")
+    place.layout().addWidget(button)
+    button.setFocus(Qt.FocusReason.TabFocusReason)
+    qtbot.waitUntil(lambda: ring.target is button)
+    button.deleteLater()
+    qtbot.waitUntil(lambda: ring.target is not button)
+    assert not ring.isVisible()
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"), [("Ctrl+Shift+S", "Ctrl Shift S"), ("Ctrl++", "Ctrl +"), ("F12", "F12")]
+)
+def test_keys_are_said_as_on_the_keyboard(keys: str, said: str) -> None:
+    assert spoken_key(keys) == said
+
+
+def test_a_sheet_closes_with_esc_and_when_the_person_goes_elsewhere(
+    qtbot, place: QWidget, theme: Theme
+) -> None:
+    field = QLineEdit()
+    place.layout().addWidget(field)
+    for leave in (lambda: QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape), field.setFocus):
+        sheet = Sheet(theme, place, "Keyboard shortcuts", [("Stop", "F12"), ("plain words", "")])
+        sheet.show_over()
+        assert sheet.isVisible()
+        assert place.rect().contains(sheet.geometry())
+        with qtbot.waitSignal(sheet.destroyed):
+            leave()

@@ -1,0 +1,164 @@
+"""The start page: what it offers, and that nothing stands there which is not there."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
+
+from app import resources
+from app.core.settings import RecentFile
+from app.ui.miniature import Row, category_of, rows
+from app.ui.start_page import StartPage, read_examples
+from app.ui.start_parts import LinkButton, day_words
+from app.ui.theme import Theme
+from app.ui.widgets import Button
+from tests.ui.shell_parts import examples
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+NOW = dt.datetime(2026, 11, 20, 9, 0, tzinfo=dt.timezone.utc)
+
+
+@pytest.fixture
+def page(qtbot, theme: Theme, tmp_path: Path) -> StartPage:
+    theme.apply()
+    made = StartPage(theme, examples(tmp_path))
+    made.resize(1440, 820)
+    qtbot.addWidget(made)
+    made.show_recent([])
+    made.show()
+    return made
+
+
+def words(page: StartPage) -> str:
+    labels = [shown.text() for shown in page.findChildren(QLabel) if shown.isVisible()]
+    return " | ".join(
+        [*labels, *(button.text() for button in page.findChildren(Button) if button.isVisible())]
+    )
+
+
+def test_it_offers_a_robot_a_behaviour_and_examples(page: StartPage) -> None:
+    seen = words(page)
+    for part in ("What would you like to do?", "Use the virtual robot", "New behaviour", "Open an example"):
+        assert part in seen
+    assert "Learn" not in seen
+    assert "Find mine" not in seen
+    assert "Recent" not in seen
+    assert [card.text() for card in page.example_cards] == ["Greeting", "Quiz"]
+
+
+def test_only_one_button_is_filled(page: StartPage) -> None:
+    assert [b.text() for b in page.findChildren(Button) if b.kind == "primary"] == ["Use the virtual robot"]
+
+
+def test_what_is_pressed_is_told(qtbot, page: StartPage, tmp_path: Path) -> None:
+    told: list[object] = []
+    page.virtual_robot.connect(lambda: told.append("robot"))
+    page.new_behaviour.connect(lambda: told.append("new"))
+    page.example_chosen.connect(told.append)
+    page.developer_pressed.connect(lambda: told.append("developer"))
+    for button in page.findChildren(Button):
+        if button.text() in {"Use the virtual robot", "New behaviour"}:
+            QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    QTest.keyClick(page.example_cards[1], Qt.Key.Key_Space)
+    QTest.mouseClick(page.findChildren(LinkButton)[0], Qt.MouseButton.LeftButton)
+    assert told == ["robot", "new", tmp_path / "Quiz.nepb", "developer"]
+
+
+def test_recent_files_stand_there_with_their_day(page: StartPage, tmp_path: Path) -> None:
+    page.show_recent(
+        [RecentFile(tmp_path / f"{n}.nepb", f"Story {n}", NOW.timestamp() - n * 86400) for n in range(4)], NOW
+    )
+    QTest.qWait(1)
+    assert "Recent" in words(page)
+    assert [row.accessibleName() for row in page.recent_rows] == [
+        "Open Story 0, Today, 9:00",
+        "Open Story 1, Yesterday",
+        "Open Story 2, 18 November",
+    ]
+    page.show_recent([])
+    assert "Recent" not in words(page)
+
+
+@pytest.mark.parametrize(
+    ("days", "said"),
+    [(0, "Today, 9:00"), (1, "Yesterday"), (3, "17 November"), (400, "16 October 2025")],
+)
+def test_days_are_said_in_words(days: int, said: str) -> None:
+    assert day_words(NOW - dt.timedelta(days=days), NOW) == said
+
+
+def test_the_robots_chip_is_there_only_with_a_robot(page: StartPage) -> None:
+    assert not page.robot_card.chip.isVisible()
+    page.show_robot("Pepper ready", "ok")
+    assert page.robot_card.chip.isVisible()
+    page.show_robot("", "off")
+    assert not page.robot_card.chip.isVisible()
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_large_text_scrolls_and_clips_nothing(qtbot, page: StartPage, theme: Theme, percent: int) -> None:
+    page.resize(1100, 660)
+    theme.set_text_percent(percent)
+    QTest.qWait(1)
+    for shown in page.findChildren(QLabel):
+        if shown.isVisible() and shown.text():
+            room = shown.heightForWidth(shown.width()) if shown.wordWrap() else shown.sizeHint().height()
+            assert shown.height() >= room, shown.text()
+
+
+def test_the_shipped_examples_are_read_with_their_blocks() -> None:
+    found = read_examples(resources.folder() / "examples")
+    assert len(found) >= 3
+    for example in found[:3]:
+        assert example.text
+        assert len(example.rows) >= 3
+        assert example.rows[0].category == "events"
+
+
+def test_a_damaged_example_is_left_out(tmp_path: Path) -> None:
+    (tmp_path / "a.nepb").write_text("{", "utf-8")
+    (tmp_path / "b.nepb").write_text(json.dumps({"workspace": 3}), "utf-8")
+    (tmp_path / "c.nepb").write_text(json.dumps({"name": "C", "workspace": {}}), "utf-8")
+    assert [example.name for example in read_examples(tmp_path)] == ["C"]
+    assert read_examples(tmp_path / "nowhere") == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "category"),
+    [
+        ("control_wait", "control"),
+        ("robot_pepper_do_say", "robot"),
+        ("robot_virtual_pepper_get_battery", "sensors"),
+        ("robot_pepper_when_touched", "events"),
+    ],
+)
+def test_a_blocks_category_is_in_its_type(kind: str, category: str) -> None:
+    assert category_of(kind) == category
+
+
+def test_rows_follow_the_blocks_and_stand_inside_others() -> None:
+    inner = {"type": "robot_pepper_do_say", "inputs": {"TEXT": {"shadow": {"type": "values_text"}}}}
+    repeat = {
+        "type": "control_repeat",
+        "inputs": {"TIMES": {}, "DO": {"block": inner}},
+        "next": {"block": inner},
+    }
+    top = {"type": "events_started", "next": {"block": repeat}}
+    found = rows({"blocks": {"blocks": [{"type": "values_text"}, top]}})
+    assert found == (
+        Row(0, "events", 7, 0),
+        Row(0, "control", 6, 1),
+        Row(1, "robot", 3, 1),
+        Row(0, "robot", 3, 1),
+    )
+
+
+@pytest.mark.parametrize("workspace", [{}, {"blocks": 3}, {"blocks": {"blocks": [1, None]}}])
+def test_a_workspace_without_blocks_has_no_rows(workspace: dict[str, object]) -> None:
+    assert rows(workspace) == ()

@@ -1,0 +1,108 @@
+"""The status bar says what is true with its number, and nothing that is not known."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from app.ui.robots_chip import robots_chip
+from app.ui.status_bar import Facts, StatusBar
+from app.ui.theme import Theme
+from tests.ui import fakes
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def link(name: str, state: str) -> SimpleNamespace:
+    return SimpleNamespace(name=name, state=state)
+
+
+def with_robots(*links: SimpleNamespace, active: bool = False) -> SimpleNamespace:
+    return SimpleNamespace(fleet=SimpleNamespace(links=list(links)), runs=SimpleNamespace(active=active))
+
+
+@pytest.fixture
+def session() -> fakes.Session:
+    return fakes.Session.full()
+
+
+def facts(session: object) -> Facts:
+    return Facts(session, clock=time.gmtime)  # type: ignore[arg-type]
+
+
+def test_health_names_the_alerts_before_the_robots(session: fakes.Session) -> None:
+    assert facts(session).health() == ("circle-x", "1 alert", "error")
+    session.alerts.put("slow", "warn", "Slow.")
+    assert facts(session).health()[1] == "2 alerts"
+    session.alerts.cure("slow")
+    session.alerts.cure("message:/faces")
+    assert facts(session).health() == ("circle-check", "Pepper is well", "ok")
+
+
+def test_health_without_a_robot() -> None:
+    assert facts(fakes.Session()).health() == ("circle-dashed", "No robot", "off")
+
+
+def test_saving_is_said_with_its_time(session: fakes.Session) -> None:
+    assert facts(session).saved()[1] == ""
+    session.document.saved_at = 8 * 3600 + 41 * 60
+    assert facts(session).saved()[1] == "Saved 8:41"
+    session.document.dirty = True
+    assert facts(session).saved()[1] == "Not saved, kept safe"
+
+
+def test_traffic_counts_live_topics_only(session: fakes.Session) -> None:
+    session.messages_per_s = 268.6
+    assert facts(session).traffic()[1] == "7 nodes, 12 topics, 269 messages/s"
+    session.messages_per_s = None
+    assert facts(session).traffic()[1] == "7 nodes, 12 topics"
+    session.graph = None
+    assert facts(session).traffic()[1] == ""
+
+
+def test_losses_are_there_only_when_there_are_any(session: fakes.Session) -> None:
+    assert facts(session).lost()[1] == ""
+    session.lost_30s = 12
+    assert facts(session).lost() == ("triangle-alert", "12 lost in 30 s", "warn")
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("connected", "Master 127.0.0.1:7780"),
+        ("searching", "Looking for the master 127.0.0.1:7780"),
+        ("none", "No master"),
+    ],
+)
+def test_the_master(session: fakes.Session, kind: str, words: str) -> None:
+    session.master.kind = kind
+    assert facts(session).master()[1] == words
+
+
+def test_facts_without_words_leave_no_gap(qtbot, theme: Theme) -> None:
+    bar = StatusBar(theme)
+    qtbot.addWidget(bar)
+    bar.resize(900, 26)
+    bar.show()
+    bar.show_facts((("", "one", None), ("", "", None), ("", "two", None)), (("", "right", None),))
+    assert bar.words() == ["one", "two", "right"]
+    bar.show_facts((("", "one", None),), ())
+    assert bar.words() == ["one"]
+
+
+@pytest.mark.parametrize(
+    ("links", "active", "chip"),
+    [
+        ([], False, ("No robot", "off")),
+        ([link("NAO", "away")], False, ("No robot", "off")),
+        ([link("Pepper", "ready")], False, ("Pepper ready", "ok")),
+        ([link("Pepper", "ready")], True, ("Pepper running", "ok")),
+        ([link("Pepper", "busy")], False, ("Pepper moving", "ok")),
+        ([link("Pepper", "ready"), link("Turtle", "ready")], False, ("2 robots", "ok")),
+        ([link("Pepper", "ready"), link("Turtle", "silent")], True, ("Turtle does not answer", "error")),
+    ],
+)
+def test_the_chip_of_the_robots(links, active: bool, chip: tuple[str, str]) -> None:
+    assert robots_chip(with_robots(*links, active=active)) == chip  # type: ignore[arg-type]
