@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping
 
+from app.blocks.catalogue import categories
+
 LIMIT_S = 10
 
 
@@ -40,13 +42,21 @@ def _started(workspace: dict[str, object], block_type: str) -> dict[str, object]
         return workspace
     starter: dict[str, object] = {"type": block_type, "x": 40, "y": 40}
     for number, top in enumerate(tops):
-        if isinstance(top, dict):
+        if isinstance(top, dict) and _can_follow(str(top.get("type", ""))):
             starter |= {name: top.pop(name) for name in ("x", "y") if name in top}
             starter["next"] = {"block": top}
             tops[number] = starter
             return workspace
     tops.append(starter)
     return workspace
+
+
+def _can_follow(block_type: str) -> bool:
+    """Whether a block of this type hangs under others; one that nobody knows is taken for such a block."""
+    known = {block.type: block.shape for category in categories() for block in category.blocks}
+    if block_type in known:
+        return known[block_type] in ("statement", "cap")
+    return "_get_" not in block_type and "_when_" not in block_type
 
 
 def _blocks(workspace: Mapping[str, object]) -> Iterator[dict[str, object]]:

@@ -25,7 +25,8 @@ class Names:
         # Python compares names in this form: two that look different must not become one.
         plain = _GAPS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]
         if not plain.isidentifier():
-            plain = f"{otherwise}_{plain}" if f"{otherwise}_{plain}".isidentifier() else otherwise
+            longer = f"{otherwise}_{plain}"
+            plain = longer if plain and longer.isidentifier() else otherwise
         plain = unicodedata.normalize("NFKC", plain)
         name, number = plain.lower() if plain.isascii() else plain, 2
         stem = name

@@ -202,6 +202,7 @@ class Runner:
         if process.stdout is not None:
             process.stdout.close()
         self._orders.put(None)
+        self._threads[-1].join(timeout=END_S)  # its last words
         was_stopped = self.state == "stopping"
         self.state = "ended"
         last = self._last

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import copy
+
+from app.blocks.compiler import compile_behaviour
+from app.blocks.mend import mend
+from tests.blocks.samples import block, robot, say, started, workspace
+
+
+def problems(saved):
+    return compile_behaviour(saved, [robot()]).problems
+
+
+def test_a_time_limit():
+    inner = block("control_wait_until", "w", CONDITION=block("robot_pepper_get_sees_face", ROBOT="Pepper"))
+    saved = workspace(started(block("control_forever", BODY=[say("a"), inner])))
+    before = copy.deepcopy(saved)
+    (problem,) = problems(saved)
+    assert problem.mend_action is not None
+    mended = mend(saved, problem.mend_action)
+    assert mended is not None
+    assert saved == before
+    assert problems(mended) == ()
+    assert "at_most_s=10" in compile_behaviour(mended, [robot()]).source
+
+
+def test_a_start_for_blocks_without_one():
+    saved = workspace(say("Hi") | {"x": 100, "y": 50})
+    mended = mend(saved, problems(saved)[0].mend_action or "")
+    assert mended is not None
+    assert problems(mended) == ()
+    top = mended["blocks"]["blocks"][0]
+    assert (top["type"], top["x"], top["y"]) == ("events_started", 100, 50)
+
+
+def test_a_value_gets_no_start():
+    saved = workspace(block("robot_pepper_get_battery", ROBOT="Pepper"), say("Hi"))
+    mended = mend(saved, "add:events_started")
+    assert mended is not None
+    assert [top["type"] for top in mended["blocks"]["blocks"]] == [
+        "robot_pepper_get_battery",
+        "events_started",
+    ]
+
+
+def test_an_empty_workspace_gets_a_start():
+    mended = mend({}, "add:events_started")
+    assert mended is not None
+    assert compile_behaviour(mended, []).starts == 1
+
+
+def test_what_is_no_matter_of_blocks():
+    assert mend(workspace(), "connect:NAO") is None
+    assert mend(workspace(), "limit:nobody") is None

@@ -1,0 +1,167 @@
+"""Names, fields, values, hats, sentences: the pure parts, each by itself."""
+
+from __future__ import annotations
+
+import keyword
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.blocks import values
+from app.blocks.explain import BehaviourError, explain
+from app.blocks.fields import ChoiceField, ColourField, FieldError, NumberField, PathField, TopicField
+from app.blocks.hats import Hat, PassGate, changes, event_matches
+from app.blocks.names import Names
+from app.blocks.robot_handle import sentence
+from app.blocks.robot_text import TextParts
+from app.blocks.workspace import parse_workspace
+from tests.blocks.samples import robot
+
+
+@given(st.lists(st.text(), min_size=1, max_size=8))
+def test_every_name_is_one_of_pythons_and_no_name_comes_twice(words):
+    names = Names(frozenset({"taken"}))
+    made = [names.new(word, "thing") for word in words]
+    assert len(set(made)) == len(made)
+    assert all(name.isidentifier() and not keyword.iskeyword(name) and name != "taken" for name in made)
+
+
+def test_names_read_like_the_words():
+    names = Names(frozenset())
+    assert names.new("when started", "x") == "when_started"
+    assert names.new("When started!", "x") == "when_started_2"
+    assert names.new("123", "thing") == "thing_123"
+    assert names.new("???", "thing") == "thing"
+
+
+def test_a_number_field():
+    field = NumberField("N", 5, 0, 10)
+    assert [field.read(saved) for saved in (None, 3, "4.5", 2.0)] == [5, 3, 4.5, 2]
+    for wrong in ("x", True, float("nan"), float("inf"), [], 11, -1):
+        with pytest.raises(FieldError):
+            field.read(wrong)
+
+
+def test_a_choice_field_gives_back_the_value_behind_the_words():
+    field = ChoiceField("C", (("yes", True), ("three", 3), ("all", "all")))
+    assert [field.read(saved) for saved in ("true", "3", "all", None)] == [True, 3, "all", True]
+    assert field.words(3) == "three"
+    with pytest.raises(FieldError):
+        field.read("none")
+    assert ChoiceField("ROBOT", (), source="robots:nao").read("NAO") == "NAO"
+
+
+def test_topics_colours_paths():
+    assert TopicField("T").read("/a/b") == "/a/b"
+    for wrong in ("", "a b", "{", "\n", "x" * 201):
+        with pytest.raises(FieldError):
+            TopicField("T").read(wrong)
+    assert ColourField("C").read("#ABCDEF") == "#abcdef"
+    with pytest.raises(FieldError):
+        ColourField("C").read("red")
+    assert PathField("P").read("a.b") == "a.b"
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (None, ""),
+        (True, "true"),
+        (2.0, "2"),
+        (2.5, "2.5"),
+        ({"a": "é"}, '{"a": "é"}'),
+        ([1], "[1]"),
+        ("x", "x"),
+    ],
+)
+def test_values_as_text(value, expected):
+    assert values.text(value) == expected
+
+
+def test_parts_of_messages():
+    message = {"faces": [{"name": "Ada"}], "a.b": 1}
+    assert values.part(message, "faces.0.name") == "Ada"
+    assert values.part(message, "a.b") == 1
+    assert values.part(message, "") == message
+    assert values.part("tired", "value") == "tired"
+    for nothing in ("faces.1.name", "faces.x", "nobody", "faces.0.name.first"):
+        assert values.part(message, nothing) is None
+
+
+def test_random_numbers_stay_between_their_limits():
+    assert {values.random_number(3, 1) for _ in range(200)} == {1, 2, 3}
+    assert all(0.5 <= values.random_number(0.5, 1) <= 1 for _ in range(50))
+
+
+def test_rounds():
+    assert list(values.repeat(2.5)) == [0, 1, 2]
+    assert list(values.repeat(-3)) == []
+    with pytest.raises(BehaviourError, match="“repeat” needs a number, not a text"):
+        values.repeat("x")
+
+
+def test_errors_in_words():
+    assert explain(OverflowError(), "÷", "b").sentence == "“÷” gives something too large."
+    assert explain(MemoryError(), "÷", "b").block == "b"
+    assert explain(RecursionError(), "", None).sentence == "this block is nested too deep."
+    assert explain(KeyError("x"), "say", "b").sentence == "“say” failed: 'x'."
+    inner = BehaviourError("no voice.", "inner")
+    assert explain(inner, "outer", "outer").block == "inner"
+
+
+def test_a_hat_keeps_its_newest_events_and_counts_the_others():
+    hat = Hat("x", most=3)
+    for number in range(5):
+        hat.happened((number,))
+    assert hat.dropped == 2
+    lone = Hat("x", most=1)
+    lone.happened(())
+    lone.happened(())
+    assert lone.dropped == 0  # a second touch while the script runs is one more run, not a loss
+
+
+def test_a_gate_tells_only_of_passing():
+    passed = []
+    gate = PassGate("below", 20, lambda: passed.append(1))
+    for value, so_far in ((10, 0), (30, 0), (20, 0), (19, 1), (5, 1), (None, 1), (True, 1), (21, 1), (0, 2)):
+        gate(value)
+        assert len(passed) == so_far
+
+
+def test_a_change_is_a_difference():
+    seen = []
+    told = changes(lambda: seen.append(1))
+    for value in (1, 1, 2, 2, 1):
+        told(value)
+    assert len(seen) == 2
+
+
+def test_events_match_their_filters():
+    touched, source = robot().event("touched"), robot().source
+    assert event_matches({"place": "head", "down": True}, {"place": "head"}, touched, source)
+    assert not event_matches({"place": "head", "down": False}, {"place": "head"}, touched, source)
+    assert not event_matches({"place": "left_hand"}, {"place": "head"}, touched, source)
+    assert event_matches({"word": "Hello "}, {"word": "hello"}, robot().event("heard"), source)
+    assert event_matches("no object", {}, None, {})
+
+
+def test_what_a_robot_does_in_words():
+    pepper = robot()
+    turn, say = pepper.action("turn"), pepper.action("say")
+    assert turn is not None
+    assert say is not None
+    assert sentence(pepper, turn, {"direction": "right"}) == "Pepper turns right by 90 °"
+    assert sentence(pepper, say, {"text": "Hi"}) == "Pepper says “Hi”"
+
+
+def test_places_in_a_robots_text():
+    parts = TextParts("%robot say %text loud %text %nobody %ROBOT", ["text", "robot", "Text", "live"])
+    assert parts.text == "%ROBOT say %TEXT loud   "
+    assert parts.arguments == {"text": "TEXT", "robot": "ROBOT_2", "Text": "TEXT_2", "live": "LIVE_2"}
+    assert TextParts("wave", []).text == "%ROBOT wave"
+
+
+def test_ids_are_made_unique():
+    saved = {"blocks": {"blocks": [{"type": "a", "id": "x"}, {"type": "b", "id": "x"}, {"type": "c"}]}}
+    assert [block.id for block in parse_workspace(saved).all_blocks()] == ["block", "x~2", "x"]

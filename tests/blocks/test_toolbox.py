@@ -1,0 +1,146 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app.blocks import editor_definitions
+from tests.blocks.samples import nao, robot
+
+DEFINITIONS = editor_definitions([robot()], [nao()], ["/faces"])
+BLOCKS = {definition["type"]: definition for definition in DEFINITIONS["blocks"]}  # type: ignore[attr-defined]
+
+
+def words(block_type: str) -> str:
+    """What stands on a block, with fields' and gaps' names."""
+    definition = BLOCKS[block_type]
+    lines = []
+    for number in range(4):
+        text = str(definition.get(f"message{number}", ""))
+        for place, argument in enumerate(definition.get(f"args{number}", []), 1):
+            text = text.replace(f"%{place}", f"[{argument['name']}]")
+        lines.append(text.strip())
+    return " / ".join(line for line in lines if line)
+
+
+@pytest.mark.parametrize(
+    ("block_type", "expected"),
+    [
+        ("events_started", "[ICON] when started"),
+        ("events_message", "[ICON] when a message arrives on [TOPIC]"),
+        ("robot_pepper_when_touched", "[ICON] when [ROBOT] [PLACE] is touched"),
+        ("robot_pepper_do_light", "[ICON] [ROBOT] light [WHERE] [COLOUR]"),
+        ("robot_pepper_do_say", "[ICON] [ROBOT] say [TEXT]"),
+        ("robot_pepper_do_turn", "[ICON] [ROBOT] turn [DIRECTION] by [ANGLE] °"),
+        ("robot_pepper_do_look", "[ICON] [ROBOT] look [EMOTION] for [SECONDS] s"),
+        ("robot_pepper_get_sees_face", "[ICON] [ROBOT] sees a face"),
+        ("robot_pepper_get_battery", "[ICON] [ROBOT] battery [LIVE]"),
+        ("robot_nao_do_wave", "[ICON] [ROBOT] wave [HAND] hand"),
+        ("control_wait", "[ICON] wait [SECONDS] s"),
+        ("control_wait_until", "[ICON] wait until [CONDITION]"),
+        ("control_repeat", "[ICON] repeat [TIMES] times / [BODY]"),
+        ("control_if", "[ICON] if [CONDITION] / [BODY]"),
+        ("control_if_else", "[ICON] if [CONDITION] / [BODY] / else / [ELSE]"),
+        ("messages_publish", "[ICON] publish [VALUE] on [TOPIC]"),
+        ("messages_newest", "[ICON] newest [FIELD] of [TOPIC]"),
+        ("values_text", "“ [TEXT] ”"),
+    ],
+)
+def test_blocks_read_as_in_the_design(block_type, expected):
+    assert words(block_type) == expected
+
+
+def test_the_icon_of_each_block_is_a_picture_and_its_arguments_are_numbered():
+    for definition in BLOCKS.values():
+        for number in range(4):
+            arguments = definition.get(f"args{number}", [])
+            message = str(definition.get(f"message{number}", "")).replace("%%", "")
+            for place in range(1, len(arguments) + 1):
+                assert f"%{place}" in message
+            assert f"%{len(arguments) + 1}" not in message
+    icon = BLOCKS["robot_pepper_do_say"]["args0"][0]
+    assert icon == {"type": "field_icon", "name": "ICON", "icon": "message-circle"}
+
+
+def test_shapes_become_connections():
+    hat, statement, cap = BLOCKS["events_started"], BLOCKS["control_wait"], BLOCKS["control_forever"]
+    assert ("previousStatement" in hat, "nextStatement" in hat) == (False, True)
+    assert ("previousStatement" in statement, "nextStatement" in statement) == (True, True)
+    assert ("previousStatement" in cap, "nextStatement" in cap) == (True, False)
+    assert BLOCKS["robot_pepper_get_sees_face"]["output"] == "Boolean"
+    assert BLOCKS["robot_pepper_get_battery"]["output"] == "Number"
+    assert BLOCKS["messages_newest"]["output"] is None
+
+
+def test_fields_of_ours():
+    fields = {argument["name"]: argument for argument in BLOCKS["robot_pepper_do_light"]["args0"]}
+    assert fields["ROBOT"] == {
+        "type": "field_choice", "name": "ROBOT", "options": [["Pepper", "Pepper"]], "source": "robots:pepper",
+    }  # fmt: skip
+    assert fields["WHERE"]["options"] == [["eyes", "eyes"], ["shoulders", "shoulders"]]
+    assert fields["COLOUR"] == {"type": "field_colour_chip", "name": "COLOUR", "value": "#37b6ff"}
+    newest = {argument["name"]: argument for argument in BLOCKS["messages_newest"]["args0"]}
+    assert newest["TOPIC"] == {"type": "field_topic", "name": "TOPIC", "value": "/faces"}
+    home = {argument["name"]: argument for argument in BLOCKS["robot_pepper_do_go_home"]["args0"]}
+    assert home["WITH_SONG"]["options"] == [["without a song", "false"], ["with a song", "true"]]
+
+
+def test_the_toolbox():
+    contents = DEFINITIONS["toolbox"]["contents"]  # type: ignore[index]
+    shape = [(item["kind"], item["name"]) for item in contents]
+    assert shape == [
+        ("blocksHeading", "Blocks"),
+        ("category", "Events"), ("category", "Control"), ("category", "Values"), ("category", "Variables"),
+        ("category", "Messages"),
+        ("robotHeading", "Pepper"),
+        ("category", "Speech"), ("category", "Movement"), ("category", "Face and lights"),
+        ("category", "Sensors"),
+        ("robotHeading", "NAO"),
+    ]  # fmt: skip
+    pepper, away = contents[6], contents[-1]
+    assert (pepper["virtual"], pepper["connected"], away["connected"]) == (True, True, False)
+    assert len({item["toolboxitemid"] for item in contents if item["kind"] == "category"}) == 9
+    speech = contents[7]
+    assert (speech["icon"], speech["categorystyle"], contents[10]["categorystyle"]) == (
+        "message-circle", "robot", "sensors",
+    )  # fmt: skip
+    say = speech["contents"][0]
+    assert say == {
+        "kind": "block",
+        "type": "robot_pepper_do_say",
+        "fields": {"ROBOT": "Pepper"},
+        "inputs": {"TEXT": {"shadow": {"type": "values_text", "fields": {"TEXT": "Hello"}}}},
+    }
+    assert contents[4]["contents"][0] == {
+        "kind": "button", "text": "New variable", "callbackkey": "CREATE_VARIABLE",
+    }  # fmt: skip
+
+
+def test_every_entry_of_the_toolbox_is_defined_and_every_style_is_known():
+    for item in DEFINITIONS["toolbox"]["contents"]:  # type: ignore[index]
+        for entry in item.get("contents", []):
+            if entry["kind"] == "block":
+                definition = BLOCKS[entry["type"]]
+                names = {argument["name"] for n in range(4) for argument in definition.get(f"args{n}", [])}
+                assert set(entry.get("inputs", {})) | set(entry.get("fields", {})) <= names
+    assert {definition["style"] for definition in BLOCKS.values()} <= set(DEFINITIONS["styles"])  # type: ignore[arg-type]
+
+
+def test_robots_of_one_model_share_their_blocks():
+    two = editor_definitions([robot("Pepper"), robot("Salt")])
+    says = [each for each in two["blocks"] if each["type"] == "robot_pepper_do_say"]  # type: ignore[attr-defined]
+    assert len(says) == 1
+    assert says[0]["args0"][1]["options"] == [["Pepper", "Pepper"], ["Salt", "Salt"]]
+    presets = [
+        entry["fields"]["ROBOT"]
+        for item in two["toolbox"]["contents"]  # type: ignore[index]
+        if item.get("name") == "Speech"
+        for entry in item["contents"]
+        if entry["type"] == "robot_pepper_do_say"
+    ]
+    assert presets == ["Pepper", "Salt"]
+
+
+def test_everything_is_json():
+    json.dumps(DEFINITIONS)
+    assert editor_definitions([])["toolbox"]["contents"][-1]["name"] == "Messages"  # type: ignore[index]

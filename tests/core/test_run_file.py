@@ -1,0 +1,152 @@
+"""``python -m app run FILE``: with a robot on a real network, and with the virtual one in its own process."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from app import resources
+from app.run import FAILED, INTERRUPTED, OK, ROBOT_MISSING, UNUSABLE, run_file
+from tests.blocks.fakes import until
+from tests.blocks.samples import block, number, robot, say, started, text, workspace, write
+from tests.blocks.wire_robot import WireRobot
+
+
+@pytest.fixture
+def pepper(master):
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def saved(tmp_path):
+    def write_file(content, name="Test"):
+        path = tmp_path / "test.nepb"
+        robots = {"Pepper": dict(robot().source)}
+        path.write_text(
+            json.dumps(
+                {
+                    "format": "nep-behaviour",
+                    "version": 1,
+                    "name": name,
+                    "workspace": content,
+                    "robots": robots,
+                }
+            )
+        )
+        return path
+
+    return write_file
+
+
+def run(path, **more) -> tuple[int, str]:
+    out = io.StringIO()
+    return run_file(path, out=out, **more), out.getvalue()
+
+
+def test_a_file_runs_to_its_end_and_the_robot_has_stopped(pepper, saved):
+    code, out = run(saved(workspace(started(say("Hi"), write(text("done"))))))
+    assert code == OK
+    assert "“Test” runs" in out
+    assert "done" in out.splitlines()
+    assert "Pepper stopped (" in out
+    assert pepper.commands[-1]["op"] == "stop"
+
+
+def test_a_failing_block_is_told(pepper, saved):
+    pepper.refuses = {"say": "no voice"}
+    code, out = run(saved(workspace(started(say("Hi")))))
+    assert code == FAILED
+    assert "Pepper: no voice." in out
+    assert "Pepper stopped (" in out
+
+
+def test_an_interrupt_stops_it_and_proves_it(pepper, saved):
+    pepper.slow = {"say"}
+    interrupted = threading.Event()
+    found: list[tuple[int, str]] = []
+    path = saved(workspace(started(say("Hi"))))
+    thread = threading.Thread(target=lambda: found.append(run(path, interrupted=interrupted)))
+    thread.start()
+    until(lambda: bool(pepper.heard("invoke")))
+    interrupted.set()
+    thread.join(15)
+    assert found[0][0] == INTERRUPTED
+    assert "Pepper stopped (" in found[0][1]
+
+
+def test_a_robot_that_does_not_stop_is_named(pepper, saved):
+    pepper.silent = {"stop"}
+    code, out = run(saved(workspace(started(say("Hi")))))
+    assert code == FAILED
+    assert "Pepper did not answer. Switch it off by hand." in out
+
+
+def test_a_robot_that_is_not_there(master, saved):
+    code, out = run(saved(workspace(started(say("Hi")))), robot_wait_s=0.2)
+    assert code == ROBOT_MISSING
+    assert "Pepper not found." in out
+
+
+def test_what_cannot_run(master, saved, tmp_path):
+    code, out = run(saved(workspace(started(block("control_wait")))))
+    assert (code, "error: wait needs a number." in out) == (UNUSABLE, True)
+    assert run(saved(workspace()))[0] == UNUSABLE
+    assert run(tmp_path / "missing.nepb")[0] == UNUSABLE
+    (tmp_path / "x.nepb").write_text("{")
+    assert run(tmp_path / "x.nepb")[0] == UNUSABLE
+    code, out = run(saved(workspace(started(say("Hi")))), master="127.0.0.1:1")
+    assert (code, "no master" in out) == (UNUSABLE, True)
+    assert run(saved(workspace(started(write(number(1))))), master="127.0.0.1:1")[0] == OK  # needs nobody
+
+
+@pytest.fixture
+def virtual_pepper(master):
+    environment = {**os.environ, "NEP_MASTER": master.address}
+    command = [
+        sys.executable,
+        "-m",
+        "app.robots.simulated",
+        "--name",
+        "Pepper",
+        "--owner-pid",
+        str(os.getpid()),
+    ]
+    process = subprocess.Popen(command, env=environment)
+    yield process
+    process.terminate()
+    process.wait(10)
+
+
+@pytest.mark.parametrize("number", [0, 2], ids=["greeting", "tour guide"])
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_the_examples_run_on_the_virtual_robot(master, virtual_pepper, number):
+    path = sorted(resources.path("examples").glob("*.nepb"))[number]
+    code, out = run(path, robot_wait_s=20)
+    assert code == OK, out
+    said = ["Hello! I am Pepper.", None, "Thank you for coming."][number]
+    assert f"Pepper says “{said}”" in out
+    assert "Pepper stopped (" in out
+
+
+@pytest.mark.timeout(60)
+def test_the_program_text_runs_as_a_file(master, pepper, tmp_path):
+    from app.blocks import compile_behaviour
+
+    saved = workspace(started(say("Hi"), write(text("done"))))
+    path = tmp_path / "program.py"
+    path.write_text(compile_behaviour(saved, [robot()], name="Test").source, "utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
+    done = subprocess.run([sys.executable, path], env=environment, capture_output=True, text=True, timeout=30)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+    assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
+    assert pepper.commands[-1]["op"] == "stop"
