@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from app.robots.description import Action
 from app.ui.forms import ActionForm
 from app.ui.icons import paint_icon
+from app.ui.sensor_words import number_words
 from app.ui.theme import Theme
 from app.ui.widgets import Bar, Button, Card, Chip, IconButton, label, paint
 from app.ui.words import seconds_words
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from app.core.robot_link import Invocation
 
 TILE = 28
+TO_GO = "to_go"
 RISKS = {"moves": "moves the robot", "locomotes": "moves the robot"}
 
 
@@ -42,20 +44,34 @@ class Tile(QWidget):
 
 
 def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
-    """What the robot says meanwhile: "moved 0.2 m"; the fields that its description names."""
+    """What the robot says meanwhile: "0.3 m to go"; the fields that its description names."""
     parts = []
     for field in action.feedback:
         value = feedback.get(field.name)
         if value is None or field.name == "progress":
             continue
-        number = f"{value:.2f}" if isinstance(value, float) else str(value)
-        parts.append(" ".join(part for part in (field.title, number, field.unit) if part))
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            words = number_words(float(round(value, 2)), field.unit)
+        else:
+            words = f"“{value}”"
+        parts.append(f"{words} {field.title}" if field.name == TO_GO else f"{field.title} {words}")
     return ", ".join(parts)
 
 
-def progress_of(invocation: Invocation) -> float | None:
-    """How much is done, 0 to 1, if the robot tells it."""
-    value = invocation.feedback.get("progress")
+def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
+    """How much is done, 0 to 1: what the robot calls progress, or what is left to go of what was asked."""
+    share = _number(feedback.get("progress"))
+    if share is not None:
+        return share
+    left = _number(feedback.get(TO_GO))
+    unit = next((field.unit for field in action.feedback if field.name == TO_GO), None)
+    asked = next(
+        (_number(given.get(one.name)) for one in action.parameters if unit and one.unit == unit), None
+    )
+    return 1.0 - abs(left / asked) if left is not None and asked else None
+
+
+def _number(value: object) -> float | None:
     good = isinstance(value, (int, float)) and not isinstance(value, bool)
     return float(value) if good else None  # type: ignore[arg-type]
 
@@ -72,6 +88,7 @@ class ActionCard(Card):
         super().__init__(theme)
         self.action = action
         self._running = False
+        self._given: Mapping[str, object] = {}
         self._folded = False
         self.form = ActionForm(theme, action, options)
         self.form.changed.connect(self._say_summary)
@@ -134,7 +151,8 @@ class ActionCard(Card):
         if self._running:
             self.cancelled.emit()
         else:
-            self.tried.emit(self.form.input())
+            self._given = self.form.input()
+            self.tried.emit(dict(self._given))
 
     def show_problems(self, sentences: Sequence[str]) -> None:
         """The input was refused."""
@@ -150,7 +168,9 @@ class ActionCard(Card):
         self.try_button.setAccessibleName(f"{self.try_button.text()} {self.action.title}")
         self.try_button.setEnabled(can_cancel or not self._running)
         self.set_first(self.border == "accent")
-        share = progress_of(invocation) if invocation is not None and self._running else None
+        share = None
+        if invocation is not None and self._running:
+            share = progress_of(self.action, self._given, invocation.feedback)
         self.progress.setVisible(share is not None)
         self.progress.set_fraction(share)
         words = ""

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPixmap
 
 from app.ui.robot_figure import HEAD, limbs, paint_figure
-from app.ui.robot_room import Spot, Stage, paint_room, paint_thing, thing_area
+from app.ui.robot_room import WIDTH, Spot, Stage, paint_room, paint_thing, thing_area
 from app.ui.robot_state import RobotState, Thing
 
 BUBBLE_WIDTH = 190.0
@@ -151,7 +151,10 @@ def _placed(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
     for thing in state.objects:
         before = thing.kind in {"person", "face"} and thing.x > state.x
         shown = replace(thing, kind="place") if before else thing
-        placed.append((stage.spot(thing.x, thing.y), shown))
+        spot = stage.spot(thing.x, thing.y)
+        half = thing_area(shown, spot).width() / 2
+        inside = min(max(spot.u, half + 4), WIDTH - half - 4)  # what stands at a side wall is seen whole
+        placed.append((replace(spot, u=inside), shown))
     return sorted(placed, key=lambda pair: pair[0].v)
 
 

@@ -186,7 +186,7 @@ def _head(p: QPainter, state: RobotState, heading: float) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(_shade(HEAD_RX))
     p.drawEllipse(QPointF(0, 0), HEAD_RX, HEAD_RY)
-    nod = -HEAD_RY * 0.85 * math.sin(math.radians(max(-45.0, min(45.0, state.head_pitch_deg))))
+    nod = HEAD_RY * 0.6 * math.sin(math.radians(max(-45.0, min(45.0, state.head_pitch_deg))))
     p.save()
     round_head = QPainterPath()
     round_head.addEllipse(QPointF(0, 0), HEAD_RX, HEAD_RY)

@@ -19,6 +19,8 @@ BACK, FRONT = 178.0, 280.0  # where things stand at the far wall and nearest to 
 START = 250.6 - HORIZON  # where the robot of the design stands: scale 1
 BALL_M, CARD_M = 0.14, 0.30
 UNITS_PER_M = 150.0
+SHELF_UNITS_PER_M = 66.0
+BOOKS = (("#3F7CB3", "#C9523F", "#E2A94F", "#4E8C7A"), ("#4E8C7A", "#7A5BA8", "#3F7CB3"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,17 +183,37 @@ def _table(p: QPainter, spot: Spot) -> None:
     p.restore()
 
 
+def _shelf(p: QPainter, area: QRectF) -> None:
+    """Two boards with books, lower than it is, so that the window stays in view."""
+    p.fillRect(area, QColor("#8B6644"))
+    edge = area.width() * 0.07
+    inside = area.adjusted(edge, edge, -edge, -edge * 0.6)
+    p.fillRect(inside, QColor("#6B4A2F"))
+    board = inside.height() / 2
+    for row in range(2):
+        bottom = inside.top() + board * (row + 1)
+        p.fillRect(QRectF(inside.left(), bottom - edge * 0.7, inside.width(), edge * 0.7), QColor("#9E7654"))
+        x = inside.left() + edge * 0.6
+        for place, colour in enumerate(BOOKS[row]):
+            wide, high = edge * (1.5 + place % 2 * 0.5), board * (0.62 + 0.09 * (place * 2 % 3))
+            p.fillRect(QRectF(x, bottom - edge * 0.7 - high, wide, high), QColor(colour))
+            x += wide + edge * 0.25
+
+
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
     """Where a thing is seen, in stage units."""
     if thing.kind == "place":
         return QRectF(spot.u - 30 * spot.scale, spot.v - 8 * spot.scale, 60 * spot.scale, 16 * spot.scale)
+    if thing.kind == "shelf":
+        high = (thing.height_m or 1.2) * SHELF_UNITS_PER_M * spot.scale
+        return QRectF(spot.u - 27 * spot.scale, spot.v - high, 54 * spot.scale, high)
     if thing.kind == "ball":
         r = max(4.0, (thing.size_m or BALL_M) * 110.0 * spot.scale)
         return QRectF(spot.u - r, spot.v - 2 * r + r * 0.08, 2 * r, 2 * r)
     if thing.kind == "table":
         share = spot.scale / TABLE.scale
         return QRectF(spot.u - 53 * share, spot.v - 61 * share, 106 * share, 61 * share)
-    wide = max(10.0, (thing.size_m or CARD_M) * UNITS_PER_M * spot.scale)
+    wide = max(10.0, min(thing.size_m or CARD_M, CARD_M * 0.8) * UNITS_PER_M * spot.scale)
     return QRectF(spot.u - wide / 2, spot.v - 78 * spot.scale - wide * 0.6, wide, wide * 1.2)
 
 
@@ -201,6 +223,9 @@ def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     if thing.kind == "table":
         _table(p, spot)
+        return
+    if thing.kind == "shelf":
+        _shelf(p, area)
         return
     if thing.kind == "ball":
         _ball(p, area, QColor(thing.colour or "#D8403F"))

@@ -19,6 +19,7 @@ class Thing:
     name: str = ""
     colour: str | None = None
     size_m: float | None = None
+    height_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,7 @@ class RobotState:
     """One drawable moment of a robot.
 
     ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
-    grows to the robot's left, pitch grows upwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
+    grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
     """
 
     x: float = 0.0
@@ -115,6 +116,7 @@ def _thing(one: Mapping[str, object]) -> Thing:
         name=str(one.get("name") or ""),
         colour=_colour(colour, "") or None,
         size_m=_number(size) if size is not None else None,
+        height_m=_number(one.get("height")) if one.get("height") is not None else None,
     )
 
 

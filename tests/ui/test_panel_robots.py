@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
 from app.robots.parts import Field
-from app.ui.action_card import feedback_words
+from app.ui.action_card import feedback_words, progress_of
 from app.ui.panels.robots import PANEL, RobotsPanel
 from tests.ui.fakes import ACTIONS, Invocation, RobotLink, Session, pepper
 from tests.ui.panel_case import Window, button, press
@@ -96,8 +96,13 @@ def test_what_cannot_be_cancelled_waits_for_its_end(panel, window) -> None:
 
 def test_feedback_is_said_in_the_words_of_the_description() -> None:
     walk = next(action for action in ACTIONS if action.name == "walk")
-    described = replace(walk, feedback=(Field("moved", "moved", "number", "m"),))
-    assert feedback_words(described, {"moved": 0.2, "progress": 0.5, "other": 1}) == "moved 0.20 m"
+    walk = replace(walk, feedback=(Field("to_go", "to go", "number", "m"), Field("word", "word", "text")))
+    assert feedback_words(walk, {"to_go": 0.301, "progress": 0.5, "other": 1}) == "0.30 m to go"
+    assert feedback_words(walk, {"word": "hello"}) == "word “hello”"
+    assert progress_of(walk, {"distance": 0.5}, {"progress": 0.25}) == 0.25
+    assert progress_of(walk, {"distance": -0.5}, {"to_go": -0.2}) == pytest.approx(0.6)
+    assert progress_of(walk, {}, {"to_go": 0.2}) is None
+    assert progress_of(walk, {"distance": 0.5}, {}) is None
 
 
 def test_one_try_is_filled_the_one_with_the_focus(qtbot, panel) -> None:
