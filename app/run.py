@@ -42,12 +42,7 @@ def run_file(
     one line each. Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots
     stopped.
     """
-    stream = out or sys.stdout
-
-    def say(line: str) -> None:
-        stream.write(line + "\n")
-        stream.flush()
-
+    say = _writer(out or sys.stdout)
     try:
         name, workspace, descriptions = read(Path(path))
         known = _known(descriptions)
@@ -70,6 +65,14 @@ def run_file(
     except (AppError, NepError) as error:
         say(f"{error}.")
         return UNUSABLE
+
+
+def _writer(stream: TextIO) -> Callable[[str], None]:
+    def say(line: str) -> None:
+        stream.write(line + "\n")
+        stream.flush()
+
+    return say
 
 
 def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:

@@ -52,6 +52,7 @@ class Block:
     parameters: tuple[str, ...] = ()  # a hat's: names that its function gets
     fails: bool = True  # a value's: may its Python raise?
     needs_message: bool = False  # reads the message that started its script
+    publishes: bool = False  # its topics are published on, not listened to
 
     def argument(self, name: str) -> Argument | None:
         """The argument of that name."""

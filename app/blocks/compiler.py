@@ -9,12 +9,9 @@ from collections.abc import Mapping, Sequence
 from app.blocks.block import Block
 from app.blocks.catalogue import Catalogue
 from app.blocks.fields import (
-    Argument,
-    ChoiceField,
     Field,
     FieldError,
     StatementInput,
-    TopicField,
     ValueInput,
     VariableField,
 )
@@ -24,6 +21,7 @@ from app.blocks.program import Program
 from app.blocks.reading import reading
 from app.blocks.render import instrumented, readable
 from app.blocks.template import expression, literal, statements
+from app.blocks.uses import Uses, saved_value
 from app.blocks.workspace import Placed, Workspace, parse_workspace
 from app.robots.description import Robot
 
@@ -72,9 +70,7 @@ class _Compiler:
         self._notes = Notes(catalogue, workspace)
         self._readings: dict[str, str] = {}
         self._labels: dict[str, str] = {}
-        self._used: dict[str, dict[object, None]] = {
-            kind: {} for kind in ("robots", "sensors", "events", "publishes", "listens")
-        }
+        self._uses = Uses()
         self._in_message = False
         self._numbers: set[str] = set()  # the blocks that must give a number
 
@@ -93,11 +89,11 @@ class _Compiler:
             source=source,
             runnable=instrumented(body, self._marks, self._numbers),
             lines=lines,
-            robots=tuple(str(name) for name in self._used["robots"]),
-            sensors=tuple(pair for pair in self._used["sensors"] if isinstance(pair, tuple)),
-            events=tuple(pair for pair in self._used["events"] if isinstance(pair, tuple)),
-            publishes=tuple(str(topic) for topic in self._used["publishes"]),
-            listens=tuple(str(topic) for topic in self._used["listens"]),
+            robots=tuple(self._uses.robots),
+            sensors=tuple(self._uses.sensors),
+            events=tuple(self._uses.events),
+            publishes=tuple(self._uses.publishes),
+            listens=tuple(self._uses.listens),
             readings=self._readings,
             labels=self._labels,
             problems=self._notes.problems(),
@@ -123,7 +119,7 @@ class _Compiler:
         except _Skip:
             return None
         decorator = expression(_template(block, first), expressions, self._keywords(block, expressions))
-        self._use(first, block)
+        self._uses.remember(first, block)
         parameters = ", ".join(block.parameters)
         (function,) = statements(
             f"@%DECORATOR\ndef script({parameters}):\n    %BODY",
@@ -169,7 +165,7 @@ class _Compiler:
             expressions = self._expressions(placed, block)
         except _Skip:
             return []
-        self._use(placed, block)
+        self._uses.remember(placed, block)
         self._notes.look(placed, block)
         bodies = {
             argument.name: self._statements(placed.inputs.get(argument.name, ()))
@@ -215,7 +211,7 @@ class _Compiler:
         if missing is not None:
             made = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
         else:
-            self._use(placed, block)
+            self._uses.remember(placed, block)
             made = expression(_template(block, placed), expressions, self._keywords(block, expressions))
         if block.fails or missing is not None:
             self._marks[made] = placed.id
@@ -270,35 +266,12 @@ class _Compiler:
         self._labels[placed.id] = self._notes.label(placed, block)
         return words
 
-    def _use(self, placed: Placed, block: Block) -> None:
-        """Remember the robots and topics that the program needs before its first block."""
-        robot = placed.field_id("ROBOT") or _first_robot(block)
-        if block.robot is not None:
-            self._used["robots"][robot] = None
-            if block.robot.kind in ("sensor", "event"):
-                name = block.robot.name or str(_read(block, placed, "SENSOR"))
-                self._used[f"{block.robot.kind}s"][robot, name] = None
-        for argument in block.arguments:
-            if isinstance(argument, TopicField):
-                kind = "publishes" if block.type.startswith("messages_publish") else "listens"
-                self._used[kind][str(_read(block, placed, argument.name))] = None
-
 
 def _template(block: Block, placed: Placed) -> str:
     if isinstance(block.python, str):
         return block.python
-    chosen = _read(block, placed, block.variant or "")
+    chosen = saved_value(block, placed, block.variant or "")
     return block.python[str(chosen)]
-
-
-def _read(block: Block, placed: Placed, name: str) -> object:
-    argument: Argument | None = block.argument(name)
-    return argument.read(placed.fields.get(name)) if isinstance(argument, Field) else None
-
-
-def _first_robot(block: Block) -> str:
-    field = block.argument("ROBOT")
-    return str(field.read(None)) if isinstance(field, ChoiceField) else ""
 
 
 def _is_plain(name: str) -> bool:

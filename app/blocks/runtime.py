@@ -21,6 +21,15 @@ from app.robots.description import Robot
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
 
+_OWN = (
+    "fail", "newest", "number", "on_message", "on_start", "on_true", "publish", "robot", "step",
+    "stop_program",
+    "value", "wait", "wait_until", "write",
+)  # fmt: skip
+_PURE = (
+    "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
+)  # fmt: skip
+
 MESSAGES_WAITING = 16
 EVENTS_WAITING = 1
 
@@ -56,31 +65,7 @@ class Runtime:
 
     def namespace(self) -> dict[str, object]:
         """The names of a program, each bound to what it does."""
-        return {
-            "fail": self.fail,
-            "is_known": values.is_known,
-            "join": values.join,
-            "length": values.length,
-            "newest": self.newest,
-            "number": self.number,
-            "on_message": self.on_message,
-            "on_start": self.on_start,
-            "on_true": self.on_true,
-            "part": values.part,
-            "publish": self.publish,
-            "random_number": values.random_number,
-            "repeat": values.repeat,
-            "robot": self.robot,
-            "rounded": values.rounded,
-            "rounded_down": values.rounded_down,
-            "rounded_up": values.rounded_up,
-            "step": self.step,
-            "stop_program": self.stop_program,
-            "value": self.value,
-            "wait": self.wait,
-            "wait_until": self.wait_until,
-            "write": self.write,
-        }
+        return {name: getattr(self, name) for name in _OWN} | {name: getattr(values, name) for name in _PURE}
 
     # ---- beginning and end
 

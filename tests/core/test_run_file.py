@@ -146,7 +146,9 @@ def test_the_program_text_runs_as_a_file(master, pepper, tmp_path):
     path = tmp_path / "program.py"
     path.write_text(compile_behaviour(saved, [robot()], name="Test").source, "utf-8")
     environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
-    done = subprocess.run([sys.executable, path], env=environment, capture_output=True, text=True, timeout=30)
+    done = subprocess.run(
+        [sys.executable, path], env=environment, capture_output=True, text=True, timeout=30, check=False
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
     assert pepper.commands[-1]["op"] == "stop"

@@ -22,6 +22,7 @@ CATEGORY = Category(
             tooltip="Sends a value to everybody who listens to this topic.",
             python="publish(%TOPIC, %VALUE)",
             arguments=(ValueInput("VALUE", None, "hello"), TopicField("TOPIC")),
+            publishes=True,
         ),
         Block(
             type="messages_publish_field",
@@ -32,6 +33,7 @@ CATEGORY = Category(
             tooltip="Sends a message with one named field, such as {“name”: “Ada”}.",
             python="publish(%TOPIC, {%FIELD: %VALUE})",
             arguments=(TextField("FIELD", "name"), ValueInput("VALUE", None, "Ada"), TopicField("TOPIC")),
+            publishes=True,
         ),
         Block(
             type="messages_write",
