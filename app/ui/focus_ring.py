@@ -7,7 +7,15 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QGuiApplication, QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractItemView, QAbstractScrollArea, QApplication, QMenu, QMenuBar, QWidget
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QAbstractScrollArea,
+    QApplication,
+    QMainWindow,
+    QMenu,
+    QMenuBar,
+    QWidget,
+)
 from shiboken6 import isValid
 
 from app.ui.theme import Theme
@@ -51,7 +59,11 @@ class FocusRing(QWidget):
     def _rings(self, widget: QWidget) -> bool:
         if widget.window() is not self._window or widget is self._window or widget.property("ownFocus"):
             return False
-        return not isinstance(widget, QAbstractItemView | QAbstractScrollArea | QMenu | QMenuBar)
+        parent = widget.parentWidget()
+        if parent is not None and parent.inherits("QWebEngineView"):  # the page shows its own focus
+            return False
+        own = QAbstractItemView | QAbstractScrollArea | QMainWindow | QMenu | QMenuBar
+        return not isinstance(widget, own)
 
     def _follow(self, target: QWidget | None) -> None:
         for widget in self._chain:

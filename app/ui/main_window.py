@@ -110,6 +110,7 @@ class MainWindow(QMainWindow):
         bench = self.benches[layout.name]
         self.showing = layout.name
         self.pages.setCurrentWidget(bench)
+        bench.setFocus(Qt.FocusReason.OtherFocusReason)
         self._show_bars(layout.name)
         self.state.keep_layout(layout.name)
         return bench

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.core.run_view import RunView
 from app.ui.run_parts import Bar, Mark, Result, Sentence
 from app.ui.theme import Theme
 from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, paint
+
+ROOM_PX = 960  # what the bar needs at 100 % text
 
 
 class RunBar(Bar):
@@ -41,6 +44,7 @@ class RunBar(Bar):
         self.step.clicked.connect(self.step_pressed)
         self.stop.clicked.connect(self.stop_pressed)
         self.confirm.clicked.connect(self.confirm_pressed)
+        theme.changed.connect(self._fit)
 
     def _build(self, theme: Theme) -> None:
         row = QHBoxLayout(self)
@@ -57,6 +61,16 @@ class RunBar(Bar):
         row.addWidget(self.result)
         row.addSpacing(-4)
         row.addWidget(self.stop)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Large text in a narrow window: Pause and Step are icons, in every state."""
+        bare = self.width() < self._theme.scaled(ROOM_PX)
+        self.pause.set_bare(bare)
+        self.step.set_bare(bare)
 
     def show_view(self, view: RunView) -> None:
         """Show one of the six states."""

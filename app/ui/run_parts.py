@@ -92,7 +92,7 @@ class Sentence(QWidget):
         return QSize(320, round(high))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(120, self.sizeHint().height())
+        return QSize(60, self.sizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
@@ -168,7 +168,7 @@ class Result(QWidget):
         return QSize(round(width) + 2, max(least, round(paint.height_of(self._font())) + 10))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(60, self.sizeHint().height())
+        return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme

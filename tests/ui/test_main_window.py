@@ -11,6 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 
 from app.core.journal import Journal, left_behind
+from app.core.run_view import RunView
 from app.core.session import Session
 from app.core.settings import Settings
 from app.ui.actions import TABLE, shortcuts
@@ -408,3 +409,33 @@ def test_all_controls_have_names(qtbot, window: MainWindow, commands: Commands) 
         if b.isVisible() and not (b.accessibleName() or b.text())
     ]
     assert nameless == []
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_titles_grow_with_the_text(qtbot, window: MainWindow, commands: Commands, percent: int) -> None:
+    show(qtbot, window)
+    bench = window.show_layout("behaviour")
+    window.theme.set_text_percent(percent)
+    for dock in bench.docks.values():
+        qtbot.waitUntil(lambda title=dock.title: title.height() >= title.sizeHint().height())
+        assert dock.title.name.height() >= dock.title.name.sizeHint().height()
+        assert dock.title.height() >= dock.title.fontMetrics().height()
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_results_are_never_cut_at_the_smallest_window(
+    qtbot, window: MainWindow, commands, percent: int
+) -> None:
+    show(qtbot, window)
+    window.show_layout("behaviour")
+    window.resize(1100, 700)
+    window.theme.set_text_percent(percent)
+    bar = window.run_bar
+    bar.show_view(
+        RunView(
+            "proven", "Stopped", "", "Stopped", can_run=True, result="Pepper stopped (41 ms)", result_ok=True
+        )
+    )
+    qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())
+    assert bar.stop.geometry().right() <= bar.width()
+    assert bar.run.width() >= bar.run.sizeHint().width()

@@ -96,6 +96,10 @@ class Button(QAbstractButton):
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
+    def shown_word(self) -> str:
+        """The word that is painted."""
+        return self.text()
+
     def frame(self) -> QRectF:
         """Where the button's body is painted."""
         return QRectF(self.rect())
@@ -113,16 +117,17 @@ class Button(QAbstractButton):
         if self.measure.font == "body":
             font.setWeight(font.Weight.Medium)
         frame = self.frame()
-        text_width = paint.width_of(font, self.text())
+        word = self.shown_word()
+        text_width = paint.width_of(font, word)
         icon = self.measure.icon if self.icon_name is not None else 0
-        gap = self.measure.gap if icon and self.text() else 0
+        gap = self.measure.gap if icon and word else 0
         left = frame.center().x() - (icon + gap + text_width) / 2
         if self.icon_name is not None:
             top = frame.center().y() - icon / 2
             filled = self.fill_icon and self.isEnabled()
             paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, ink, filled=filled)
         area = QRectF(QPointF(left + icon + gap, frame.top()), frame.bottomRight())
-        paint.words(painter, area, self.text(), font, ink)
+        paint.words(painter, area, word, font, ink)
 
     def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
         """Fill, border and ink of the moment."""

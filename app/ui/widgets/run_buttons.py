@@ -14,6 +14,7 @@ from app.ui.widgets.button import Button
 
 Place = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
+BARE_WIDTH = 56
 RING = 4
 
 
@@ -26,6 +27,7 @@ class RunButton(Button):
         """``widest`` is the longest word it will ever show, so that it never changes its width."""
         super().__init__(theme, text, icon, size="large", parent=parent)
         self._widest = widest or text
+        self._bare = False
         self.fill_icon = False
 
     def set_filled(self, filled: bool) -> None:
@@ -33,8 +35,20 @@ class RunButton(Button):
         self.fill_icon = filled
         self.set_kind("run" if filled else "plain")
 
+    def set_bare(self, bare: bool) -> None:
+        """Show only the icon, where large text leaves no room for the word; its accessible name stays."""
+        if bare != self._bare:
+            self._bare = bare
+            self.updateGeometry()
+            self.update()
+
+    def shown_word(self) -> str:
+        return "" if self._bare else self.text()
+
     def sizeHint(self) -> QSize:
         font = self._theme.font("button")
+        if self._bare:
+            return QSize(BARE_WIDTH, max(self.measure.height, round(paint.height_of(font)) + 12))
         inner = self.measure.icon + self.measure.gap + paint.width_of(font, self._widest)
         height = max(self.measure.height, round(paint.height_of(font)) + 12)
         return QSize(max(RUN_WIDTH, round(inner) + 28), height)
