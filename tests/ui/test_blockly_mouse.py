@@ -31,6 +31,22 @@ def test_a_block_dragged_under_the_hat_snaps_there(qtbot, view, person):
     assert them.newest() == changed.args[0]
 
 
+def test_what_is_flushed_while_a_block_is_in_the_hand_is_a_program(qtbot, view, person):
+    them = person(START)
+    hat = them.box("[data-id=start] > .blocklyPath")
+    them.open_category("Control")
+    start = them.hold(".blocklyFlyout .control_wait")
+    end = QPoint(round(hat["left"] + 16), round(hat["bottom"] + 22))
+    them.move(start, QPoint(700, 300))
+    them.move(QPoint(700, 300), end)
+    them.wait_for("!!document.querySelector('[data-id=start] .blocklyInsertionMarker')")
+    tops = them.tops()
+    assert START in tops
+    assert [top["type"] for top in tops if top != START] == ["control_wait"]
+    them.drop(end)
+    qtbot.waitUntil(lambda: "next" in them.tops()[0], timeout=WAIT_MS)
+
+
 def test_undo_redo_and_their_announcement(qtbot, view, person):
     them = person(START)
     history: list[tuple[bool, bool]] = []

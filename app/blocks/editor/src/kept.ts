@@ -72,10 +72,14 @@ export function keepWhole(state: BlockState): BlockState {
 
 /** The opposite of `keep` and `keepWhole`. */
 export function unkeep(state: BlockState): BlockState {
-  const result: BlockState = {...state};
-  if (state.inputs) result.inputs = mapInputs(state.inputs, unkeepConnected);
-  if (state.next) result.next = unkeepConnected(state.next);
-  if (state.type !== KEPT) return result;
+  const {inputs, next, ...result} = state as BlockState;
+  if (inputs) {
+    const filled = Object.entries(inputs).map(([name, each]) => [name, unkeepConnected(each)] as const)
+      .filter(([, each]) => each.block || each.shadow);
+    if (filled.length) result['inputs'] = Object.fromEntries(filled);
+  }
+  if (next?.block || next?.shadow) result['next'] = unkeepConnected(next);
+  if (state.type !== KEPT) return result as BlockState;
   const kept = state.extraState as KeptState;
   const {type, extraState, ...rest} = result;
   void type;
@@ -92,8 +96,9 @@ function keepConnected(each: Connected, kind: InputKind): Connected {
     ...(each.shadow && {shadow: keep(each.shadow, kind)})};
 }
 
+/** Without the `null` that Blockly writes for the grey preview of a block that is still being dragged. */
 function unkeepConnected(each: Connected): Connected {
-  return {...each, ...(each.block && {block: unkeep(each.block)}), ...(each.shadow && {shadow: unkeep(each.shadow)})};
+  return {...(each.shadow && {shadow: unkeep(each.shadow)}), ...(each.block && {block: unkeep(each.block)})};
 }
 
 /** Whether the definition has a place for everything that the state holds. */
