@@ -282,6 +282,12 @@ def master(peers: Peers, nep_home: str) -> Program:
     return start_master(peers, nep_home)
 
 
+@pytest.fixture
+def start_again(peers: Peers, nep_home: str) -> Callable[[], Program]:
+    """Starts the master again after it was killed."""
+    return lambda: start_master(peers, nep_home)
+
+
 def start_master(peers: Peers, address: str) -> Program:
     """Start `nep master` and wait until it answers."""
     from nep.masters import is_running

@@ -154,6 +154,14 @@ def publish_until(publisher, frame, done):
     pytest.fail("nothing arrived")
 
 
+def waiting(subscriber):
+    """All frames that have arrived."""
+    frames = []
+    while subscriber.poll(0):
+        frames.append(subscriber.recv())
+    return frames
+
+
 def test_the_answer_has_the_originals_shape_and_ports_from_9000_up(gateway, original):
     first = original.ask_raw(
         b'{"node":"n1","topic":"t1","mode":"many2many","socket":"publisher","pid":1,"msg_type":"json"}'
@@ -295,9 +303,8 @@ def test_a_restarted_gateway_serves_the_same_ports_to_those_who_never_ask_again(
         publish_until(publisher, b't {"n":1}', lambda: subscriber.poll(0))
         gateway.close()
         gateway_at(second)
-        publish_until(publisher, b't {"n":2}', lambda: second.published)
-        while subscriber.recv() != b't {"n":2}':
-            pass
+        publish_until(publisher, b't {"n":2}', lambda: b't {"n":2}' in waiting(subscriber))
+        second.wait(lambda: second.published)
         second.wait(lambda: second.subscribed)
         second.wait(lambda: {program.name for program in second.programs} == {"other", "both"})
         assert original.ask("t", "subscriber")["port"] == port
