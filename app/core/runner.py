@@ -22,7 +22,7 @@ from app.errors import RunnerError
 Kind = Literal["ready", "running", "paused", "error", "print", "ended"]
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
-ASK_S = 0.05
+ASK_S = 0.04
 """How long a stopped program may take to end by itself; then it is killed. Together well below 100 ms."""
 END_S = 2.0
 """How long a process whose program has ended may take to end."""
