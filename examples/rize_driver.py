@@ -1,4 +1,4 @@
-"""A robot for RIZE and for blocks, in 30 lines on the original nep: ``pip install nep==0.5.3.5``.
+"""A robot for RIZE and for blocks, on the original nep: ``pip install nep==0.5.3.5 tornado simplejson``.
 
     python rize_driver.py Turtle
 

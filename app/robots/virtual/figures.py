@@ -69,10 +69,10 @@ def person() -> Texture:
     for side in (-1, 1):  # arms and hands behind the body
         shoulder, hand = 0.5 + side * 0.27, 0.5 + side * 0.36
         paint.shape(
-            [(shoulder - 0.07, 0.3), (shoulder + 0.05, 0.3), (hand + 0.06, 0.55), (hand - 0.06, 0.55)],
+            [(shoulder - 0.07, 0.322), (shoulder + 0.05, 0.322), (hand + 0.06, 0.55), (hand - 0.06, 0.55)],
             "#3972a8",
         )
-        paint.oval((shoulder, 0.3), (0.062, 0.03), "#3972a8")
+        paint.oval((shoulder + 0.008 * side, 0.322), (0.06, 0.03), "#3972a8")
         paint.oval((hand, 0.565), (0.055, 0.03), "#e0ab85")
     paint.oval((0.5, 0.33), (0.325, 0.09), "#3f7db8")
     paint.shape([(0.175, 0.33), (0.825, 0.33), (0.76, 0.66), (0.24, 0.66)], "#3f7db8")
