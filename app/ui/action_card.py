@@ -52,9 +52,9 @@ def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
             continue
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             words = number_words(float(round(value, 2)), field.unit)
+            parts.append(f"{words} {field.title}" if field.name == TO_GO else f"{field.title} {words}")
         else:
-            words = f"“{value}”"
-        parts.append(f"{words} {field.title}" if field.name == TO_GO else f"{field.title} {words}")
+            parts.append(f"“{value}”")
     return ", ".join(parts)
 
 

@@ -36,6 +36,11 @@ def image_summary(message: Message) -> Mapping[str, object]:
     }
 
 
+def tells_its_shape(message: Message) -> bool:
+    """Whether it is a picture that can be summed up without decoding it."""
+    return message.codec == "image" and message.extension.get("shape") is not None
+
+
 def plain_words(value: object) -> str:
     """A value for the clipboard: text as it is, everything else as JSON."""
     if isinstance(value, str):

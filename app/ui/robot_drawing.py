@@ -8,8 +8,9 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPixmap
 
 from app.ui.robot_figure import HEAD, limbs, paint_figure
-from app.ui.robot_room import WIDTH, Spot, Stage, paint_room, paint_thing, thing_area
+from app.ui.robot_room import WIDTH, Spot, Stage, paint_room
 from app.ui.robot_state import RobotState, Thing
+from app.ui.robot_things import paint_thing, thing_area
 
 BUBBLE_WIDTH = 190.0
 BUBBLE_LINES = 4

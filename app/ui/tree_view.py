@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QMouseEvent, QPainter, QPen
@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem, QTreeVi
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.tree import NODE_ROLE, Node, TreeModel
-from app.ui.tree_values import words_of
+from app.ui.tree_values import size_of, words_of
 
 Index = QModelIndex | QPersistentModelIndex
 INDENT, LEFT_EDGE, CHEVRON, VALUE_EDGE = 14, 8, 14, 10
@@ -78,6 +78,22 @@ class TreeView(QTreeView):
         """Whether any mark may still be fading: then the view wants to be painted again."""
         changed = self._tree.changed_at_s
         return changed is not None and self._clock() - changed < 1.2
+
+    def expand_small(self, rows: int) -> None:
+        """Open the small parts of a message, upper levels first, while at most ``rows`` rows are shown."""
+        waiting, shown = [QModelIndex()], self._tree.rowCount()
+        while waiting:
+            above = waiting.pop(0)
+            for row in range(self._tree.rowCount(above)):
+                index = self._tree.index(row, 0, above)
+                node = self._tree.node(index)
+                size = size_of(node.value)
+                few = 0 < size <= (8 if isinstance(node.value, Mapping) else 1)
+                if few and node.depth < 3 and shown + size <= rows:
+                    shown += size
+                    self._tree.fetchMore(index)
+                    self.expand(index)
+                    waiting.append(index)
 
     def drawBranches(self, _painter: QPainter, _rect: QRect, _index: Index) -> None:
         return

@@ -155,6 +155,19 @@ def test_pictures_are_summed_up_not_listed() -> None:
     }  # fmt: skip
 
 
+def test_pictures_are_not_decoded_to_be_summed_up(panel, window) -> None:
+    panel.show_topic("/robot/camera")
+    topic = window.session.topics["/robot/camera"]
+    told = {"shape": [480, 640, 3], "encoding": "jpeg"}
+    topic.newest = Message("/robot/camera", b"no picture at all", "image", "image", seq=1, extension=told)
+    panel.refresh()
+    assert panel.pages.currentIndex() == TREE
+    assert panel.model.value()["width"] == 640
+    topic.newest = Message("/robot/camera", b"no picture at all", "image", "image", seq=2)
+    panel.refresh()
+    assert panel.pages.currentIndex() == RAW  # nothing tells its shape, and its bytes are none
+
+
 def test_strings_are_shown_as_one_value(panel, window) -> None:
     panel.show_topic("/speech/words")
     window.session.send("/speech/words", b"hello")

@@ -98,7 +98,7 @@ def test_feedback_is_said_in_the_words_of_the_description() -> None:
     walk = next(action for action in ACTIONS if action.name == "walk")
     walk = replace(walk, feedback=(Field("to_go", "to go", "number", "m"), Field("word", "word", "text")))
     assert feedback_words(walk, {"to_go": 0.301, "progress": 0.5, "other": 1}) == "0.30 m to go"
-    assert feedback_words(walk, {"word": "hello"}) == "word “hello”"
+    assert feedback_words(walk, {"word": "hello"}) == "“hello”"
     assert progress_of(walk, {"distance": 0.5}, {"progress": 0.25}) == 0.25
     assert progress_of(walk, {"distance": -0.5}, {"to_go": -0.2}) == pytest.approx(0.6)
     assert progress_of(walk, {}, {"to_go": 0.2}) is None

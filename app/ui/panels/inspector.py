@@ -11,10 +11,17 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.hex_view import HexView
-from app.ui.inspector_parts import FindField, Foot, image_summary, message_facts, plain_words
+from app.ui.inspector_parts import (
+    FindField,
+    Foot,
+    image_summary,
+    message_facts,
+    plain_words,
+    tells_its_shape,
+)
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.tree import Node, TreeModel
-from app.ui.tree_values import search, size_of
+from app.ui.tree_values import search
 from app.ui.tree_view import TreeView
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton, Line, Segments, label
 from app.ui.words import size_words
@@ -44,7 +51,7 @@ class InspectorPanel(PanelWidget):
         self.model = TreeModel()
         self.live = Chip(self.theme, "", "info", "")
         self.freeze = IconButton(self.theme, "snowflake", "Freeze this panel", checkable=True, size=26)
-        self.freeze.toggled.connect(self._set_frozen)
+        self.freeze.toggled.connect(lambda _on: self.refresh())
         self.header = [self.live, self.freeze]
         self._make_tree()
         self._make_body()
@@ -147,7 +154,7 @@ class InspectorPanel(PanelWidget):
             self._show_raw(message, "")
         elif large and message is not self._allowed:
             self._offer_large(message)
-        elif self.session.topics.check(topic):
+        elif tells_its_shape(message) or self.session.topics.check(topic):
             self._show_tree(message)
         else:
             readable = False
@@ -159,23 +166,8 @@ class InspectorPanel(PanelWidget):
         first = not self.model.rowCount()
         self.model.set_value(value, time.monotonic())
         if first:
-            self._expand_first()
+            self.tree.expand_small(FIRST_ROWS)
         self._page(TREE)
-
-    def _expand_first(self) -> None:
-        """Open the small parts of a first message, so that there is something to see."""
-        waiting, rows = [QModelIndex()], self.model.rowCount()
-        while waiting:
-            above = waiting.pop(0)
-            for row in range(self.model.rowCount(above)):
-                index = self.model.index(row, 0, above)
-                node = self.model.node(index)
-                few = 0 < size_of(node.value) <= (8 if isinstance(node.value, Mapping) else 1)
-                if few and node.depth < 3 and rows + size_of(node.value) <= FIRST_ROWS:
-                    rows += size_of(node.value)
-                    self.model.fetchMore(index)
-                    self.tree.expand(index)
-                    waiting.append(index)
 
     def _show_raw(self, message: Message, sentence: str) -> None:
         self.bytes.show_bytes(message.data)
@@ -225,9 +217,6 @@ class InspectorPanel(PanelWidget):
     def frozen(self) -> bool:
         """Whether this panel holds its message."""
         return self.freeze.isChecked()
-
-    def _set_frozen(self, _on: bool) -> None:
-        self.refresh()
 
     def _set_mode(self, mode: str) -> None:
         self._raw_wanted = mode == "raw"
@@ -285,7 +274,7 @@ class InspectorPanel(PanelWidget):
 
     def theme_changed(self) -> None:
         self.tree.row_height = round(self.theme.scaled(self.theme.size("row", "tree")))
-        self.tree.viewport().update()
+        self.tree.doItemsLayout()
 
     def save_state(self) -> dict[str, object]:
         return {"topic": self._topic}

@@ -95,16 +95,16 @@ COLUMNS: tuple[Column[Topic], ...] = (
     Column(
         "publishers",
         "Publishers",
-        78,
+        74,
         publishers_cell,
         lambda t: t.publishers,
         figures=True,
         tip=_publishers_tip,
     ),
-    Column("rate", "Rate /s", 66, rate_cell, lambda t: t.rate_hz, figures=True),
-    Column("bandwidth", "Bandwidth", 80, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True),
-    Column("age", "Age", 66, age_cell, lambda t: t.age_s, figures=True),
-    Column("loss", "Loss", 76, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip),
+    Column("rate", "Rate /s", 58, rate_cell, lambda t: t.rate_hz, figures=True),
+    Column("bandwidth", "Bandwidth", 78, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True),
+    Column("age", "Age", 58, age_cell, lambda t: t.age_s, figures=True),
+    Column("loss", "Loss", 66, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip),
 )
 
 
