@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 
@@ -30,6 +31,9 @@ TICK_MS = 33
 SMALLEST = QSize(1100, 700)
 FIRST_SIZE = QSize(1440, 900)
 START = "start"
+FACTS_EVERY = 8  # ticks
+
+_log = logging.getLogger(__name__)
 
 
 class MainWindow(QMainWindow):
@@ -40,13 +44,16 @@ class MainWindow(QMainWindow):
     ) -> None:
         super().__init__()
         self.session, self.theme, self.panels = session, theme, panels
-        self.state = WindowState(session.settings)
+        self.state = WindowState(
+            session.settings, lambda sentence: session.console.add("warn", "studio", sentence)
+        )
         self.run: Callable[[str], object] = lambda _name: None
         self.on_shut: Callable[[], object] = lambda: None
         self.showing = ""
         self.benches: dict[str, Workbench] = {}
         self._facts = Facts(session)
         self._alerts_seen = -1
+        self._ticks = 0
         self._shut = False
         self._build(examples)
         self.context = PanelContext(session, theme, self.open_topic, self.toast.say, self._run)
@@ -121,6 +128,7 @@ class MainWindow(QMainWindow):
         self.tool_bar.setVisible(layout == "developer")
         self.status.setVisible(layout is not None)
         self._show_session()
+        self._show_facts()
 
     @property
     def bench(self) -> Workbench | None:
@@ -154,7 +162,16 @@ class MainWindow(QMainWindow):
     def tick(self) -> None:
         """Take what is new, and let everything that can be seen show it."""
         began = time.perf_counter()
-        self.session.tick()
+        self._ticks += 1
+        try:
+            self.session.tick()
+        except Exception as error:  # noqa: BLE001  the window must live on, and say so once
+            if not self.session.alerts.has("studio"):
+                _log.exception("a tick of the session failed")
+                detail = f"{type(error).__name__}: {error}"
+                self.session.alerts.put(
+                    "studio", "error", "Studio has a fault and may show old values.", detail
+                )
         self._show_session()
         if self.bench is not None:
             self.bench.refresh()
@@ -165,20 +182,30 @@ class MainWindow(QMainWindow):
         view = self.session.runs.view()
         words, status = robots_chip(self.session)
         self.bar.show_robots(words, status)
-        facts = self._facts
         if self.showing == START:
             self.bar.stop.show_state(view.stop_word, ring=view.state == "stopping", filled=self._moves())
             there = any(link.state in {"ready", "busy"} for link in self.session.fleet.links)
             self.start.show_robot(words if there else "", status)
         elif self.showing == "behaviour":
             self.run_bar.show_view(view)
-            self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach()))
         else:
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
+        if self._ticks % FACTS_EVERY == 0:
+            self._show_facts()
+        self._show_alerts()
+
+    def _show_facts(self) -> None:
+        """Figures that nobody can read 30 times a second."""
+        facts, document = self._facts, self.session.document
+        if self.showing == "behaviour":
+            self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach()))
+        elif self.showing == "developer":
             reach = ("lock", facts.reach()[1], None)
             self.status.show_facts((facts.master(), reach, facts.traffic(), facts.lost()), (facts.window(),))
-        self._show_alerts()
+        title = "NEP Studio" if self.showing == START else f"{document.name} - NEP Studio"
+        if title != self.windowTitle():
+            self.setWindowTitle(title)
 
     def _moves(self) -> bool:
         return self.session.runs.active or any(link.state == "busy" for link in self.session.fleet.links)

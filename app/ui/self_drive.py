@@ -15,7 +15,7 @@ from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
 from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
+from app.ui.main_window import FIRST_SIZE, MainWindow
 
 LOOK_MS = 100
 SETTLE_S = 0.6
@@ -45,6 +45,7 @@ class SelfDrive(QObject):
         self._step: Step | None = None
         self._began = 0.0
         self._seen_at: float | None = None
+        window.resize(FIRST_SIZE)
         folder.mkdir(parents=True, exist_ok=True)
         self._timer = QTimer(self)
         self._timer.setInterval(LOOK_MS)
@@ -69,7 +70,7 @@ class SelfDrive(QObject):
             return any(topic.watched and topic.newest is not None for topic in session.topics)
 
         return [
-            Step("the start page", window.show_start, window.isVisible, picture="start-light"),
+            Step("the start page", self._first, window.isVisible, picture="start-light"),
             Step("its dark colours", lambda: run("theme.dark"), window.isVisible, picture="start-dark"),
             Step("the virtual robot", self._begin, robot_there, 40, settle_s=2.5),
             Step("the program runs", lambda: run("run.run"), glows, 30, "behaviour-light", 1.5),
@@ -79,7 +80,12 @@ class SelfDrive(QObject):
             Step("a message", self._inspect, inspected, 20, "developer-dark", 2.5),
             Step("light again", lambda: run("theme.light"), lambda: True, 5, "developer-light"),
             Step("the stopped program", lambda: run("layout.behaviour"), lambda: True, 5, "stopped-light"),
+            Step("its actions", lambda: run("panel:robots"), lambda: True, 5, "robots-light"),
         ]
+
+    def _first(self) -> None:
+        self._commands.run("theme.light")
+        self._window.show_start()
 
     def _begin(self) -> None:
         self._commands.run("theme.light")

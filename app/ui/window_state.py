@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QByteArray
 from PySide6.QtWidgets import QMainWindow
@@ -19,9 +19,10 @@ Saved = dict[str, object]
 class WindowState:
     """Reads and writes the keys "window", "layout", "layouts", "theme", "text_percent" and "less_motion"."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, complain: Callable[[str], object]) -> None:
+        """``complain`` is told, in a sentence, what can't be kept."""
         self._settings = settings
-        self.problem: str | None = None
+        self._complain = complain
 
     def apply_theme(self, theme: Theme) -> None:
         """Give the theme what was chosen before; it is applied once."""
@@ -75,4 +76,4 @@ class WindowState:
         try:
             self._settings.set(key, value)
         except SettingsError as error:
-            self.problem = str(error)
+            self._complain(str(error))

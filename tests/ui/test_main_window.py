@@ -439,3 +439,21 @@ def test_results_are_never_cut_at_the_smallest_window(
     qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())
     assert bar.stop.geometry().right() <= bar.width()
     assert bar.run.width() >= bar.run.sizeHint().width()
+
+
+def test_a_fault_of_the_session_is_said_once_and_the_window_lives_on(
+    qtbot, window: MainWindow, commands: Commands, monkeypatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    show(qtbot, window)
+    window.show_layout("developer")
+
+    def fail() -> None:
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(window.session, "tick", fail)
+    before = panel(window, "developer", "topics").refreshed
+    window.tick()
+    window.tick()
+    assert panel(window, "developer", "topics").refreshed == before + 2
+    assert window.banner.banner.accessibleName().endswith("RuntimeError: broken")
+    assert len(caplog.records) == 1
