@@ -48,7 +48,7 @@ def run_file(
         known = _known(descriptions)
         wanted = compile_behaviour(workspace, known, name=name).robots
         with nep.node("behaviour runner", master=master) as node:
-            robots = find_robots(node, robot_wait_s, wanted=wanted) if wanted else ()
+            robots = find_robots(node, robot_wait_s, wanted=wanted, known=known) if wanted else ()
             program = compile_behaviour(workspace, robots, absent=known, name=name)
             code = _refused(program, wanted, robots, say)
             if code is not None:

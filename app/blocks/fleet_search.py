@@ -15,6 +15,7 @@ from nep.graph import GraphView
 from nep.message import Message
 
 DESCRIPTION = "robot/description"
+RIZE = "rize"
 SLICE_S = 0.1
 
 
@@ -47,12 +48,14 @@ def find_robots(
     timeout_s: float,
     *,
     wanted: Sequence[str] = (),
+    known: Sequence[Robot] = (),
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
 ) -> tuple[Robot, ...]:
     """The robots that announce themselves, by name.
 
     With `wanted` it waits until those are there, `timeout_s` at most; else it takes who is there at once.
+    Robots of RIZE announce nothing: those of `known` count as there when somebody listens to their commands.
     """
     wait = wait or threading.Event().wait
     until = clock() + timeout_s
@@ -60,13 +63,18 @@ def find_robots(
     asked: dict[str, Subscription] = {}
     try:
         while True:
-            for topic, info in node.graph().topics.items():
+            topics = node.graph().topics
+            for robot in known:
+                info = topics.get(robot.topics.command)
+                if robot.dialect == RIZE and info is not None and info.subscribers:
+                    found.setdefault(robot.name, robot)
+            for topic, info in topics.items():
                 if info.msg_type == DESCRIPTION and info.publishers and topic not in asked:
                     asked[topic] = node.new_sub(topic, DESCRIPTION)
             for subscription in asked.values():
-                robot = _described(subscription)
-                if robot is not None:
-                    found[robot.name] = robot
+                announced = _described(subscription)
+                if announced is not None:
+                    found[announced.name] = announced
             missing = set(wanted) - set(found) if wanted else len(asked) > len(found)
             if not missing or clock() >= until:
                 return tuple(found[name] for name in sorted(found))

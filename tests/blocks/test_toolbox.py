@@ -1,10 +1,13 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 
 from app.blocks import editor_definitions
+from app.blocks.catalogue import categories
 from tests.blocks.samples import nao, robot
 
 DEFINITIONS = editor_definitions([robot()], [nao()], ["/faces"])
@@ -144,3 +147,11 @@ def test_robots_of_one_model_share_their_blocks():
 def test_everything_is_json():
     json.dumps(DEFINITIONS)
     assert editor_definitions([])["toolbox"]["contents"][-1]["name"] == "Messages"  # type: ignore[index]
+
+
+def test_the_page_about_blocks_names_all_of_them():
+    page = Path("docs/blocks.md").read_text("utf-8")
+    for category in categories():
+        for described in category.blocks:
+            told = re.sub(r"%([A-Z_]+)", lambda match: f"({match[1].lower()})", described.text)
+            assert f"| {' '.join(told.split())} | {described.tooltip} |" in page

@@ -16,7 +16,7 @@ from app import resources
 from app.run import FAILED, INTERRUPTED, OK, ROBOT_MISSING, UNUSABLE, run_file
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, robot, say, started, text, workspace, write
-from tests.blocks.wire_robot import WireRobot
+from tests.blocks.wire_robot import RizeRobot, WireRobot
 
 
 @pytest.fixture
@@ -106,6 +106,25 @@ def test_what_cannot_run(master, saved, tmp_path):
     code, out = run(saved(workspace(started(say("Hi")))), master="127.0.0.1:1")
     assert (code, "no master" in out) == (UNUSABLE, True)
     assert run(saved(workspace(started(write(number(1))))), master="127.0.0.1:1")[0] == OK  # needs nobody
+
+
+def test_a_robot_of_rize_is_driven_too(master, tmp_path):
+    rosie = RizeRobot(master.address)
+    try:
+        hello = block("robot_rize_do_say", ROBOT="Rosie", TEXT=text("hello"))
+        robots = {"Rosie": dict(rosie.described.source)}
+        content = {"format": "nep-behaviour", "version": 1, "name": "RIZE", "robots": robots}
+        path = tmp_path / "rize.nepb"
+        path.write_text(json.dumps(content | {"workspace": workspace(started(hello))}))
+        code, out = run(path)
+        assert code == OK, out
+        assert "Rosie: stop sent; this robot cannot confirm" in out
+        first = rosie.commands[0]
+        assert (first["robots"], first["primitives"]["primitive"], first["primitives"]["input"]) == (
+            "Rosie", "say", "hello",
+        )  # fmt: skip
+    finally:
+        rosie.close()
 
 
 @pytest.fixture
