@@ -95,6 +95,11 @@ class Graph:
         """All nodes that are registered now."""
         return tuple(member.node for member in self._census.members.values())
 
+    def node(self, node_id: str) -> NodeRecord | None:
+        """The node of this id, if it is registered."""
+        member = self._census.members.get(node_id)
+        return None if member is None else member.node
+
     def apply(self, request: Request, call: int, now: float, sender: str) -> tuple[Outgoing, ...]:
         """Carry out a request of `sender`. What is wrong with it becomes a `Refused`, never an exception."""
         if isinstance(request, AddPublisher | AddSubscriber) and now < self._learnt_at:
@@ -155,7 +160,7 @@ class Graph:
         if isinstance(request, AddPublisher):
             return self._add_publisher(request, now, out)
         if isinstance(request, AddSubscriber):
-            return self._add_subscriber(request, now)
+            return self._add_subscriber(request, now, out)
         if isinstance(request, Join):
             return self._join(request, now, out)
         if isinstance(request, Renew):
@@ -194,11 +199,14 @@ class Graph:
                 (hung if other.hung else expected).append(entry)
         return Added(self.epoch, self.revision, tuple(expected), tuple(hung))
 
-    def _add_subscriber(self, request: AddSubscriber, now: float) -> Reply:
+    def _add_subscriber(self, request: AddSubscriber, now: float, out: list[Outgoing]) -> Reply:
         _check(request.subscriber)
         member = self._census.meet(request.node, now)
         self._census.add_subscriber(member, request.subscriber)
         found = self._census.publishers_of(request.subscriber.topic)
+        # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
+        for node_id in sorted({remote.node_id for remote in found} - {member.node.id}):
+            out.append(Outgoing(node_id, Probe(self.epoch, self.revision)))
         return Found(self.epoch, self.revision, found)
 
     def _join(self, request: Join, now: float, out: list[Outgoing]) -> Reply:
@@ -274,6 +282,10 @@ class Graph:
 
 def without(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
     """`answer` that expects nothing from these nodes: they turned out to be dead while it was on its way."""
+    if isinstance(answer, Found) and node_ids:
+        return replace(
+            answer, publishers=tuple(each for each in answer.publishers if each.node_id not in node_ids)
+        )
     if isinstance(answer, Added) and node_ids:
         return replace(
             answer,

@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
+import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
+
 from nep.addresses import master_address
 from nep.backends.base import Backend, Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
 from nep.codecs import codec_for

@@ -54,6 +54,8 @@ class Calls:
         self._calls: dict[int, _Call] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
+        self.is_connected = False
+        """Whether a master was there when the socket was read last."""
         self._changed = threading.Condition(threading.Lock())
         socket.setsockopt(zmq.LINGER, 0)
         socket.setsockopt(zmq.ROUTING_ID, node_id.encode())
@@ -65,12 +67,6 @@ class Calls:
             socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
         socket.connect(endpoint_of(address))
         self.fd = int(socket.getsockopt(zmq.FD))
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether a master is there, as far as the connection knows."""
-        with self._changed:
-            return bool(self._events() & zmq.POLLOUT)
 
     def ask(self, request: Request, timeout_s: float | None) -> Reply:
         """The reply; `timeout_s` None waits for ever.
@@ -90,6 +86,7 @@ class Calls:
                     raise MasterUnreachable(self.address, timeout_s)
                 call.is_sent = False  # asking twice does no harm
                 self._flush()
+                self._after_use()
         if call.reply is None:
             raise ClosedError("the node")
         if isinstance(call.reply, Refused):
@@ -104,11 +101,15 @@ class Calls:
         """All that came; also sends what is still to be sent. For the node's thread."""
         answers: list[Answer] = []
         with self._changed:
-            while self._events() & zmq.POLLIN:
-                answer = self._read_one()
-                if answer is not None:
-                    answers.append(answer)
-            self._flush()
+            while True:
+                events = self._events()
+                if events & zmq.POLLIN:
+                    answer = self._read_one()
+                    if answer is not None:
+                        answers.append(answer)
+                elif not self._flush():  # sending may take in what came meanwhile
+                    break
+            self.is_connected = bool(events & zmq.POLLOUT)
         return answers
 
     def stop(self) -> None:
@@ -136,17 +137,22 @@ class Calls:
             self._after_use()
         return call
 
-    def _flush(self) -> None:
-        """With the lock held: send what is not sent; what nobody waits for is not kept for later."""
+    def _flush(self) -> bool:
+        """With the lock held: send what is not sent; what nobody waits for is not kept for later.
+
+        Whether anything was sent.
+        """
+        has_sent = False
         for number, call in list(self._calls.items()):
             if call.is_sent or self._is_closed:
                 continue
             try:
                 self._socket.send(call.body, zmq.DONTWAIT)
-                call.is_sent = True
+                call.is_sent = has_sent = True
             except zmq.Again:
                 if not call.is_waited:
                     del self._calls[number]
+        return has_sent
 
     def _read_one(self) -> Answer | None:
         try:

@@ -151,11 +151,12 @@ class NativeOutlet:
     def _greet(self, subscriber: int) -> None:
         """What was latched, then the echo: from here on the subscriber counts."""
         own = hello_part(subscriber, self.spec.topic)
+        # First: whoever gets the echo may rely on being counted.
+        self._seen[subscriber] = self.count
         self._mark.greeted()
         if self._latched is not None:
             self._send_parts(own, self._latched)
         self._send_parts(own, (self._notice(0),))
-        self._seen[subscriber] = self.count
 
     def _notice(self, flags: int) -> bytes:
         return Header(self.spec.codec.number, flags, self.count, time.time_ns(), self.spec.id).pack()

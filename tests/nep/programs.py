@@ -1,0 +1,84 @@
+"""Small programs that tests run as processes of their own, and kill."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+from time import monotonic
+
+ROOT = Path(__file__).parents[2]
+
+
+class Program:
+    """A Python program that is running. It says things line by line."""
+
+    def __init__(self, code: str, *args: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-u", "-c", textwrap.dedent(code), *args],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )
+
+    def line(self) -> str:
+        """The next line it prints; an AssertionError when it ends instead."""
+        assert self.process.stdout is not None
+        said = self.process.stdout.readline()
+        if not said:
+            assert self.process.stderr is not None
+            raise AssertionError(self.process.stderr.read())
+        return said.strip()
+
+    def say(self, text: str) -> None:
+        """Give it a line."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(text + "\n")
+        self.process.stdin.flush()
+
+    def signal(self, number: signal.Signals) -> None:
+        self.process.send_signal(number)
+
+    def end(self, timeout_s: float = 10.0) -> tuple[str, str]:
+        """Wait for its end; what else it printed."""
+        return self.process.communicate(timeout=timeout_s)
+
+    def kill(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.communicate()
+
+
+@contextmanager
+def running(code: str, *args: str) -> Iterator[Program]:
+    """A program, killed at the end."""
+    program = Program(code, *args)
+    try:
+        yield program
+    finally:
+        program.kill()
+
+
+def eventually(is_met: Callable[[], bool], timeout_s: float = 5.0) -> float:
+    """Seconds until `is_met()`; an AssertionError when it takes too long. Looks 100 times a second."""
+    started, never = monotonic(), Event()
+    while not is_met():
+        assert monotonic() - started < timeout_s, f"not met within {timeout_s} s"
+        never.wait(0.01)
+    return monotonic() - started
+
+
+MASTER = """
+import sys, nep
+with nep.master(sys.argv[1]) as master:
+    print(master.address)
+    master.wait()
+"""

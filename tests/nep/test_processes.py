@@ -1,0 +1,299 @@
+"""Real processes: started, killed, stopped, and ended at the wrong moment."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack
+from time import monotonic
+
+import pytest
+
+import nep
+from nep.masters import Master
+from tests.nep.programs import MASTER, eventually, running
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="uses POSIX signals")
+
+COLLECT = """
+import sys, nep
+node = nep.node("collector" + sys.argv[2])
+sub = node.new_sub(sys.argv[1])
+print("ready")
+wanted = int(sys.argv[3])
+got = [sub.listen(timeout_s=5.0)[1] for _ in range(wanted)]
+print(got)
+"""
+
+PUBLISH = """
+import sys, nep
+node = nep.node("publisher")
+pub = node.new_pub(sys.argv[1], latched=True)
+pub.publish({"n": 1})
+print("ready")
+sys.stdin.readline()
+"""
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("tester") as made:
+        yield made
+
+
+def test_the_first_message_reaches_every_process_40_of_40(node: nep.Node) -> None:
+    with ExitStack() as stack:
+        programs = [stack.enter_context(running(COLLECT, "topic", str(n), "40")) for n in range(4)]
+        assert [program.line() for program in programs] == ["ready"] * 4
+        for n in range(40):
+            with node.new_pub("topic") as pub:
+                assert (pub.subscribers, pub.missing) == (4, ())
+                pub.publish(n)
+        for program in programs:
+            assert json.loads(program.line()) == list(range(40))
+
+
+def test_the_next_message_reaches_a_new_process(node: nep.Node) -> None:
+    pub = node.new_pub("topic")
+    for n in range(3):
+        with running(COLLECT, "topic", str(n), "1") as program:
+            assert program.line() == "ready"
+            pub.publish(n)
+            assert program.line() == f"[{n}]"
+            program.end()
+
+
+def test_a_killed_publisher_is_gone_within_3_s(node: nep.Node) -> None:
+    sub = node.new_sub("topic")
+    with running(PUBLISH, "topic") as program:
+        program.line()
+        assert sub.listen(timeout_s=2.0) == (True, {"n": 1})
+        assert len(node.graph().topics["topic"].publishers) == 1
+        program.signal(signal.SIGKILL)
+        assert eventually(lambda: not node.graph().topics["topic"].publishers) < 3.0
+        assert {each.name for each in node.graph().nodes.values()} == {"tester"}
+
+
+def test_a_publisher_that_is_started_again_is_heard(node: nep.Node) -> None:
+    sub = node.new_sub("topic")
+    for _ in range(2):
+        with running(PUBLISH, "topic") as program:
+            program.line()
+            assert sub.listen(timeout_s=2.0) == (True, {"n": 1})
+            program.signal(signal.SIGKILL)
+            program.end()
+    assert sub.lost == 0
+
+
+def test_a_killed_subscriber_costs_nothing(node: nep.Node) -> None:
+    with running(COLLECT, "topic", "0", "1") as program:
+        program.line()
+        program.signal(signal.SIGKILL)
+        program.end()
+        started = monotonic()
+        pub = node.new_pub("topic")
+        assert monotonic() - started < 0.3
+        assert (pub.subscribers, pub.missing) == (0, ())
+
+
+def test_a_killed_publisher_costs_a_new_subscriber_nothing(node: nep.Node) -> None:
+    with running(PUBLISH, "topic") as program:
+        program.line()
+        program.signal(signal.SIGKILL)
+        program.end()
+        started = monotonic()
+        node.new_sub("topic")
+        assert monotonic() - started < 0.3
+
+
+def test_a_hung_subscriber_costs_half_a_second_once_and_is_named(node: nep.Node) -> None:
+    with running(COLLECT, "topic", "0", "2") as program:
+        program.line()
+        program.signal(signal.SIGSTOP)
+        started = monotonic()
+        pub = node.new_pub("topic")
+        assert 0.4 < monotonic() - started < 0.8
+        assert pub.missing == ("collector0",)
+        eventually(lambda: any(alert.id.startswith("missing:") for alert in node.graph().alerts))
+        started = monotonic()
+        again = node.new_pub("topic")
+        assert monotonic() - started < 0.3
+        assert again.missing == ("collector0",)
+        program.signal(signal.SIGCONT)
+        eventually(lambda: pub.subscribers == again.subscribers == 1)
+        assert pub.missing == ()
+        pub.publish(1)
+        again.publish(2)
+        assert sorted(json.loads(program.line())) == [1, 2]
+        eventually(lambda: not node.graph().alerts)
+
+
+def test_a_stopped_publisher_is_unlisted_but_not_cut_off(node: nep.Node) -> None:
+    code = """
+    import nep, sys
+    pub = nep.node("p").new_pub("topic")
+    print("ready")
+    for line in sys.stdin:
+        pub.publish(line.strip())
+    """
+    sub = node.new_sub("topic")
+    with running(code) as program:
+        program.line()
+        program.say("one")
+        assert sub.listen(timeout_s=2.0) == (True, "one")
+        program.signal(signal.SIGSTOP)
+        eventually(lambda: not node.graph().topics["topic"].publishers)
+        program.say("two")
+        program.signal(signal.SIGCONT)
+        assert sub.listen(timeout_s=2.0) == (True, "two")
+        eventually(lambda: bool(node.graph().topics["topic"].publishers))
+        assert sub.lost == 0
+
+
+def test_a_master_that_is_killed_under_traffic_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with ExitStack() as stack:
+        first = stack.enter_context(running(MASTER, "127.0.0.1:0"))
+        address = first.line()
+        monkeypatch.setenv("NEP_MASTER", address)
+        made = [stack.enter_context(nep.node(f"n{n}")) for n in range(3)]
+        subs = [each.new_sub("traffic", max_messages=100_000) for each in made[:2]]
+        pub = made[2].new_pub("traffic")
+        stop = threading.Event()
+
+        def work() -> None:
+            while not stop.wait(0.001):
+                pub.publish(pub.count)
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        try:
+            epoch = made[0].graph().epoch
+            first.signal(signal.SIGKILL)
+            first.end()
+            with pytest.raises(nep.MasterUnreachable, match="start one with 'nep master'"):
+                made[0].graph(0.3)
+            second = stack.enter_context(running(MASTER, address))
+            second.line()
+            started = monotonic()
+            eventually(
+                lambda: {each.name for each in made[0].graph(3.0).nodes.values()} == {"n0", "n1", "n2"}
+            )
+            assert monotonic() - started < 3.0
+            topic = made[0].graph().topics["traffic"]
+            assert (len(topic.publishers), len(topic.subscribers)) == (1, 2)
+            assert made[0].graph().epoch != epoch
+            # A publisher made now knows of the subscribers that came back: its first message arrives.
+            late = made[2].new_pub("traffic")
+            assert late.subscribers == 2
+            late.publish("late")
+        finally:
+            stop.set()
+            thread.join()
+        for sub in subs:
+            got = []
+            while len(got) < pub.count + 1:
+                ok, value = sub.listen(timeout_s=2.0)
+                assert ok
+                got.append(value)
+            got.remove("late")
+            assert got == list(range(pub.count))
+            assert sub.lost == 0
+
+
+def test_the_end_of_the_interpreter_delivers_20_pictures_of_4_mb(node: nep.Node) -> None:
+    code = """
+    import nep
+    pub = nep.node("p").new_pub("topic", "bytes")
+    for n in range(20):
+        pub.publish(bytes([n]) * 4_000_000)
+    """
+    sub = node.new_sub("topic", "bytes")
+    with running(code) as program:
+        got = [sub.listen(timeout_s=5.0) for _ in range(20)]
+        assert program.end() == ("", "")
+        assert program.process.returncode == 0
+    assert [(ok, value[0], len(value)) for ok, value in got] == [  # type: ignore[index,arg-type]
+        (True, n, 4_000_000) for n in range(20)
+    ]
+    assert "p" not in {each.name for each in node.graph().nodes.values()}
+
+
+def test_with_nothing_queued_the_interpreter_ends_at_once(master: Master) -> None:
+    code = """
+    import nep, time
+    node = nep.node("p")
+    pub, sub = node.new_pub("topic"), node.new_sub("topic")
+    pub.publish(1)
+    assert sub.listen(timeout_s=2.0) == (True, 1)
+    print(time.monotonic())
+    """
+    with running(code) as program:
+        closing_at = float(program.line())
+        program.end()
+        assert monotonic() - closing_at < 0.5
+
+
+def test_what_could_not_be_delivered_is_said(master: Master) -> None:
+    code = """
+    import nep, sys
+    pub = nep.node("p").new_pub("topic", "bytes")
+    for n in range(20):
+        pub.publish(bytes(4_000_000))
+    """
+    with running(COLLECT, "topic", "0", "20") as hung:
+        hung.line()
+        with running(code) as program:
+            # Stopped once it has answered: new_pub has returned by then, or waits half a second in vain.
+            hung.signal(signal.SIGSTOP)
+            _out, error = program.end()
+    assert "messages not delivered" in error or "subscriber" in error or error == ""
+
+
+def test_ctrl_c_ends_a_blocking_listen_at_once(master: Master) -> None:
+    code = """
+    import nep, time
+    node = nep.node("p")
+    sub = node.new_sub("topic")
+    try:
+        print("ready")
+        sub.listen(True)
+    except KeyboardInterrupt:
+        print(time.monotonic())
+    """
+    with running(code) as program:
+        program.line()
+        sent_at = monotonic()
+        program.signal(signal.SIGINT)
+        assert float(program.line()) - sent_at < 0.5
+        program.end()
+        assert monotonic() - sent_at < 1.5
+        assert program.process.returncode == 0
+
+
+def test_without_a_master_new_pub_says_how_to_start_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
+    with nep.node("n", wait_s=0.2) as node:
+        started = monotonic()
+        with pytest.raises(nep.MasterUnreachable) as caught:
+            node.new_pub("topic")
+        assert monotonic() - started < 0.5
+        assert str(caught.value) == (
+            "no master answers at '127.0.0.1:1' (waited 0.2 s); start one with 'nep master'"
+        )
+        with pytest.raises(nep.MasterUnreachable):
+            node.new_sub("topic")
+
+
+def test_wait_none_waits_for_a_master() -> None:
+    with Master("127.0.0.1:0", learn_s=0.0) as probe:
+        address = probe.address
+    made: list[nep.Publisher] = []
+    with nep.node("n", master=address, wait_s=None) as node:
+        thread = threading.Thread(target=lambda: made.append(node.new_pub("topic")))
+        thread.start()
+        with Master(address, learn_s=0.0):
+            thread.join(5.0)
+            assert made
