@@ -15,9 +15,10 @@ import typer
 from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say
-from nep.errors import EncodeError
+from nep.errors import EncodeError, NepError
 from nep.pubsub import Publisher
 
+_SHOWN = 40
 _TEXT_TYPES = frozenset({"string"})
 _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 
@@ -82,7 +83,7 @@ def publish(
 
 
 def value_of(text: str, msg_type: str) -> object:
-    """The payload that `text` stands for. Raises `EncodeError` with a sentence."""
+    """The payload that `text` stands for. Raises `NepError` with a sentence."""
     if text.startswith("@"):
         data = _read(Path(text[1:]), msg_type)
         if msg_type in _BYTE_TYPES:
@@ -97,8 +98,9 @@ def value_of(text: str, msg_type: str) -> object:
     try:
         return orjson.loads(text)
     except orjson.JSONDecodeError as error:
-        reason = f"{error}; put texts into quotes ('\"hello\"'), or use --type string"
-        raise EncodeError(msg_type, "str", reason) from error
+        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]} …"
+        reason = f"put a text into quotes ('\"{text[:20]}\"'), or use --type string"
+        raise NepError(f"'{shown}' is no JSON; {reason}") from error
 
 
 def _read(file: Path, msg_type: str) -> bytes:

@@ -6,7 +6,7 @@ import pytest
 
 from nep.cli.echo import Lines, show_record
 from nep.cli.publish import value_of
-from nep.errors import EncodeError
+from nep.errors import EncodeError, NepError
 from nep.message import Message
 
 
@@ -89,7 +89,7 @@ def test_the_type_decides_what_a_text_stands_for(text, msg_type, value):
 
 
 def test_text_that_is_no_json_says_what_to_do():
-    with pytest.raises(EncodeError, match="--type string"):
+    with pytest.raises(NepError, match=r"'hello' is no JSON; .* --type string"):
         value_of("hello", "json")
 
 
