@@ -6,7 +6,15 @@ import re
 from collections.abc import Mapping
 
 from app.blocks.block import Block
-from app.blocks.fields import ChoiceField, Field, FieldError, StatementInput, ValueInput, VariableField
+from app.blocks.fields import (
+    ChoiceField,
+    Field,
+    FieldError,
+    StatementInput,
+    TextField,
+    ValueInput,
+    VariableField,
+)
 from app.blocks.workspace import Placed
 
 _PLACE = re.compile(r"%([A-Z][A-Z0-9_]*)")
@@ -33,15 +41,15 @@ def reading(
         if isinstance(argument, VariableField):
             return variables.get(_saved_variable(argument, placed), argument.value)
         if isinstance(argument, Field) and not argument.silent:
-            return _field(argument, placed)
+            words = _field(argument, placed)
+            return f"“{words}”" if is_text and isinstance(argument, TextField) else words
         if isinstance(argument, ValueInput):
             inner = placed.inputs.get(argument.name, ())
             return reading(inner[0], blocks, variables) if inner else "…"
-        if isinstance(argument, StatementInput):
-            return ""
         return ""
 
-    words = " ".join(_PLACE.sub(place, block.text).split()).replace("“ ", "“").replace(" ”", "”")
+    is_text = block.shape == "value"
+    words = " ".join(_PLACE.sub(place, block.text).split())
     return words if len(words) <= _LONGEST else f"{words[: _LONGEST - 1]}…"
 
 
@@ -60,7 +68,7 @@ def label(placed: Placed, block: Block) -> str:
             found += _field(argument, placed)
         elif argument is None:
             found += piece
-    return " ".join(found.replace("“", " ").replace("”", " ").split()) or label_of_type(block.type)
+    return " ".join(found.split()) or label_of_type(block.type)
 
 
 def label_of_type(block_type: str) -> str:

@@ -46,7 +46,7 @@ def words(block_type: str) -> str:
         ("control_if_else", "[ICON] if [CONDITION] / [BODY] / else / [ELSE]"),
         ("messages_publish", "[ICON] publish [VALUE] on [TOPIC]"),
         ("messages_newest", "[ICON] newest [FIELD] of [TOPIC]"),
-        ("values_text", "“ [TEXT] ”"),
+        ("values_text", "[TEXT]"),
     ],
 )
 def test_blocks_read_as_in_the_design(block_type, expected):

@@ -57,7 +57,7 @@ _PLAIN = (
     ),
     Block(
         type="values_text",
-        text="“ %TEXT ”",
+        text="%TEXT",  # the editor puts quotation marks around it
         shape="value",
         style="values",
         icon="",
