@@ -25,6 +25,8 @@ from app.ui.panels.base import Density, Panel, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, IconButton, label, paint, set_role
 
+LEAST_BODY = QSize(160, 60)
+
 
 class TitleTab(QAbstractButton):
     """The name of a panel that shares its place with others; a press brings it to the front."""
@@ -189,11 +191,16 @@ class DockBody(QWidget):
         self._theme = theme
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 0, 1, 1)
+        column.setSizeConstraint(QVBoxLayout.SizeConstraint.SetNoConstraint)
         self._stack = QStackedLayout()
         column.addLayout(self._stack)
         self._stack.addWidget(panel)
         self._failure: EmptyState | None = None
         self._corners = (_Corner(theme, self, False), _Corner(theme, self, True))
+
+    def minimumSizeHint(self) -> QSize:
+        # What does not fit scrolls inside its panel: people decide how large panels are, not contents.
+        return LEAST_BODY
 
     def resizeEvent(self, _event: object) -> None:
         left, right = self._corners

@@ -145,6 +145,7 @@ class StartPage(QWidget):
 
     def _head(self, title: QLabel, button: Button | None = None) -> QHBoxLayout:
         row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(title)
         row.addStretch(1)
         if button is not None:
@@ -174,9 +175,14 @@ class StartPage(QWidget):
                 old.deleteLater()
         self.recent_rows: list[RecentRow] = []
         paint.show_when(self._recent_box, bool(recent))
+        paint.show_when(self._open, not recent)
         if not recent:
             return
-        layout.addWidget(label("Recent", "heading"))
+        other = Button(self._theme, "Open a file", "folder-open", kind="ghost")
+        other.clicked.connect(self.open_pressed)
+        head = QWidget()
+        head.setLayout(self._head(label("Recent", "heading"), other))
+        layout.addWidget(head)
         holder = QWidget()
         row = QHBoxLayout(holder)
         row.setContentsMargins(0, 0, 0, 0)
