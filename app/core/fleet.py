@@ -166,7 +166,8 @@ class Fleet:
     def _update_rize(self, view: GraphView) -> None:
         if self._rize_events is None and rize.EVENTS in view.topics:
             self._rize_events = self._watches.open([rize.EVENTS])
-        there = self._rize.present(view)
+        native = {link.name for link in self._links.values() if link.robot.dialect == "native"}
+        there = self._rize.present(view, native)
         for name in there:
             known = self._links.get(name)
             if known is None or known.robot.dialect == "rize":

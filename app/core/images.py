@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 RATE_WINDOW_S = 2.0
+RATE_DELAY_S = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,28 +40,29 @@ class Picture:
 
 
 class Rate:
-    """Events a second over the last two seconds; None until two were seen."""
+    """Pictures a second by the time of their arrival, over two seconds; None until two were seen.
+
+    The window ends a little before now: pictures that arrived and may still be painted are not judged yet, so
+    that "shown 30 of 30/s" compares the same pictures.
+    """
 
     def __init__(self) -> None:
         """Have seen nothing."""
-        self._times: deque[float] = deque()
+        self._times: deque[float] = deque(maxlen=4096)
 
-    def add(self, now: float, count: int = 1) -> None:
-        """``count`` events happened at ``now`` (monotonic seconds)."""
-        self._times.extend([now] * min(count, 1000))
-        self._forget(now)
+    def add(self, arrived_s: float) -> None:
+        """A picture that arrived at this time (monotonic seconds)."""
+        self._times.append(arrived_s)
 
     def per_second(self, now: float) -> float | None:
         """How many a second; None when fewer than two are in the window."""
-        self._forget(now)
-        if len(self._times) < 2:
-            return None
-        span = max(now - self._times[0], 1e-3)
-        return len(self._times) / max(span, RATE_WINDOW_S / 2)
-
-    def _forget(self, now: float) -> None:
-        while self._times and now - self._times[0] > RATE_WINDOW_S:
+        end = now - RATE_DELAY_S
+        while self._times and self._times[0] <= end - RATE_WINDOW_S:
             self._times.popleft()
+        counted = sum(1 for time_s in self._times if time_s <= end)
+        if counted < 2:
+            return None
+        return counted / min(RATE_WINDOW_S, max(end - self._times[0], 1e-3))
 
 
 @dataclass(eq=False)
@@ -72,10 +74,9 @@ class ImageStream:
     _watch_closed: Callable[[], None]
     picture: Picture | None = None
     error: str | None = None
-    _waiting: Message | None = None
+    _waiting: tuple[Message, float] | None = None
     _arriving: Rate = field(default_factory=Rate)
     _shown: Rate = field(default_factory=Rate)
-    _opened_s: float = 0.0
 
     @property
     def arriving_hz(self) -> float | None:
@@ -96,7 +97,8 @@ class ImageStream:
 
     def shown(self) -> None:
         """The panel painted `picture` (said once for each)."""
-        self._shown.add(self._images.clock())
+        if self.picture is not None:
+            self._shown.add(self.picture.received_s)
 
     def close(self) -> None:
         """Nobody looks any more; said twice it does nothing."""
@@ -121,7 +123,7 @@ class Images:
 
     def stream(self, topic: str) -> ImageStream:
         """Look at a topic's pictures until the stream is closed."""
-        stream = ImageStream(topic, self, self._watch(topic), _opened_s=self.clock())
+        stream = ImageStream(topic, self, self._watch(topic))
         with self.lock:
             self._streams.setdefault(topic, []).append(stream)
             if self._thread is None and not self._closing:
@@ -134,10 +136,11 @@ class Images:
         if not self._streams:
             return
         with self.lock:
+            now = self.clock()
             for message in messages:
                 for stream in self._streams.get(message.topic, ()):
-                    stream._waiting = message  # noqa: SLF001  one module, one lock
-                    stream._arriving.add(self.clock())  # noqa: SLF001
+                    stream._waiting = (message, now)  # noqa: SLF001  one module, one lock
+                    stream._arriving.add(now)  # noqa: SLF001
             self._arrived.notify()
 
     def forget(self, stream: ImageStream) -> None:
@@ -165,8 +168,8 @@ class Images:
                 if self._closing:
                     return
                 work = self._take_waiting()
-            for streams, message in work:
-                picture, error = decode(message, self.clock())
+            for streams, message, arrived_s in work:
+                picture, error = decode(message, arrived_s)
                 for stream in streams:
                     stream.error = error
                     if picture is not None:
@@ -176,17 +179,17 @@ class Images:
         every = (stream for streams in self._streams.values() for stream in streams)
         return any(stream._waiting is not None for stream in every)  # noqa: SLF001
 
-    def _take_waiting(self) -> list[tuple[list[ImageStream], Message]]:
+    def _take_waiting(self) -> list[tuple[list[ImageStream], Message, float]]:
         work = []
         for streams in self._streams.values():
             waiting = [stream for stream in streams if stream._waiting is not None]  # noqa: SLF001
             if not waiting:
                 continue
-            message = waiting[-1]._waiting  # noqa: SLF001
+            newest = waiting[-1]._waiting  # noqa: SLF001
             for stream in waiting:
                 stream._waiting = None  # noqa: SLF001
-            if message is not None:
-                work.append((waiting, message))
+            if newest is not None:
+                work.append((waiting, *newest))
         return work
 
 

@@ -5,6 +5,8 @@ They tell nothing about themselves, so who listens to ``robot_action`` is taken 
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from nep.views import GraphView
 
 COMMANDS = "robot_action"
@@ -27,21 +29,25 @@ class RizeNames:
         if name not in self._told:
             self._told.append(name)
 
-    def present(self, view: GraphView) -> set[str]:
-        """The names of the robots of RIZE in this graph."""
+    def present(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
+        """The names of the robots of RIZE in this graph.
+
+        ``native`` are robots with a description: they say on ``rize_event`` that they are ready, too.
+        """
+        told = [name for name in self._told if name not in native]
         info = view.topics.get(COMMANDS)
         ids = {subscriber.node_id for subscriber in info.subscribers} if info is not None else set()
         nodes = [
             view.nodes[id].name for id in ids if id in view.nodes and view.nodes[id].generation not in NATIVE
         ]
-        if len(nodes) == 1 and len(self._told) == 1:
-            return {self._told[0]}
-        return {self._name(node) for node in nodes}
+        if len(nodes) == 1 and len(told) == 1:
+            return {told[0]}
+        return {_name(node, told) for node in nodes}
 
-    def _name(self, node: str) -> str:
-        stem = node
-        for suffix in SUFFIXES:
-            stem = stem.removesuffix(suffix)
-        return next(
-            (told for told in self._told if told.lower() in {stem.lower(), node.lower()}), stem or node
-        )
+
+def _name(node: str, told: Collection[str]) -> str:
+    stem = node
+    for suffix in SUFFIXES:
+        stem = stem.removesuffix(suffix)
+    same = {stem.lower(), node.lower()}
+    return next((name for name in told if name.lower() in same), stem or node)

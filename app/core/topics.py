@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import platform
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -57,8 +59,12 @@ class Topic:
 class Topics:
     """All topics, in the order in which they were first seen. One thread uses it (the window's)."""
 
-    def __init__(self) -> None:
-        """Know no topic yet."""
+    def __init__(self, own: tuple[str, int] | None = None) -> None:
+        """Know no topic yet. ``own`` is the computer and process that looks (default: this one).
+
+        A topic that only the looking process subscribes has vanished: looking does not keep it.
+        """
+        self._own = own if own is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
         self._first_graph = True
         self.revision = 0
@@ -101,7 +107,12 @@ class Topics:
 
     def update(self, view: GraphView, now: float) -> None:
         """Take over a new graph; ``now`` is a monotonic clock in s."""
-        shown = {name: info for name, info in view.topics.items() if info.publishers or info.subscribers}
+        own = {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
+        shown = {
+            name: info
+            for name, info in view.topics.items()
+            if info.publishers or any(each.node_id not in own for each in info.subscribers)
+        }
         for name, info in shown.items():
             topic = self._topics.get(name)
             if topic is None:

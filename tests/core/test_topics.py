@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.core.mailbox import Batch
 from app.core.topics import GONE_SHOWN_S, Topics, total_rate_hz
 from nep.message import Message
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 NODE = NodeInfo("n1", "camera_driver", "here", 5, "python", "native", 0)
 
@@ -56,6 +56,22 @@ def test_a_vanished_topic_stays_ten_seconds_and_its_figures_are_unknown() -> Non
     assert topics.live() == []
     topics.age(5 + GONE_SHOWN_S, 0)
     assert len(topics) == 0
+
+
+def test_looking_at_a_topic_does_not_keep_it() -> None:
+    topics = Topics(own=("here", 77))
+    looking = NodeInfo("n2", "studio", "here", 77, "python", "native", 0)
+    there = GraphView(
+        1, 1, {"n1": NODE, "n2": looking}, {"/a": info("/a", subscribers=(SubscriberInfo(9, "n2"),))}
+    )
+    topics.update(there, 0)
+    assert topics.live()
+    left = info("/a", publishers=0, subscribers=(SubscriberInfo(9, "n2"),))
+    topics.update(GraphView(1, 2, {"n2": looking}, {"/a": left}), 1)
+    assert topics.live() == []
+    foreign = info("/a", publishers=0, subscribers=(SubscriberInfo(9, "n2"), SubscriberInfo(8, "n1")))
+    topics.update(GraphView(1, 3, {"n1": NODE, "n2": looking}, {"/a": foreign}), 2)
+    assert [topic.name for topic in topics.live()] == ["/a"]
 
 
 def test_a_topic_that_comes_back_is_live_again() -> None:
