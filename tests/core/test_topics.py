@@ -62,14 +62,16 @@ def test_looking_at_a_topic_does_not_keep_it() -> None:
     topics = Topics(own=("here", 77))
     looking = NodeInfo("n2", "studio", "here", 77, "python", "native", 0)
     there = GraphView(
-        1, 1, {"n1": NODE, "n2": looking}, {"/a": info("/a", subscribers=(SubscriberInfo(9, "n2"),))}
+        1, 1, {"n1": NODE, "n2": looking}, {"/a": info("/a", subscribers=(SubscriberInfo(9, "n2", 0, 0),))}
     )
     topics.update(there, 0)
     assert topics.live()
-    left = info("/a", publishers=0, subscribers=(SubscriberInfo(9, "n2"),))
+    left = info("/a", publishers=0, subscribers=(SubscriberInfo(9, "n2", 0, 0),))
     topics.update(GraphView(1, 2, {"n2": looking}, {"/a": left}), 1)
     assert topics.live() == []
-    foreign = info("/a", publishers=0, subscribers=(SubscriberInfo(9, "n2"), SubscriberInfo(8, "n1")))
+    foreign = info(
+        "/a", publishers=0, subscribers=(SubscriberInfo(9, "n2", 0, 0), SubscriberInfo(8, "n1", 0, 0))
+    )
     topics.update(GraphView(1, 3, {"n1": NODE, "n2": looking}, {"/a": foreign}), 2)
     assert [topic.name for topic in topics.live()] == ["/a"]
 
