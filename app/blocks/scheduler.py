@@ -85,9 +85,12 @@ class Scheduler:
             self._enter(script)
 
     def look(self) -> None:
-        """An idle script takes the turn for a look at its condition; `rest` gives it back."""
+        """An idle script takes the turn to look at its condition, not while paused; `rest` gives it back."""
+        script = self._script()
         with self._lock:
-            self._enter(self._script())
+            while self._paused and not self._stopping:
+                script.wake.wait()
+            self._enter(script)
 
     def rest(self) -> None:
         """The script's work is done until its next event."""

@@ -234,6 +234,24 @@ def test_a_script_ends_in_a_pause_too(stage):
     assert stage.did == []
 
 
+def test_nobody_looks_at_conditions_while_paused(stage):
+    looked = []
+
+    def body() -> None:
+        while True:
+            stage.scheduler.look()
+            looked.append(1)
+            stage.scheduler.rest()
+
+    stage.scheduler.pause()
+    stage.threads.append(stage.scheduler.start("hat", body))
+    threading.Event().wait(0.05)
+    assert stage.scheduler.snapshot().paused
+    assert looked == []
+    stage.scheduler.go_on()
+    until(lambda: len(looked) > 3)
+
+
 def test_who_is_no_script_is_told(stage):
     with pytest.raises(RuntimeError, match="only a script"):
         stage.scheduler.step("x")
