@@ -1,0 +1,82 @@
+"""The end-to-end tests: real processes, and a screen of their own so that nobody's mouse is taken."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import socket
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+
+import pytest
+
+from dev import virtual_screen
+from tests.e2e.studio import Studio, save_picture, terminate_all
+from tests.e2e.x11 import Screen
+
+HERE = Path(__file__).parent
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Everything here is end to end, and needs Xvfb."""
+    missing = pytest.mark.skip(reason="needs Xvfb (the package xvfb): a screen that is nobody's")
+    for item in items:
+        if HERE in item.path.parents:
+            item.add_marker(pytest.mark.e2e)
+            if shutil.which("Xvfb") is None:
+                item.add_marker(missing)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Keeps what was on the screen when a test failed, before anything is closed."""
+    report = yield
+    screen = getattr(item, "funcargs", {}).get("screen")
+    folder = getattr(item, "funcargs", {}).get("tmp_path")
+    if report.when == "call" and report.failed and screen is not None and folder is not None:
+        with contextlib.suppress(OSError, AssertionError):
+            save_picture(screen, folder / "screen.png")
+            report.sections.append(("Screen", f"the screen is in {folder / 'screen.png'}"))
+    return report
+
+
+@pytest.fixture(scope="session")
+def screen() -> Iterator[Screen]:
+    """A virtual screen of 1600 x 1000 that nobody else uses."""
+    with virtual_screen() as number:
+        screen = Screen(f":{number}")
+        yield screen
+        screen.close()
+
+
+@pytest.fixture
+def address(monkeypatch: pytest.MonkeyPatch) -> str:
+    """Where this test's master is, or will be when somebody starts one."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    monkeypatch.setenv("NEP_MASTER", address)
+    return address
+
+
+@pytest.fixture
+def start(screen: Screen, address: str, tmp_path: Path) -> Iterator[Callable[..., Studio]]:
+    """Starts Studio, with the same settings each time; whatever is left is ended after the test."""
+    started: list[Studio] = []
+
+    def start(*arguments: str, **environment: str) -> Studio:
+        started.append(Studio(screen, tmp_path / "home", address, *arguments, **environment))
+        return started[-1].wait_up()
+
+    screen.move(2, 990)
+    yield start
+    for studio in started:
+        studio.close()
+    if started:
+        terminate_all(started[0].children())
+
+
+@pytest.fixture
+def studio(start: Callable[..., Studio]) -> Studio:
+    """Studio on its start page."""
+    return start()

@@ -1,0 +1,204 @@
+"""Eyes in the real Studio: they tell the tests what a person sees and where it is. They touch nothing.
+
+`python -m app` imports this by itself when this folder is on PYTHONPATH. Requests and answers are lines of
+JSON on two pipes whose numbers are in NEP_E2E_EYES; no process that Studio starts inherits them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+
+CELL_ROLE = 0x0100  # Qt.UserRole: what a cell of our tables shows
+TABLE_ROWS = 200
+
+
+def _open() -> None:
+    told = os.environ.pop("NEP_E2E_EYES", "")
+    if not told:
+        return
+    ask, answer = (int(number) for number in told.split(","))
+    for pipe in (ask, answer):
+        os.set_inheritable(pipe, False)
+    threading.Thread(target=_serve, args=(ask, answer), name="eyes", daemon=True).start()
+
+
+def _serve(ask: int, answer: int) -> None:
+    lock = threading.Lock()
+
+    def reply(number: int, value: object) -> None:
+        data = json.dumps({"to": number, "is": value}, default=str).encode() + b"\n"
+        with lock, open(answer, "wb", closefd=False) as stream:
+            stream.write(data)
+
+    looker = None
+    with open(ask, "rb", closefd=False) as stream:
+        for line in stream:
+            request = json.loads(line)
+            if looker is None:
+                looker = _looker(reply)
+            if looker is None:
+                reply(request["n"], None)
+            else:
+                looker.asked.emit(line.decode())
+
+
+def _looker(reply):
+    widgets = sys.modules.get("PySide6.QtWidgets")
+    application = widgets.QApplication.instance() if hasattr(widgets, "QApplication") else None
+    if application is None:
+        return None
+    from PySide6.QtCore import QObject, Signal
+
+    class Looker(QObject):
+        asked = Signal(str)
+
+        def look(self, line: str) -> None:
+            request = json.loads(line)
+            try:
+                if request["do"] == "script":
+                    _script(request, reply)
+                else:
+                    reply(request["n"], _widgets(application))
+            except Exception as error:  # noqa: BLE001  the tests are told, Studio goes on
+                reply(request["n"], {"error": f"{type(error).__name__}: {error}"})
+
+    looker = Looker()
+    looker.asked.connect(looker.look)
+    looker.moveToThread(application.thread())
+    return looker
+
+
+def _script(request, reply) -> None:
+    """What a script that only reads finds in the page of the block editor."""
+    page = next((view.page() for view in _web_views()), None)
+    if page is None:
+        reply(request["n"], None)
+        return
+    page.runJavaScript(f"JSON.stringify({request['script']})", lambda got: reply(request["n"], got))
+
+
+def _web_views():
+    from PySide6.QtWidgets import QApplication
+
+    kind = getattr(sys.modules.get("PySide6.QtWebEngineWidgets"), "QWebEngineView", None)
+    views = [each for each in QApplication.allWidgets() if kind is not None and isinstance(each, kind)]
+    return [view for view in views if view.isVisible()]
+
+
+def _widgets(application) -> list[dict]:
+    """Every widget that can be seen, windows first."""
+    from PySide6.QtWidgets import QWidget
+
+    seen = []
+    for window in application.topLevelWidgets():
+        if window.isVisible():
+            inside = [widget for widget in window.findChildren(QWidget) if widget.isVisible()]
+            seen += [_tell(widget, application) for widget in (window, *inside)]
+    return seen
+
+
+def _tell(widget, application) -> dict:
+    from PySide6.QtCore import QRect
+    from PySide6.QtWidgets import QAbstractItemView, QMenu, QMenuBar
+
+    told = {
+        "kind": type(widget).__name__,
+        "name": widget.accessibleName(),
+        "description": widget.accessibleDescription(),
+        "object": widget.objectName(),
+        "text": _text(widget),
+        "tip": widget.toolTip(),
+        "rect": _shown(widget),
+        "enabled": widget.isEnabled(),
+        "focus": widget is application.focusWidget(),
+        "checked": bool(getattr(widget, "isChecked", bool)()),
+        "in": _panel(widget),
+    }
+    if isinstance(widget, QAbstractItemView):
+        told["rows"] = _rows(widget)
+    if isinstance(widget, (QMenu, QMenuBar)):
+        told["entries"] = [
+            {"text": action.text(), "rect": _at(widget, QRect(widget.actionGeometry(action)))}
+            for action in widget.actions()
+            if action.isVisible() and not action.isSeparator()
+        ]
+    return told
+
+
+def _shown(widget) -> list[int]:
+    """Where it is on the screen, without what its parents cut off."""
+    from PySide6.QtCore import QRect
+
+    def place(each):
+        return QRect(each.mapToGlobal(each.rect().topLeft()), each.size())
+
+    shown, above = place(widget), widget
+    while not above.isWindow() and above.parentWidget() is not None:
+        above = above.parentWidget()
+        shown &= place(above)
+    return [shown.x(), shown.y(), shown.width(), shown.height()]
+
+
+def _text(widget) -> str:
+    for name in ("text", "toPlainText", "title", "words"):
+        ask = getattr(widget, name, None)
+        if callable(ask):
+            try:
+                value = ask()
+            except TypeError:
+                continue
+            if isinstance(value, str):
+                return value
+    return ""
+
+
+def _panel(widget) -> str:
+    from PySide6.QtWidgets import QDockWidget
+
+    while widget is not None and not isinstance(widget, QDockWidget):
+        widget = widget.parentWidget()
+    return widget.objectName().removeprefix("panel.") if widget is not None else ""
+
+
+def _rows(view) -> list[dict]:
+    """The rows of a table or a tree that is shown, as far as they are open."""
+    from PySide6.QtCore import QAbstractListModel, Qt
+
+    model = view.model()
+    rows = []
+
+    def tell(parent) -> None:
+        for row in range(min(model.rowCount(parent), TABLE_ROWS)):
+            columns = 1 if isinstance(model, QAbstractListModel) else model.columnCount(parent)
+            indexes = [model.index(row, column, parent) for column in range(columns)]
+            cells = [index.data(CELL_ROLE) for index in indexes]
+            rows.append(
+                {
+                    "texts": [_cell(cell, index) for cell, index in zip(cells, indexes, strict=True)],
+                    "spoken": str(indexes[0].data(Qt.ItemDataRole.AccessibleTextRole) or ""),
+                    "struck": bool(getattr(cells[0], "struck", False)),
+                    "chip": getattr(cells[0], "chip", None),
+                    "rect": _at(view.viewport(), view.visualRect(indexes[0])),
+                }
+            )
+            if getattr(view, "isExpanded", lambda _index: False)(indexes[0]):
+                tell(indexes[0])
+
+    tell(view.rootIndex())
+    return rows
+
+
+def _cell(cell, index) -> str:
+    text = getattr(cell, "text", None)
+    return text if isinstance(text, str) else str(index.data() if index.data() is not None else "")
+
+
+def _at(widget, rect) -> list[int]:
+    corner = widget.mapToGlobal(rect.topLeft())
+    return [corner.x(), corner.y(), rect.width(), rect.height()]
+
+
+_open()

@@ -1,0 +1,105 @@
+"""The main job by mouse and keyboard: a robot, its topics and pictures, blocks that run, Stop."""
+
+from __future__ import annotations
+
+import pytest
+
+import nep
+from tests.e2e.studio import Studio, amber, middle
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(110)
+
+
+def use_the_virtual_robot(studio: Studio) -> None:
+    studio.click("Use the virtual robot")
+    studio.says("Pepper ready", 40)
+
+
+def test_from_the_start_page_to_a_robot(studio: Studio) -> None:
+    use_the_virtual_robot(studio)
+    studio.says("virtual, ready")
+    studio.find("Stop", kind="StopButton", enabled=True)
+    studio.open_category("Movement")
+    drawing = studio.find(kind="RoomView")
+    assert len({tuple(pixel) for pixel in studio.picture(drawing)[::7, ::7].reshape(-1, 3)}) > 20
+    (robot,) = studio.children("app.robots.simulated")
+    assert studio.quit() == 0
+    until(lambda: not robot.is_running(), "the virtual robot ends with its window")
+
+
+def test_topics_inspector_and_pictures_are_live(studio: Studio, address: str) -> None:
+    use_the_virtual_robot(studio)
+    studio.click("Developer")
+    with nep.node("weather", master=address) as node:
+        publisher = node.new_pub("/weather", "json")
+        new = studio.row("Topics", "/weather")
+        assert new["chip"] == "new"
+        assert publisher.subscribers == 0, "nothing is subscribed until somebody looks"
+        studio.screen.click(*middle(studio.row("Topics", "/weather")["rect"]))
+        until(lambda: publisher.subscribers == 1, "a click on the topic subscribes it")
+        for degrees in (21.5, -3):
+            publisher.publish({"degrees": degrees, "sky": {"clouds": [1, 2]}})
+            until(
+                lambda shown=str(degrees): studio.values("Newest message").get("degrees") == shown,
+                f"the inspector shows {degrees}",
+            )
+        assert studio.row("Topics", "/weather")["chip"] is None
+    until(lambda: studio.row("Topics", "/weather")["struck"], "a topic without a publisher is struck through")
+
+    studio.screen.click(*middle(studio.row("Topics", "/Pepper/camera")["rect"]))
+    view = studio.find(kind="PictureView")
+    studio.says("shown")
+    first = studio.picture(view)
+    assert first[::3, ::3].std() > 20
+    with nep.node("pusher", master=address) as node:
+        world = node.new_pub("/Pepper/world", "json")
+        until(lambda: world.subscribers, "the robot's world hears")
+        world.publish({"move": "Aiko", "x": 1.0, "y": -0.4})
+        until(
+            lambda: (abs(studio.picture(view).astype(int) - first).max(axis=2) > 40).mean() > 0.02,
+            "the picture shows that the person has moved",
+        )
+
+
+def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address: str) -> None:
+    use_the_virtual_robot(studio)
+    studio.open_category("Events")
+    view = studio.find(kind="QWebEngineView")["rect"]
+    studio.drag(".blocklyFlyout .events_started", view[0] + 420, view[1] + 90)
+    (hat,) = until(studio.blocks, "the hat is in the workspace")
+    studio.open_category("Movement")
+    left, _, _, _ = studio.spot(f"[data-id='{hat}'] > .blocklyPath")
+    _, top, _, height = studio.spot(f"[data-id='{hat}'] > .blocklyPath")
+    studio.drag(".blocklyFlyout .robot_pepper_do_turn", left + 16, top + height + 20)
+    until(
+        lambda: studio.page(f"!!document.querySelector(\"[data-id='{hat}'] .robot_pepper_do_turn\")"),
+        "the block is snapped under the hat",
+    )
+    with nep.node("listener", master=address) as node:
+        pose = node.new_sub("/Pepper/pose", "json", keep="latest", max_messages=1)
+        answers = node.new_sub("/Pepper/answer", "robot/answer")
+        quiet = studio.picture(studio.find(kind="QWebEngineView"))
+        studio.click("Run", kind="RunButton")
+        (turning,) = until(lambda: [i for i in studio.outlined("running") if i != hat], "its block glows")
+        web = studio.find(kind="QWebEngineView")
+        until(lambda: amber(studio.picture(web)) > amber(quiet) + 200, "the glow can be seen on the screen")
+        studio.says("Pepper turns left by 30 °")
+        until(lambda: 0 < (pose.listen()[1] or {}).get("theta", 0) < 30, "the robot turns")
+        studio.click("Stop", kind="StopButton")
+        studio.says("Pepper stopped (")
+        answered = until(lambda: _stops(answers), "the robot answers the stop")
+        assert {answer["state"] for answer in answered} <= {"accepted", "succeeded"}
+        until(lambda: turning in studio.outlined("stopped"), "the block where it stopped is outlined")
+        assert not studio.outlined("running")
+        resting = until(lambda: pose.listen()[1], "the robot says where it is")["theta"]
+        assert 0 < resting < 30
+
+
+def _stops(answers: nep.Subscriber) -> list[dict]:
+    """The answers to a stop that have arrived by now."""
+    found = []
+    while (message := answers.receive(0.0)) is not None:
+        if message.payload["op"] == "stop":
+            found.append(message.payload)
+    return found if any(answer["state"] == "succeeded" for answer in found) else []

@@ -1,0 +1,21 @@
+"""Waiting for something to be true, never for a time to pass."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+T = TypeVar("T")
+LOOK_S = 0.05
+
+
+def until(true: Callable[[], T], what: str, within_s: float = 20.0) -> T:
+    """Ask until the answer is true, and return it; fails with `what` when it never is."""
+    pause = threading.Event()
+    end = time.monotonic() + within_s
+    while not (found := true()):
+        assert time.monotonic() < end, f"within {within_s:g} s: {what}"
+        pause.wait(LOOK_S)
+    return found
