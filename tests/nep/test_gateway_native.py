@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import pytest
+
+import nep
+from nep.gateway.inbox import Inbox
+from nep.gateway.listing import Listing
+from nep.gateway.native import Native
+from nep.message import Message
+
+LONG_S = 10
+
+
+class Scene:
+    def __init__(self, master):
+        self.alerts = ()
+        self.made = 0
+        self.inbox = Inbox()
+        self.native = Native(self._node, Listing(master.submit, master.epoch), self._report)
+        self.native.start(self.inbox)
+        self.address = master.address
+
+    def _node(self):
+        self.made += 1
+        return nep.Node("gateway", master=self.address, generation="gateway", wait_s=0.3)
+
+    def _report(self, alerts):
+        self.alerts = alerts
+
+    def close(self):
+        self.native.close()
+        self.inbox.close()
+
+
+@pytest.fixture
+def scene(master):
+    made = Scene(master)
+    yield made
+    made.close()
+
+
+def test_no_node_is_made_before_something_is_carried(scene):
+    assert scene.made == 0
+    scene.native.subscribe("t", "json")
+    scene.native.subscribe("u", "json")
+    assert scene.made == 1
+
+
+def test_what_an_original_published_arrives_in_its_own_bytes(scene):
+    with nep.node("listener") as node, node.new_sub("t") as sub:
+        scene.native.publish("t", "json", b'{"a": 1}')
+        message = sub.receive(LONG_S)
+        assert (bytes(message.data), message.codec, message.seq) == (b'{"a": 1}', "json", 1)
+        scene.native.stop_publishing("t", "json")
+        scene.native.publish("t", "json", b'{"a": 2}')
+        assert sub.receive(LONG_S).payload == {"a": 2}
+
+
+def test_native_messages_come_in_and_own_ones_never_come_back(scene, master):
+    assert scene.native.subscribe("t", "json")
+    with nep.node("talker") as node:
+        pub = node.new_pub("t")
+        scene.native.publish("t", "json", b'"own"')
+        pub.publish("first")
+        pub.publish("last")
+        got = []
+        with node.new_sub("idle") as idle:
+            for _ in range(LONG_S * 20):
+                got += [message.payload for message in scene.inbox.take()]
+                if "last" in got:
+                    break
+                idle.receive(0.05)
+        assert got == ["first", "last"]
+        scene.native.unsubscribe("t", "json")
+        for _ in range(100):
+            if not pub.subscribers:
+                break
+            pub.publish("nobody")
+        assert not scene.native._subscribers
+
+
+def test_pictures_that_originals_cannot_read_become_jpeg(scene):
+    np = pytest.importorskip("numpy")
+    raw = nep.raw_image(np.zeros((4, 6, 3), np.uint8))
+    message = Message("cam", raw.data, "image", "image", extension=raw.extension)
+    assert bytes(scene.native.data_of(message)).startswith(b"\xff\xd8\xff")
+    jpeg = scene.native.data_of(message)
+    again = Message("cam", jpeg, "image", "image", extension={"encoding": "jpeg"})
+    assert scene.native.data_of(again) == jpeg
+
+
+def test_a_picture_that_nobody_can_read_is_an_alert_and_no_end(scene):
+    broken = Message("cam", b"123", "image", "image", extension={"encoding": "bgr8", "shape": [4, 6, 3]})
+    assert scene.native.data_of(broken) is None
+    assert [alert.id for alert in scene.alerts] == ["message:cam"]
+
+
+def test_a_name_that_is_no_native_topic_is_an_alert_and_is_not_tried_at_once_again(scene):
+    assert not scene.native.subscribe("not a topic", "json")
+    scene.native.publish("not a topic", "json", b"1")
+    (alert,) = scene.alerts
+    assert "“not a topic” stays among programs of the original NEP" in alert.sentence
+    assert alert.hint
+
+
+def test_an_alert_is_reported_once_and_taken_back_when_cured(scene):
+    scene.native.tell("port:7000", "Port 7000 is taken")
+    told = scene.alerts
+    scene.native.tell("port:7000", "Port 7000 is taken")
+    assert scene.alerts is told
+    scene.native.cure("port:7000")
+    assert scene.alerts == ()
