@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
@@ -13,6 +14,7 @@ from app.robots.tasks import Answer, Task, Tasks
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 _LONGEST_ID = 200
+_ENDED_KEPT = 100
 
 
 class Desk:
@@ -21,6 +23,7 @@ class Desk:
     def __init__(self, robot: Robot, body: object, tasks: Tasks, publish: Publish) -> None:
         self._robot, self._body, self._tasks, self._publish = robot, body, tasks, publish
         self._open: set[str] = set()
+        self._ended: deque[str] = deque(maxlen=_ENDED_KEPT)
 
     def receive(self, command: object) -> None:
         """One message of the command topic; whatever it is, it is answered or has no id to answer to."""
@@ -33,11 +36,14 @@ class Desk:
         if operation == "alive" or wanted is None or len(wanted) > _LONGEST_ID:
             return
         if operation == "stop":
+            ended = text(message.get("ends"))
+            if ended is not None:
+                self._ended.append(ended)
             self._tasks.stop(self._answering(wanted, "stop", self._robot.safe_stop.action))
         elif operation == "cancel":
             self._cancel(wanted, str(message.get("action") or ""))
         elif operation == "invoke":
-            self._invoke(wanted, str(message.get("action") or ""), message.get("input"))
+            self._invoke(wanted, program, str(message.get("action") or ""), message.get("input"))
         else:
             error = f"there is no “{operation}”; a command is invoke, cancel, stop or alive"
             self._answering(wanted, str(operation), "")(Answer("failed", error=error))
@@ -67,10 +73,14 @@ class Desk:
         """The sentence for an action that the robot has not."""
         return f"{self._robot.name} can't “{name}”{near_miss(name, [a.name for a in self._robot.actions])}"
 
-    def _invoke(self, wanted: str, name: str, given: object) -> None:
+    def _invoke(self, wanted: str, program: str | None, name: str, given: object) -> None:
         if wanted in self._open:
             return  # the same command a second time
         answer = self._answering(wanted, "invoke", name)
+        if program in self._ended:
+            # sent before its program was ended, come after the stop: it must not move the robot again
+            answer(Answer("canceled", error="its program was stopped"))
+            return
         action = self._robot.action(name)
         if action is None:
             answer(Answer("failed", error=self.unknown(name)))

@@ -186,6 +186,19 @@ def test_a_stop_that_does_not_work_is_said(turtle):
     eventually(lambda: ears.command(id="t", op="stop") or "succeeded" in ears.states("t"))
 
 
+def test_a_late_command_of_a_stopped_program_moves_nothing(turtle):
+    """A command that was on its way when its program was ended comes after the stop."""
+    body, ears, _ = turtle
+    ears.command(id="s", op="stop", ends="p1")
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    ears.invoke("1", "move", program="p1")
+    assert ears.final("1")["state"] == "canceled"
+    assert not body.moving
+    ears.invoke("2", "say", program="p2", text="hi")
+    body.go_on.set()
+    assert ears.final("2")["state"] == "succeeded"
+
+
 def test_the_stop_can_also_be_invoked_as_an_action(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "stop")
