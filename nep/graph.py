@@ -205,8 +205,8 @@ class Graph:
         self._census.add_subscriber(member, request.subscriber)
         found = self._census.publishers_of(request.subscriber.topic)
         # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
-        for node_id in sorted({remote.node_id for remote in found} - {member.node.id}):
-            out.append(Outgoing(node_id, Probe(self.epoch, self.revision)))
+        others = sorted({remote.node_id for remote in found} - {member.node.id})
+        out.extend(Outgoing(node_id, Probe(self.epoch, self.revision)) for node_id in others)
         return Found(self.epoch, self.revision, found)
 
     def _join(self, request: Join, now: float, out: list[Outgoing]) -> Reply:

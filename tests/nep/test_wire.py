@@ -1,0 +1,127 @@
+"""The native wire: what is joined is split again, and nothing else is taken for a message."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nep import wire
+from nep.errors import BadTopicError, WireError
+
+VECTORS = json.loads((Path(__file__).parents[1] / "data" / "wire" / "messages.json").read_text("utf-8"))
+
+U64 = st.integers(0, 2**64 - 1)
+TOPICS = st.text(
+    st.characters(exclude_categories=["C", "Z"], exclude_characters="{"), min_size=1, max_size=40
+).filter(lambda topic: len(topic.encode()) <= 200 and not any(letter.isspace() for letter in topic))
+HEADERS = st.builds(wire.Header, st.integers(0, 255), st.sampled_from([0, 1]), U64, U64, U64)
+EXTENSIONS = st.dictionaries(
+    st.text(max_size=8), st.integers() | st.text(max_size=8) | st.binary(max_size=8)
+).map(
+    lambda map_: {
+        key: value for key, value in map_.items() if not isinstance(value, int) or abs(value) < 2**63
+    }
+)
+
+
+@given(TOPICS, HEADERS, st.binary(max_size=100), EXTENSIONS)
+def test_what_is_joined_is_split_again(
+    topic: str, header: wire.Header, payload: bytes, extension: dict[str, object]
+) -> None:
+    parts = wire.join(topic, header, payload, extension)
+    assert len(parts) == (4 if extension else 3)
+    assert len(parts[1]) == wire.HEADER_BYTES
+    back = wire.split(parts)
+    assert (back.topic, back.payload, back.extension) == (topic, payload, extension)
+    assert back.header._replace(flags=header.flags) == header
+
+
+@given(st.lists(st.binary(max_size=60), max_size=5))
+def test_anything_else_is_refused_with_a_sentence(parts: list[bytes]) -> None:
+    try:
+        wire.split(parts)
+    except WireError as error:
+        assert str(error).startswith("cannot decode")
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=lambda vector: vector["name"])
+def test_the_shared_vectors(vector: dict[str, object]) -> None:
+    parts = [bytes.fromhex(part) for part in vector["parts"]]  # type: ignore[attr-defined]
+    if "error" in vector:
+        with pytest.raises(WireError, match=str(vector["error"])):
+            wire.split(parts)
+        return
+    read = wire.split(parts)
+    said = vector["means"]
+    assert isinstance(said, dict)
+    assert read.topic == said["topic"]
+    assert read.header == wire.Header(
+        said["codec"], said["flags"], said["seq"], said["stamp_ns"], said["publisher"]
+    )
+    assert bytes(read.payload).hex() == said["payload"]
+    assert read.extension == said["extension"]
+    assert list(wire.join(read.topic, read.header, read.payload, read.extension or None)) == parts
+
+
+@given(st.integers(0, 2**64 - 1), TOPICS)
+def test_a_hello_is_read_back(subscriber: int, topic: str) -> None:
+    part = wire.hello_part(subscriber, topic)
+    assert wire.parse_hello(part) == (subscriber, topic)
+    assert part > wire.topic_part(topic)  # libzmq sends filters in byte order
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        b"",
+        b"topic\0",
+        b"\xffhello/",
+        b"\xffhello/12/t",
+        b"\xffhello/zzzzzzzzzzzzzzzz/t",
+        b"\xffhello/" + b"0" * 16,
+    ],
+)
+def test_what_is_no_hello(part: bytes) -> None:
+    assert wire.parse_hello(part) is None
+
+
+@pytest.mark.parametrize("topic", ["a", "/Pepper/camera", "ü/ä", "x" * 200, "a=b,c", "機器人"])
+def test_topics_that_are_allowed(topic: str) -> None:
+    assert wire.check_topic(topic) == topic
+
+
+@pytest.mark.parametrize(
+    ("topic", "reason"),
+    [
+        ("", "it has 0 bytes"),
+        ("x" * 201, "it has 201 bytes"),
+        ("ü" * 101, "it has 202 bytes"),
+        ("a b", "the character ' ' is not allowed"),
+        ("a\tb", r"the character '\\t'"),
+        ("a{b", "the character '{'"),
+        ("a\0", r"the character '\\x00'"),
+        ("a\u2028", r"the character '\\u2028'"),
+        ("a\x85", r"the character '\\x85'"),
+        ("\ud800", "no Unicode text"),
+        (7, "a topic is a 'str'"),
+    ],
+)
+def test_topics_that_are_not(topic: str, reason: str) -> None:
+    with pytest.raises(BadTopicError, match=reason):
+        wire.check_topic(topic)
+
+
+def test_an_unknown_version_is_named() -> None:
+    header = bytearray(wire.Header(1, 0, 1, 2, 3).pack())
+    header[0] = 9
+    with pytest.raises(WireError, match="its version is 9, this nep reads version 1; update nep"):
+        wire.read_header(bytes(header))
+
+
+def test_an_extension_that_msgpack_cannot_hold() -> None:
+    with pytest.raises(WireError, match="an extension holds what msgpack cannot"):
+        wire.extension_part({"a": object()})
