@@ -35,7 +35,7 @@ def run_parser() -> argparse.ArgumentParser:
     """The options of ``python -m app run``."""
     made = argparse.ArgumentParser(
         prog="nep-studio run",
-        description="Run a behaviour with no window. Exit codes: 0 it ended well; 1 a block failed or a robot "
+        description="Run a behaviour with no window. Exit codes: 0 ended well; 1 a block failed or a robot "
         "did not stop; 2 the file can't be run; 3 a robot of it is not there; 130 stopped by Ctrl+C.",
     )
     made.add_argument("file", type=Path, metavar="FILE", help="the behaviour")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html import escape
 from typing import Protocol
 
@@ -162,7 +162,7 @@ class BannerPlace(QWidget):
         self.banner.show_words("info", title, detail, yes[0], second=no[0])
         self.show()
 
-    def show_alerts(self, alerts: list[AlertLike]) -> None:
+    def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
         """The alerts that are active and not closed, worst first."""
         if self._offer is not None:
             return

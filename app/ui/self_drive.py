@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,12 +36,15 @@ class Step:
 class SelfDrive(QObject):
     """Does the steps one after the other, then closes the window; ``well`` tells whether all were seen."""
 
-    def __init__(self, window: MainWindow, commands: Commands, folder: Path) -> None:
+    def __init__(
+        self, window: MainWindow, commands: Commands, folder: Path, steps: Sequence[Step] | None = None
+    ) -> None:
+        """Begin at once; ``steps`` replace the main job."""
         super().__init__(window)
         self._window, self._commands, self._folder = window, commands, folder
         self.well = False
         self.pictures: list[Path] = []
-        self._steps = iter(self._plan())
+        self._steps = iter(steps if steps is not None else self._plan())
         self._step: Step | None = None
         self._began = 0.0
         self._seen_at: float | None = None

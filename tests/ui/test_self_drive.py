@@ -1,0 +1,66 @@
+"""The self-driven tour: it waits for what it must see, takes pictures, and says what was missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtGui import QImage
+
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+from app.ui.self_drive import SelfDrive, Step
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def drive(qtbot, window: MainWindow, commands: Commands, folder: Path, steps: list[Step]) -> SelfDrive:
+    window.show()
+    done: list[str] = []
+    window.on_shut = lambda: done.append("shut")
+    driver = SelfDrive(window, commands, folder, steps)
+    qtbot.waitUntil(lambda: bool(done), timeout=10_000)
+    return driver
+
+
+def test_every_station_is_seen_before_its_picture(
+    qtbot, window: MainWindow, commands: Commands, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    looks: list[int] = []
+
+    def after_three_looks() -> bool:
+        looks.append(1)
+        return len(looks) > 3
+
+    steps = [
+        Step("dark", lambda: commands.run("theme.dark"), after_three_looks, picture="dark", settle_s=0),
+        Step(
+            "developer",
+            lambda: commands.run("layout.developer"),
+            lambda: True,
+            picture="developer",
+            settle_s=0,
+        ),
+        Step("nothing to keep", lambda: None, lambda: True, settle_s=0),
+    ]
+    driver = drive(qtbot, window, commands, tmp_path / "tour", steps)
+    assert driver.well
+    assert [path.name for path in driver.pictures] == ["dark.png", "developer.png"]
+    assert len(looks) == 4
+    shot = QImage(str(driver.pictures[1]))
+    assert (shot.width(), shot.height()) == (1440, 900)
+    assert shot.pixelColor(2, 500) == window.theme.colour("window")
+    assert "2 pictures are in" in capsys.readouterr().out
+
+
+def test_what_is_not_seen_is_said(
+    qtbot, window: MainWindow, commands: Commands, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    steps = [
+        Step("a robot", lambda: None, lambda: False, within_s=0.2),
+        Step("never", lambda: None, lambda: True),
+    ]
+    driver = drive(qtbot, window, commands, tmp_path, steps)
+    assert not driver.well
+    assert (tmp_path / "failed.png").is_file()
+    assert capsys.readouterr().err == "not seen within 0.2 s: a robot\n"
