@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from app.core.session import Session
 
-WORDS = {"ready": "ready", "busy": "moving", "silent": "does not answer", "away": "away"}
+WORDS = {"ready": "ready", "busy": "moving", "away": "away"}
 
 
 def robots_chip(session: Session) -> tuple[str, str]:
-    """Words and status: "Pepper ready", "2 robots", "Turtle does not answer", "No robot"."""
+    """Words and status: "Pepper ready", "2 robots", "Camera silent", "No robot"."""
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
         return "No robot", "off"
     silent = [link for link in links if link.state == "silent"]
     if silent:
-        words = f"{silent[0].name} {WORDS['silent']}" if len(silent) == 1 else f"{len(silent)} robots silent"
-        return words, "error"
+        words = silent[0].silent or "silent"
+        if len(silent) > 1:
+            return f"{len(silent)} robots silent", "error"
+        return (f"{silent[0].name}: {words}" if len(links) > 1 else words[:1].upper() + words[1:]), "error"
     if len(links) > 1:
         return f"{len(links)} robots", "ok"
     state = "running" if session.runs.active else WORDS[links[0].state]

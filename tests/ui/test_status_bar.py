@@ -16,7 +16,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
 def link(name: str, state: str) -> SimpleNamespace:
-    return SimpleNamespace(name=name, state=state)
+    return SimpleNamespace(name=name, state=state, silent="camera silent" if state == "silent" else None)
 
 
 def with_robots(*links: SimpleNamespace, active: bool = False) -> SimpleNamespace:
@@ -101,7 +101,9 @@ def test_facts_without_words_leave_no_gap(qtbot, theme: Theme) -> None:
         ([link("Pepper", "ready")], True, ("Pepper running", "ok")),
         ([link("Pepper", "busy")], False, ("Pepper moving", "ok")),
         ([link("Pepper", "ready"), link("Turtle", "ready")], False, ("2 robots", "ok")),
-        ([link("Pepper", "ready"), link("Turtle", "silent")], True, ("Turtle does not answer", "error")),
+        ([link("Pepper", "ready"), link("Turtle", "silent")], True, ("Turtle: camera silent", "error")),
+        ([link("Pepper", "silent")], True, ("Camera silent", "error")),
+        ([link("Pepper", "silent"), link("NAO", "silent")], True, ("2 robots silent", "error")),
     ],
 )
 def test_the_chip_of_the_robots(links, active: bool, chip: tuple[str, str]) -> None:
