@@ -257,7 +257,7 @@ class Studio(Person):
 
     def wait_up(self) -> Studio:
         """Wait until its window can be seen and is painted."""
-        self.find("Start", START_S)
+        self.find(kind="MainWindow", within_s=START_S)
         return self
 
     def children(self, *words: str) -> list[psutil.Process]:

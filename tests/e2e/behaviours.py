@@ -1,0 +1,52 @@
+"""Behaviour files for the tests."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+Block = dict[str, object]
+
+
+def block(kind: str, *, below: Block | None = None, fields: Block | None = None, **inputs: Block) -> Block:
+    """A block; its id is its type's last word. `inputs` are named as in the file, in capitals."""
+    made: Block = {"type": kind, "id": kind.rpartition("_")[2], "fields": fields or {}, "inputs": inputs}
+    return {**made, "next": {"block": below}} if below else made
+
+
+def number(value: float) -> Block:
+    return {"shadow": {"type": "values_number", "id": f"number {value}", "fields": {"NUMBER": value}}}
+
+
+def text(value: str) -> Block:
+    return {"shadow": {"type": "values_text", "id": f"text {value}", "fields": {"TEXT": value}}}
+
+
+def say(words: str, below: Block | None = None, robot: str = "Pepper", model: str = "pepper") -> Block:
+    return block(f"robot_{model}_do_say", below=below, fields={"ROBOT": robot}, TEXT=text(words))
+
+
+def turn(degrees: float) -> Block:
+    fields = {"ROBOT": "Pepper", "DIRECTION": "left"}
+    return block("robot_pepper_do_turn", fields=fields, ANGLE=number(degrees))
+
+
+def started(first: Block) -> Block:
+    return {**block("events_started", below=first), "x": 56, "y": 56}
+
+
+def forever(first: Block) -> Block:
+    return block("control_forever", BODY={"block": first})
+
+
+def write(path: Path, *scripts: Block, robots: dict[str, object] | None = None) -> Path:
+    """The scripts as a file."""
+    content = {
+        "format": "nep-behaviour",
+        "version": 1,
+        "name": path.stem,
+        "workspace": {"blocks": {"languageVersion": 0, "blocks": list(scripts)}},
+        "robots": robots or {},
+    }
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
