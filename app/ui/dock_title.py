@@ -1,4 +1,4 @@
-"""The title of a dock: name or tabs, what is shown, chips, the panel's own buttons, "more" last (UI.md §4)."""
+"""The title of a dock: name or tabs, what is shown, chips, the panel's own buttons, "more" last."""
 
 from __future__ import annotations
 
