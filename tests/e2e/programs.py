@@ -1,0 +1,86 @@
+"""Processes beside Studio: what they say, line by line, and their end."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from tests.e2e.waiting import until
+
+ROOT = Path(__file__).resolve().parents[2]
+END_S = 10.0
+
+
+class Program:
+    """A Python program of ours as a process; a context manager that ends it."""
+
+    def __init__(self, *arguments: str, environment: Mapping[str, str] | None = None) -> None:
+        self._lines: list[str] = []
+        self._news = threading.Condition()
+        self.process = subprocess.Popen(
+            [sys.executable, *arguments],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", **(environment or {})},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            encoding="utf-8",
+        )
+        self._reader = threading.Thread(target=self._read, name="program-reader", daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        for line in self.process.stdout:
+            with self._news:
+                self._lines.append(line.rstrip("\n"))
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Everything that it said."""
+        with self._news:
+            return tuple(self._lines)
+
+    def says(self, words: str, within_s: float = 20.0) -> str:
+        """Wait for a line with these words."""
+        return until(
+            lambda: next((line for line in self.lines if words in line), ""),
+            f"{self.process.args} says {words!r}: {self.lines[-5:]}",
+            within_s,
+        )
+
+    def end_input(self) -> None:
+        """Nothing more comes: the program may end."""
+        self.process.stdin.close()
+
+    def kill(self) -> None:
+        """`kill -9`."""
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(END_S)
+
+    def interrupt(self) -> None:
+        """Ctrl+C."""
+        self.process.send_signal(signal.SIGINT)
+
+    def wait(self, within_s: float) -> int:
+        """Its exit code, when it has ended and everything that it said is read."""
+        code = self.process.wait(within_s)
+        self._reader.join(END_S)
+        return code
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait(END_S)
+        self._reader.join(END_S)
+        for pipe in (self.process.stdin, self.process.stdout):
+            with contextlib.suppress(OSError):
+                pipe.close()

@@ -1,0 +1,151 @@
+"""`kill -9` of Studio, of a publisher, of the master: no work, no message and no process is lost or left."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+import nep
+from tests.e2e.behaviours import forever, say, started, turn, write
+from tests.e2e.programs import Program
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(110)
+PEER = str(Path(__file__).parent / "peer.py")
+
+
+@pytest.fixture
+def publisher(address: str) -> Iterator[Program]:
+    with Program(PEER, "publish", "/count") as program:
+        yield program
+
+
+def sleeping(process: psutil.Process) -> bool:
+    return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+
+
+def test_work_is_offered_again_after_kill_9(start: Callable[..., Studio], tmp_path: Path) -> None:
+    path = write(tmp_path / "Mine.nepb", started(say("Hello")))
+    saved = path.read_bytes()
+    studio = start(str(path))
+    studio.open_category("Control")
+    view = studio.find(kind="QWebEngineView")["rect"]
+    before = set(studio.blocks())
+    studio.drag(".blocklyFlyout .control_wait", view[0] + 420, view[1] + 300)
+    edited = until(lambda: set(studio.blocks()) - before and set(studio.blocks()), "the block is there")
+    journals = studio.home / "journal"
+    until(lambda: any("control_wait" in each.read_text() for each in journals.glob("*.json")), "it is kept")
+    studio.kill()
+
+    again = start()
+    again.says("Put back the unsaved work?")
+    again.says("“Mine” was not saved when Studio ended last time.")
+    again.click("Put it back")
+    until(lambda: set(again.blocks()) == edited, "every block is back")
+    assert path.read_bytes() == saved, "the file is as it was last saved"
+    again.click("Blocks")
+    again.screen.key("s", ["Ctrl"])
+    again.says("Saved Mine")
+    assert b"control_wait" in path.read_bytes()
+    assert again.quit() == 0
+
+    third = start()
+    third.find(kind="StartPage")
+    assert not third.all("Put it back")
+
+
+def test_what_is_thrown_away_is_not_offered_again(start: Callable[..., Studio], tmp_path: Path) -> None:
+    studio = start(str(write(tmp_path / "Mine.nepb", started(say("Hello")))))
+    studio.point("[data-id=started] > .blocklyPath", dy=30)
+    studio.screen.key("Delete")
+    until(lambda: list((studio.home / "journal").glob("*.json")), "the edit is kept")
+    studio.kill()
+    again = start()
+    again.click("Throw it away")
+    until(lambda: not list((studio.home / "journal").glob("*.json")), "it is thrown away")
+    assert again.quit() == 0
+
+
+def test_the_robot_stops_and_ends_when_studio_is_killed(
+    start: Callable[..., Studio], tmp_path: Path, address: str
+) -> None:
+    studio = start(str(write(tmp_path / "Turning.nepb", started(forever(turn(300))))))
+    studio.choose("Robots", "Use the virtual robot")
+    studio.says("Pepper ready", 40)
+    studio.click("Run", kind="RunButton")
+    until(lambda: "turn" in studio.outlined("running"), "the block glows")
+    mine = [*studio.children("app.robots.simulated"), *studio.children("app.blocks.child")]
+    (master,) = studio.children("nep", "master")
+    assert len(mine) == 2
+    with nep.node("somebody", master=address) as node:
+        heard = node.new_pub("/somebody/is/here", "json")
+        studio.kill()
+        until(lambda: not any(sleeping(each) for each in mine), "robot and program end with Studio", 10)
+        assert sleeping(master), "the master stays for the program that still needs it"
+        assert "/somebody/is/here" in node.graph().topics
+        heard.publish({})
+    until(lambda: not sleeping(master), "the master ends when nobody needs it", 15)
+
+
+def test_a_killed_publisher_is_gone_within_3_s(
+    start: Callable[..., Studio], address: str, publisher: Program
+) -> None:
+    studio = start()
+    studio.click("Open the Developer layout")
+    publisher.says("ready", 30)
+    studio.row("Topics", "/count")
+    with nep.node("looker", master=address) as node:
+        assert "/count" in node.graph().topics
+        publisher.kill()
+        killed = time.monotonic()
+        until(lambda: "/count" not in node.graph().topics, "the graph forgets it", 3.0)
+        until(lambda: studio.row("Topics", "/count")["struck"], "the list strikes it through", 3.5)
+        assert time.monotonic() - killed < 3.5
+    until(lambda: not [r for r in studio.rows("Topics") if r["texts"][0] == "/count"], "10 s later it leaves")
+
+
+def test_a_master_that_dies_loses_no_message(
+    start: Callable[..., Studio], address: str, publisher: Program
+) -> None:
+    studio = start()
+    studio.click("Open the Developer layout")
+    publisher.says("ready", 30)
+    with Program(PEER, "hear", "/count") as listener:
+        listener.says("ready", 30)
+        until(lambda: len(listener.lines) > 50, "messages flow")
+        (master,) = studio.children("nep", "master")
+        master.kill()
+        killed = time.monotonic()
+
+        def known() -> bool:
+            found = studio.children("nep", "master")
+            return bool(found) and found[0].pid != master.pid and nep.masters.is_running(address, 0.2)
+
+        until(known, "Studio starts another master", 10)
+        restarted = time.monotonic()
+        with nep.node("looker", master=address) as node:
+
+            def everybody() -> bool:
+                graph = node.graph()
+                topic = graph.topics.get("/count")
+                names = {each.name for each in graph.nodes.values()}
+                return bool(
+                    topic and topic.publishers and topic.subscribers and {"publisher", "hearer"} <= names
+                )
+
+            until(everybody, "the new master knows all of them again", 3.0)
+        assert time.monotonic() - restarted < 3.0
+        heard = len(listener.lines)
+        until(lambda: len(listener.lines) > heard + 50, "messages flow as before")
+        publisher.end_input()
+        assert publisher.wait(10) == 0
+        last = int(publisher.lines[-1]) - 1
+        listener.says(str(last))
+        numbers = [int(line) for line in listener.lines if line.isdigit()]
+        assert numbers == list(range(numbers[0], last + 1)), "every message, once, in order"
+        assert restarted - killed < 10
