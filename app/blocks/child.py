@@ -11,6 +11,7 @@ import io
 import json
 import os
 import queue
+import signal
 import sys
 import threading
 import time
@@ -104,6 +105,7 @@ class Run:
         self._robots: tuple[Robot, ...] = tuple(
             robot for robot in map(parse, robots) if robot.name in self._program.robots
         )
+        self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
         self._master = None if order.get("master") is None else str(order["master"])
         self._out = out
         self._runtime = Runtime(out.print, labels=self._program.labels, readings=self._program.readings)
@@ -145,7 +147,7 @@ class Run:
         """Run, then tell the robots to stop; the names of those that did not answer."""
         network = Network(
             node,
-            f"program-{uuid.uuid4().hex[:8]}",
+            self._id,
             self._robots,
             sensors=self._program.sensors,
             events=self._program.events,
@@ -229,6 +231,8 @@ def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
 
 
 if __name__ == "__main__":
+    # Ctrl+C in a terminal reaches us too; what it means is for the runner to decide.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     code = main()
     # Scripts may still hang in something of their own; nothing of them is worth waiting for.
     sys.stderr.flush()

@@ -208,6 +208,17 @@ def test_a_child_that_was_killed_by_somebody_is_told(runner, heard, master):
     assert heard.until("ended").text == f"The program's process was killed (signal {signal.SIGKILL.value})."
 
 
+def test_ctrl_c_in_the_terminal_is_for_the_runner(runner, heard, master):
+    made = runner()
+    made.start(endless(), [], master.address)
+    heard.until("running")
+    os.kill(made.pid, signal.SIGINT)
+    made.pause()
+    assert heard.until("paused").blocks  # it lives
+    made.stop()
+    assert heard.until("ended").ok
+
+
 def test_what_is_no_event_is_left_out(runner, heard):
     made = runner(TALKS)
     made.start(program(), [], None)
