@@ -121,9 +121,11 @@ def _run(
         was_interrupted = interrupted.is_set()
     except KeyboardInterrupt:
         was_interrupted = True
-    stopper.send_stop()  # at once; and again when the program is gone and can't move them any more
+    stopper.send_stop(
+        ends=runner.program_id
+    )  # at once; and again when the program is gone and can't move them any more
     runner.close()
-    report = stopper.stop_all(timeout_s=STOP_S)
+    report = stopper.stop_all(timeout_s=STOP_S, ends=runner.program_id)
     for line in stop_lines(report):
         say(line)
     if was_interrupted:

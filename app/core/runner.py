@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import uuid
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -64,6 +65,8 @@ class Runner:
     ) -> None:
         """`command` starts the child, by default this Python or this frozen Studio."""
         self.run = next(_runs)
+        self.program_id = f"program-{uuid.uuid4().hex[:8]}"
+        """Who the robots' commands are from; a stop names it, so that nothing it sent moves a robot later."""
         self.state: State = "ready"
         self._on_event = on_event
         self._command = tuple(command) if command is not None else child_command()
@@ -111,7 +114,14 @@ class Runner:
         self.state = "paused" if paused else "running"
         kept = program.to_json() | ({} if name is None else {"name": name})
         self._orders.put(
-            {"do": "start", "program": kept, "robots": list(robots), "master": master, "paused": paused}
+            {
+                "do": "start",
+                "id": self.program_id,
+                "program": kept,
+                "robots": list(robots),
+                "master": master,
+                "paused": paused,
+            }
         )
         works = ((self._write, "input"), (self._read, "output"), (self._read_errors, "errors"))
         for work, label in works:

@@ -152,7 +152,7 @@ class Runs:
                 run.state, run.paused_at = "paused", event.says
                 run.pause_began_s = run.pause_began_s or self._clock()
                 self._mark(stopped=event.blocks)
-            case "error":
+            case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
                 self._on_error(event)
             case "print":
                 self._console.add("info", run.name, event.text)
@@ -239,13 +239,14 @@ class Runs:
         def answered(robot: RobotStop) -> None:
             self._post_event(RobotAnswered(number, robot))
 
+        ends = runner.program_id if runner is not None else None
         if runner is not None:
             if stopper is not None:
-                stopper.send_stop()  # at once; they are told again below, because the program may still speak
+                stopper.send_stop(ends=ends)  # at once; told again below for robots that don't know `ends`
             runner.stop()
         report = StopReport((), 0.0)
         if stopper is not None:
-            report = stopper.stop_all(timeout_s=STOP_TIMEOUT_S, on_answer=answered)
+            report = stopper.stop_all(timeout_s=STOP_TIMEOUT_S, on_answer=answered, ends=ends)
         self._post_event(StopDone(number, report))
 
     def _tell_fleet(self, report: StopReport) -> None:

@@ -148,24 +148,29 @@ class RobotStopper:
         with self._changed:
             return tuple(self._lines)
 
-    def send_stop(self, names: Iterable[str] | None = None) -> None:
-        """Tell the robots to stop and do not wait; a robot that a program still moves must be told again."""
+    def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
+        """Tell the robots to stop and do not wait.
+
+        `ends` is the id of a program: robots refuse what it still sends. A robot that can't (RIZE) must be
+        told again when the program is gone.
+        """
         for line in self._chosen(names):
-            self._tell(line, _id())
+            self._tell(line, _id(), ends)
 
     def stop_all(
         self,
         names: Iterable[str] | None = None,
         timeout_s: float = 1.0,
         on_answer: Callable[[RobotStop], None] | None = None,
+        ends: str | None = None,
     ) -> StopReport:
         """Tell the robots (`names`, or all) to stop and wait until each has answered, `timeout_s` at most.
 
         `on_answer` is called in this thread for each robot as it answers, and at the end for each that did
-        not.
+        not. `ends` as in `send_stop`.
         """
         began = self._clock()
-        asked = [self._ask(line) for line in self._chosen(names)]
+        asked = [self._ask(line, ends) for line in self._chosen(names)]
         told: set[str] = set()
         until = began + timeout_s
         while True:
@@ -199,18 +204,18 @@ class RobotStopper:
                 return list(self._lines.values())
             return [self._lines[name] for name in dict.fromkeys(names) if name in self._lines]
 
-    def _ask(self, line: _Line) -> _Asked:
+    def _ask(self, line: _Line, ends: str | None) -> _Asked:
         asked = _Asked(line, _id(), self._clock())
         with self._changed:
             self._asked[asked.id] = asked
-        error = self._tell(line, asked.id)
+        error = self._tell(line, asked.id, ends)
         if line.robot.dialect == RIZE or error:
             asked.result = RobotStop(
                 line.robot.name, False, None, can_confirm=line.robot.dialect != RIZE, error=error
             )
         return asked
 
-    def _tell(self, line: _Line, id: str) -> str:
+    def _tell(self, line: _Line, id: str, ends: str | None) -> str:
         """Send a stop; the sentence about what went wrong, or nothing."""
         robot = line.robot
         stop = robot.safe_stop.action
@@ -218,6 +223,8 @@ class RobotStopper:
             command = rize.to_command(robot, stop, {}, id)
         else:
             command = {"id": id, "op": "stop", "from": self._sender, "action": stop, "input": {}}
+            if ends is not None:
+                command["ends"] = ends
         try:
             line.publisher.publish(command)
         except NepError as error:
