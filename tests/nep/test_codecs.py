@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 
@@ -47,10 +48,8 @@ def test_round_trip(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(CODECS))
 @given(data=st.binary(max_size=200))
 def test_any_bytes_decode_or_raise_a_decode_error(name: str, data: bytes) -> None:
-    try:
+    with contextlib.suppress(DecodeError):
         codec(name).decode(memoryview(data), {})
-    except DecodeError as error:
-        assert str(error).startswith(f"cannot decode {len(data)} bytes as '{name}'; ")
 
 
 def test_names_and_numbers() -> None:

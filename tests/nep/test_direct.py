@@ -1,0 +1,168 @@
+"""Direct connections: who binds, both generations of the original wire, and the native one."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import pytest
+import zmq
+
+import nep
+from nep.errors import WireError
+from nep.native.framing import from_frame, to_frame
+
+
+@pytest.fixture
+def port() -> int:
+    """A port that was free just now."""
+    with zmq.Context() as context, context.socket(zmq.REP) as socket:
+        return int(socket.bind_to_random_port("tcp://127.0.0.1"))
+
+
+@pytest.fixture
+def node() -> Iterator[nep.Node]:
+    with nep.node("n", master="127.0.0.1:1") as made:
+        yield made
+
+
+@pytest.mark.parametrize("wire", ["original", "native"])
+@pytest.mark.parametrize("mode", ["one2many", "many2one"])
+@pytest.mark.parametrize("subscriber_first", [True, False])
+def test_both_ends_without_a_master(
+    node: nep.Node, port: int, wire: str, mode: str, subscriber_first: bool
+) -> None:
+    conf = node.direct("127.0.0.1", str(port), mode, wire=wire)  # type: ignore[arg-type]
+    if subscriber_first:
+        sub = node.new_sub("t", "json", conf)
+        pub = node.new_pub("t", "json", conf)
+    else:
+        pub = node.new_pub("t", "json", conf)
+        sub = node.new_sub("t", "json", conf)
+        while not pub.subscribers:
+            node.spin(0.01)
+    pub.publish({"n": 1})
+    message = sub.receive(2.0)
+    assert message is not None
+    assert message.payload == {"n": 1}
+    assert message.seq == (None if wire == "original" else 1)
+    assert sub.lost == (None if wire == "original" else 0)
+
+
+@pytest.mark.parametrize(
+    ("generation", "msg_type", "payload", "frame"),
+    [
+        ("A", "json", {"a": [1]}, b't {"a":[1]}'),
+        ("B", "json", {"a": [1]}, b'{"a":[1]}'),
+        ("A", "string", "hello world", b"t hello world"),
+        ("B", "string", "hello world", b"hello world"),
+        ("B", "dictionary", {"a": 1}, b't {"a":1}'),
+        ("A", "bytes", b"raw", b"raw"),
+        ("B", "msgpack", {"a": 1}, b"\x81\xa1a\x01"),
+    ],
+)
+def test_frames_as_a_plain_zeromq_program_sees_them(
+    node: nep.Node, port: int, generation: str, msg_type: str, payload: object, frame: bytes
+) -> None:
+    with zmq.Context() as context, context.socket(zmq.SUB) as plain:
+        plain.setsockopt(zmq.LINGER, 0)
+        plain.subscribe(b"")
+        plain.connect(f"tcp://127.0.0.1:{port}")
+        conf = node.direct(port=port, generation=generation)  # type: ignore[arg-type]
+        pub = node.new_pub("t", msg_type, conf)
+        while not pub.subscribers:
+            node.spin(0.01)
+        pub.publish(payload)
+        assert plain.poll(2000)
+        assert plain.recv_multipart() == [frame]
+
+
+def test_both_forms_are_received_and_other_topics_are_not(node: nep.Node, port: int) -> None:
+    with zmq.Context() as context, context.socket(zmq.XPUB) as plain:
+        plain.setsockopt(zmq.LINGER, 0)
+        plain.bind(f"tcp://127.0.0.1:{port}")
+        sub = node.new_sub("t", "json", node.direct(port=port))
+        assert plain.poll(2000)
+        assert plain.recv() == b"\x01"
+        for frame in (b't {"n":1}', b'{"n": 2}', b't2 {"n":3}', b"t 4"):
+            plain.send(frame)
+        assert [sub.listen(timeout_s=2.0)[1] for _ in range(3)] == [{"n": 1}, {"n": 2}, 4]
+        assert sub.listen(timeout_s=0.05) == (False, {})
+        plain.send_multipart([b"two", b"parts"])
+        plain.send(b"t {broken")
+        plain.send(b"t 5")
+        assert sub.listen(timeout_s=2.0) == (True, 5)
+
+
+def test_pictures_are_base64_of_a_jpeg(node: nep.Node, port: int) -> None:
+    picture = np.full((24, 32, 3), 90, np.uint8)
+    conf = node.direct(port=port, mode="many2one")
+    with zmq.Context() as context, context.socket(zmq.PUB) as plain:
+        plain.setsockopt(zmq.LINGER, 0)
+        sub = node.new_sub("cam", "image", conf)
+        pub = node.new_pub("cam", "image", conf)
+        while not pub.subscribers:
+            node.spin(0.01)
+        pub.publish(picture)
+        ok, got = sub.listen(timeout_s=2.0)
+        assert ok
+        assert np.abs(got.astype(int) - 90).max() < 3  # type: ignore[attr-defined]
+
+
+def test_framing_both_ways() -> None:
+    file = cv2.imencode(".jpg", np.zeros((8, 8, 3), np.uint8))[1].tobytes()
+    for generation in ("A", "B"):
+        for msg_type, codec in [
+            ("image", "image"),
+            ("images", "image"),
+            ("json", "json"),
+            ("bytes", "bytes"),
+        ]:
+            data = file if codec == "image" else b'{"a":1}'
+            frame = to_frame("t", generation, msg_type, codec, data)
+            assert from_frame("t", msg_type, codec, frame) == data
+    assert to_frame("cam", "A", "image", "image", file) == b"cam " + base64.b64encode(file)
+    assert from_frame("cam", "image", "image", b"cam2 " + base64.b64encode(file)) is None
+    with pytest.raises(WireError, match="not base64"):
+        from_frame("cam", "image", "image", b"cam !!!")
+
+
+def test_a_port_that_is_taken(node: nep.Node, port: int) -> None:
+    conf = node.direct(port=port)
+    node.new_pub("t", "json", conf)
+    with pytest.raises(nep.AddressInUseError, match=f"'127.0.0.1:{port}' is in use"):
+        node.new_pub("t", "json", conf)
+    with pytest.raises(nep.AddressInUseError):
+        node.new_sub("t", "json", node.direct(port=port, mode="many2one"))
+
+
+def test_many_to_many_connects_to_both_ports_of_a_proxy(node: nep.Node, port: int) -> None:
+    with zmq.Context() as context, context.socket(zmq.XSUB) as xsub, context.socket(zmq.XPUB) as xpub:
+        for each in (xsub, xpub):
+            each.setsockopt(zmq.LINGER, 0)
+        xsub.bind(f"tcp://127.0.0.1:{port}")
+        xpub.bind(f"tcp://127.0.0.1:{port + 1}")
+        conf = node.direct(port=port, mode="many2many")
+        sub = node.new_sub("t", "json", conf)
+        assert xpub.poll(2000)
+        xsub.send(xpub.recv())
+        pub = node.new_pub("t", "json", conf)
+        while not pub.subscribers:
+            assert not xsub.poll(10)  # a proxy always looks at both sockets
+        pub.publish(1)
+        assert xsub.poll(2000)
+        xpub.send(xsub.recv())
+        assert sub.listen(timeout_s=2.0) == (True, 1)
+
+
+def test_what_cannot_be() -> None:
+    with nep.node("n", "memory") as node:
+        with pytest.raises(nep.NepError, match="no mode 'one2one'; did you mean 'one2many'"):
+            node.direct(mode="one2one")
+        for port in ("http", 0, 65536, "-1"):
+            with pytest.raises(nep.NepError, match="is no port"):
+                node.direct(port=port)
+        with pytest.raises(nep.NepError, match="'memory' has no direct connections"):
+            node.new_pub("t", "json", node.direct())

@@ -1,0 +1,316 @@
+"""The graph: requests in, pushes and replies out; no sockets, no clock."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nep import bodies
+from nep.errors import WireError
+from nep.graph import Graph, GraphView, Outgoing, without
+from nep.packing import pack
+from nep.rates import Meter
+from nep.records import (
+    Expected,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.requests import (
+    Added,
+    AddPublisher,
+    AddSubscriber,
+    Done,
+    Found,
+    Join,
+    Leave,
+    Look,
+    Ping,
+    Probe,
+    PublisherCame,
+    PublisherGone,
+    Refused,
+    RemovePublisher,
+    RemoveSubscriber,
+    Renew,
+    Renewed,
+    ReportMissing,
+    Request,
+    Seen,
+)
+
+
+def node(id: str, generation: str = "native", name: str = "") -> NodeRecord:
+    return NodeRecord(id, name or id.upper(), "host", 1, generation=generation)
+
+
+def publisher(
+    id: int, topic: str = "t", msg_type: str = "json", at: str = "tcp://127.0.0.1:5"
+) -> PublisherRecord:
+    return PublisherRecord(id, topic, msg_type, "json", (at,) if at else ())
+
+
+def subscriber(id: int, topic: str = "t") -> SubscriberRecord:
+    return SubscriberRecord(id, topic, "json")
+
+
+@pytest.fixture
+def graph() -> Graph:
+    return Graph(epoch=7, now=0.0, learn_s=0.0)
+
+
+def ask(graph: Graph, request: Request, now: float = 0.0) -> tuple[Outgoing, ...]:
+    return graph.apply(request, 1, now, "asker")
+
+
+def test_a_publisher_is_told_whom_to_expect_after_they_are_told(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    push, reply = ask(graph, AddPublisher(node("p"), publisher(2)))
+    assert (push.to, push.call) == ("s", None)
+    assert isinstance(push.answer, PublisherCame)
+    assert (push.answer.publisher.publisher, push.answer.publisher.node_name) == (publisher(2), "P")
+    assert (reply.to, reply.call) == ("asker", 1)
+    assert isinstance(reply.answer, Added)
+    assert (reply.answer.epoch, reply.answer.expected) == (7, (Expected(1, "s", "S"),))
+
+
+def test_a_node_with_two_subscribers_is_told_once(graph: Graph) -> None:
+    for id in (1, 2):
+        ask(graph, AddSubscriber(node("s"), subscriber(id)))
+    outgoing = ask(graph, AddPublisher(node("p"), publisher(3)))
+    assert [each.to for each in outgoing] == ["s", "asker"]
+
+
+def test_a_subscriber_is_told_who_publishes_and_these_are_probed(graph: Graph) -> None:
+    ask(graph, AddPublisher(node("p"), publisher(1)))
+    ask(graph, AddPublisher(node("original", "A"), publisher(2, at="")))
+    probe, reply = ask(graph, AddSubscriber(node("s"), subscriber(3)))
+    assert (probe.to, type(probe.answer)) == ("p", Probe)
+    assert isinstance(reply.answer, Found)
+    assert [each.publisher.id for each in reply.answer.publishers] == [1]
+    assert without(reply.answer, frozenset({"p"})) == Found(7, graph.revision)
+
+
+def test_whoever_turns_out_dead_is_not_expected() -> None:
+    answer = Added(1, 1, (Expected(1, "a", "A"), Expected(2, "b", "B")), (Expected(3, "a", "A"),))
+    assert without(answer, frozenset({"a"})) == Added(1, 1, (Expected(2, "b", "B"),), ())
+    assert without(answer, frozenset()) is answer
+
+
+def test_a_bad_topic_is_refused(graph: Graph) -> None:
+    (reply,) = ask(graph, AddPublisher(node("p"), publisher(1, "two words")))
+    assert isinstance(reply.answer, Refused)
+    assert "cannot be a topic" in reply.answer.reason
+    assert graph.nodes == ()
+
+
+def test_orderly_goodbyes_carry_the_last_message(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    ask(graph, AddPublisher(node("p"), publisher(2)))
+    push, reply = ask(graph, RemovePublisher("p", 2, last_seq=5))
+    assert push.answer == PublisherGone(7, graph.revision, 2, "t", is_closed=True, last_seq=5)
+    assert isinstance(reply.answer, Done)
+    ask(graph, AddPublisher(node("p"), publisher(3)))
+    push, _reply = ask(graph, Leave("p"))
+    assert isinstance(push.answer, PublisherGone)
+    assert push.answer.is_closed
+    ask(graph, RemoveSubscriber("s", 1))
+    assert graph.view().topics == {}
+    assert [each.id for each in graph.nodes] == ["s"]
+
+
+def test_a_lapsed_lease_unlists_and_does_not_close(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)), 0.0)
+    ask(graph, AddPublisher(node("p"), publisher(2)), 0.0)
+    ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 0, 0),)), 2.0)
+    assert [each.to for each in graph.silent(2.0)] == ["p"]
+    assert graph.tick(2.9) == ()
+    (push,) = graph.tick(3.0)
+    assert isinstance(push.answer, PublisherGone)
+    assert (push.to, push.answer.is_closed) == ("s", False)
+    (reply,) = ask(graph, Renew("p", 7, 0, (PublisherCount(2, 1, 1, 1),)), 4.0)
+    assert isinstance(reply.answer, Renewed)
+    assert reply.answer.again
+
+
+def test_managed_nodes_have_no_lease_and_get_no_pushes(graph: Graph) -> None:
+    ask(graph, Join(node("o", "A"), 0, (publisher(1, at=""),), (subscriber(2),), managed=True))
+    assert graph.silent(100.0) == ()
+    assert graph.tick(100.0) == ()
+    outgoing = ask(graph, AddPublisher(node("p"), publisher(3)))
+    assert [each.to for each in outgoing] == ["asker"]
+    assert isinstance(outgoing[0].answer, Added)
+    assert outgoing[0].answer.expected == ()
+    assert graph.view().nodes["o"].generation == "A"
+
+
+def test_renewals_bring_statistics_and_what_changed(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    before = graph.revision
+    ask(graph, AddPublisher(node("p"), publisher(2)))
+    for second in range(3):
+        count = PublisherCount(2, 20 * second, 2000 * second, 20 * second, second)
+        ask(graph, Renew("p", 7, 0, (count,)), float(second))
+    (reply,) = ask(graph, Renew("s", 7, before, (), (SubscriberCount(1, 30, 10),)), 2.0)
+    assert isinstance(reply.answer, Renewed)
+    assert [each.topic for each in reply.answer.topics] == ["t"]
+    assert reply.answer.last_seqs == {2: 40}
+    (reply,) = ask(graph, Renew("s", 7, graph.revision, (), (SubscriberCount(1, 30, 10),)), 2.0)
+    assert isinstance(reply.answer, Renewed)
+    assert reply.answer.topics == ()
+    topic = graph.view().topics["t"]
+    assert (topic.rate_hz, topic.bandwidth_Bps, topic.last_stamp_ns) == (20.0, 2000.0, 2)
+    assert (topic.lost, topic.loss_ratio) == (10, 0.25)
+
+
+@pytest.mark.parametrize("epoch", [6, 7])
+def test_a_renewal_that_does_not_match_asks_for_everything(graph: Graph, epoch: int) -> None:
+    ask(graph, AddPublisher(node("p"), publisher(2)))
+    counts = () if epoch == 7 else (PublisherCount(2, 0, 0, 0),)
+    (reply,) = ask(graph, Renew("p", epoch, 0, counts))
+    assert isinstance(reply.answer, Renewed)
+    assert reply.answer.again
+
+
+def test_joining_replaces_what_was_known(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    ask(graph, AddPublisher(node("p"), publisher(2)))
+    outgoing = ask(graph, Join(node("p"), 3, (publisher(4),), (subscriber(5),)))
+    assert [type(each.answer) for each in outgoing] == [PublisherCame, PublisherCame, Found]
+    topic = graph.view().topics["t"]
+    assert [each.id for each in topic.publishers] == [4]
+    assert sorted(each.id for each in topic.subscribers) == [1, 5]
+
+
+def test_a_learning_master_lets_the_old_come_back_first() -> None:
+    graph = Graph(epoch=7, now=0.0, learn_s=1.0)
+    assert ask(graph, AddPublisher(node("new"), publisher(1)), 0.2) == ()
+    assert graph.learning_end == 1.0
+    assert ask(graph, Join(node("old"), 3, (), (subscriber(2),)), 0.4) != ()
+    assert graph.tick(0.9) == ()
+    push, reply = graph.tick(1.0)
+    assert (push.to, reply.to, reply.call) == ("old", "asker", 1)
+    assert isinstance(reply.answer, Added)
+    assert [each.id for each in reply.answer.expected] == [2]
+    assert graph.learning_end is None
+
+
+def test_who_does_not_answer_is_an_alert_until_it_renews(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    ask(graph, AddPublisher(node("p"), publisher(2)))
+    ask(graph, ReportMissing("p", 2, (1, 99)))
+    (alert,) = graph.view().alerts
+    assert (alert.id, alert.sentence) == ("missing:s", "“S” does not answer “P”")
+    _push, reply = ask(graph, AddPublisher(node("p"), publisher(3)))
+    assert isinstance(reply.answer, Added)
+    assert (reply.answer.expected, reply.answer.hung) == ((), (Expected(1, "s", "S"),))
+    ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 0, 0),)))
+    assert graph.view().alerts == ()
+
+
+def test_alerts_on_names_types_and_messages(graph: Graph) -> None:
+    ask(graph, AddPublisher(node("a", name="N"), publisher(1, msg_type="json")))
+    ask(graph, AddPublisher(node("b", name="N"), publisher(2, msg_type="string")))
+    ask(graph, AddSubscriber(node("c"), subscriber(3)))
+    ask(graph, Renew("c", 7, 0, (), (SubscriberCount(3, 1, 0, "its version is 2"),)))
+    alerts = {each.id: each.sentence for each in graph.view().alerts}
+    assert set(alerts) == {"name:N", "type:t", "message:t"}
+    assert alerts["message:t"] == "“C” cannot read “t”: its version is 2"
+    ask(graph, Leave("b"))
+    assert {each.id for each in graph.view().alerts} == {"message:t"}
+
+
+def test_the_gateway_s_copies_do_not_count_twice(graph: Graph) -> None:
+    ask(graph, Join(node("o", "A"), 0, (publisher(1, at=""),), managed=True))
+    ask(graph, AddPublisher(node("g", "gateway"), publisher(2)))
+    for second in range(2):
+        ask(graph, Renew("o", 7, 0, (PublisherCount(1, 10 * second, 0, 0),)), float(second))
+        ask(graph, Renew("g", 7, 0, (PublisherCount(2, 10 * second, 0, 0),)), float(second))
+    assert graph.view().topics["t"].rate_hz == 10.0
+
+
+REQUESTS: list[Request] = [
+    Join(node("a"), 3, (publisher(1),), (subscriber(2),), True),
+    AddPublisher(node("a"), publisher(2**63)),
+    AddSubscriber(node("a"), subscriber(2**64 - 1)),
+    RemovePublisher("a", 1, 5),
+    RemoveSubscriber("a", 1),
+    Leave("a"),
+    Renew("a", 1, 2, (PublisherCount(1, 2, 3, 4, 5),), (SubscriberCount(1, None, None, "p"),)),
+    ReportMissing("a", 1, (2, 3)),
+    Look(),
+    Ping(),
+]
+
+
+@pytest.mark.parametrize("request_", REQUESTS, ids=lambda each: type(each).__name__)
+def test_requests_survive_the_wire(request_: Request) -> None:
+    assert bodies.decode_request(bodies.encode_request(request_, 42)) == (42, request_)
+
+
+def test_answers_survive_the_wire(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    ask(graph, AddPublisher(node("a", name="S"), publisher(2)))
+    ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 5, 5),)))
+    for request in REQUESTS:
+        for each in ask(graph, request):
+            assert bodies.decode_answer(bodies.encode_answer(each.answer, 3)) == (3, each.answer)
+    (seen,) = ask(graph, Look())
+    assert isinstance(seen.answer, Seen)
+    assert isinstance(seen.answer.view, GraphView)
+
+
+@given(st.binary(max_size=50))
+def test_any_bytes_are_a_request_or_a_sentence(body: bytes) -> None:
+    assert isinstance(bodies.decode_request(body).request, str | Ping | Look)
+    with pytest.raises(WireError):
+        bodies.decode_answer(body)
+
+
+@given(
+    st.sampled_from(["join", "publisher+", "renew", "missing", "look", "nonsense", 7, None]),
+    st.recursive(
+        st.none() | st.integers(0, 9) | st.text(max_size=4),
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(
+                st.sampled_from(["node", "id", "publisher", "topic", "node_id"]), inner, max_size=5
+            )
+        ),
+    ),
+)
+def test_any_map_is_a_request_or_a_sentence(do: object, what: object) -> None:
+    asked = bodies.decode_request(pack({"do": do, "call": 5, "what": what}))
+    assert asked.call == 5
+    if isinstance(asked.request, str):
+        assert asked.request
+
+
+def test_a_wrong_field_is_named() -> None:
+    body = pack({"do": "renew", "call": 1, "what": {"node_id": "a", "epoch": "x", "revision": 1}})
+    assert bodies.decode_request(body).request == "'Renew.epoch' is a 'str', not 'int'"
+    body = pack({"do": "leave", "call": 1, "what": {}})
+    assert bodies.decode_request(body).request == "'Leave.node_id' is missing"
+
+
+def test_newer_peers_may_send_more() -> None:
+    body = pack({"do": "leave", "call": 1, "what": {"node_id": "a", "mood": "fine"}})
+    assert bodies.decode_request(body).request == Leave("a")
+
+
+def test_a_meter_needs_two_readings_and_forgets() -> None:
+    meter = Meter()
+    assert meter.rates() is None
+    meter.add(0.0, 0, 0)
+    assert meter.rates() is None
+    meter.add(1.0, 100, 1000)
+    assert meter.rates() == (100.0, 1000.0)
+    meter.add(2.0, 100, 1000)  # it stopped: shown as the mean until ten messages are out of the window
+    for second in range(3, 20):
+        meter.add(float(second), 100, 1000)
+    assert meter.rates() == (0.0, 0.0)
+    meter.add(21.0, 3, 3)  # the program was started again
+    assert meter.rates() is None

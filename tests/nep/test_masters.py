@@ -1,0 +1,200 @@
+"""The master as a thread: nothing kills it, attachments live with it, it ends with its owner."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+
+import pytest
+import zmq
+
+import nep
+from nep import bodies
+from nep.masters import Master, is_running
+from nep.packing import pack
+from nep.records import NodeRecord, PublisherCount, PublisherRecord
+from nep.requests import Done, Join, Leave, Ping, Refused, Renew, Renewed
+from nep.views import GraphView
+from tests.nep.programs import eventually, running
+
+ORIGINAL = NodeRecord("original-1", "old", "host", 1, "JavaScript", "A")
+
+
+class Attached:
+    """An attachment that notes what happens to it."""
+
+    def __init__(self, fails: bool = False) -> None:
+        self.events: list[str] = []
+        self.views: list[GraphView] = []
+        self.fails = fails
+
+    def start(self, master: Master) -> None:
+        self.events.append("start")
+        assert isinstance(master.submit(Ping()), Done)
+        if self.fails:
+            raise nep.AddressInUseError("127.0.0.1:7000")
+
+    def changed(self, view: GraphView) -> None:
+        self.views.append(view)
+        if self.fails:
+            raise RuntimeError("an attachment that breaks")
+
+    def close(self) -> None:
+        self.events.append("close")
+
+
+def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None:
+    context = zmq.Context()
+    socket = context.socket(zmq.DEALER)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.connect(f"tcp://{master.address}")
+    bad = [
+        [b""],
+        [b"\xff\xff"],
+        [b"", b"", b""],
+        [b"x" * 100_000],
+        [pack(None)],
+        [pack({"do": "fly", "call": 3})],
+        [pack({"do": "renew", "call": 3, "what": [1]})],
+        [bodies.encode_request(Leave("somebody else"), 3)],
+        [bodies.encode_request(Join(ORIGINAL, managed=True), 3)],
+    ]
+    try:
+        for parts in bad:
+            socket.send_multipart(parts)
+            assert socket.poll(2000)
+            _call, answer = bodies.decode_answer(socket.recv())
+            assert isinstance(answer, Refused)
+            assert answer.reason
+    finally:
+        socket.close()
+        context.term()
+    assert is_running(master.address)
+
+
+def test_a_socket_of_another_kind_does_not_kill(master: Master) -> None:
+    context = zmq.Context()
+    for kind in (zmq.REQ, zmq.PUB, zmq.REP):
+        socket = context.socket(kind)
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.connect(f"tcp://{master.address}")
+        if kind != zmq.REP:
+            socket.send(b"{}")
+        socket.close()
+    context.term()
+    assert is_running(master.address)
+
+
+def test_two_masters_do_not_share_an_address(master: Master) -> None:
+    with pytest.raises(nep.AddressInUseError, match="in use by another program"):
+        Master(master.address).start()
+
+
+def test_nobody_answers_where_no_master_is() -> None:
+    with Master("127.0.0.1:0") as master:
+        address = master.address
+        assert is_running(address)
+    assert not is_running(address, 0.1)
+
+
+def test_what_is_attached_starts_before_anybody_is_answered_and_hears_of_changes() -> None:
+    attached = Attached()
+    with Master("127.0.0.1:0", attachments=[attached], learn_s=0.0) as master:
+        with nep.node("n", master=master.address) as node:
+            node.new_pub("topic")
+            eventually(lambda: any("topic" in view.topics for view in attached.views))
+        eventually(lambda: attached.views[-1].nodes == {})
+    assert attached.events == ["start", "close"]
+
+
+def test_an_attachment_that_cannot_start_ends_the_start() -> None:
+    fine, broken = Attached(), Attached(fails=True)
+    master = Master("127.0.0.1:0", attachments=[fine, broken])
+    with pytest.raises(nep.AddressInUseError):
+        master.start()
+    assert (fine.events, broken.events) == (["start", "close"], ["start"])
+    assert not is_running(master.address, 0.1)
+
+
+def test_an_attachment_that_breaks_does_not_break_the_master(caplog: pytest.LogCaptureFixture) -> None:
+    attached = Attached()
+    with Master("127.0.0.1:0", attachments=[attached], learn_s=0.0) as master:
+        attached.fails = True
+        with nep.node("n", master=master.address) as node:
+            node.new_pub("topic")
+            eventually(lambda: bool(attached.views))
+        assert is_running(master.address)
+    assert "something attached to the master failed" in caplog.text
+
+
+def test_foreign_nodes_are_registered_from_inside(master: Master) -> None:
+    record = PublisherRecord(5, "old/topic", "json", "json")
+    assert not isinstance(master.submit(Join(ORIGINAL, 0, (record,), managed=True)), Refused)
+    renew = Renew(ORIGINAL.id, master.epoch, 0, (PublisherCount(5, 3, 30, 0),))
+    assert isinstance(master.submit(renew), Renewed)
+    with nep.node("n") as node:
+        view = node.graph()
+        assert (view.nodes[ORIGINAL.id].generation, view.nodes[ORIGINAL.id].language) == ("A", "JavaScript")
+        assert view.topics["old/topic"].publishers[0].count == 3
+        node.new_sub("old/topic")  # nobody to connect to, nobody to wait for
+    master.submit(Leave(ORIGINAL.id))
+    assert master.view().nodes == {}
+
+
+def test_a_closed_master_takes_nothing(master: Master) -> None:
+    master.close()
+    master.close()
+    with pytest.raises(nep.ClosedError):
+        master.submit(Ping())
+    assert master.wait(0.0)
+
+
+def test_submitting_from_many_threads(master: Master) -> None:
+    replies: list[object] = []
+    threads = [
+        threading.Thread(target=lambda: replies.extend(master.submit(Ping()) for _ in range(50)))
+        for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [type(each) for each in replies] == [Done] * 200
+
+
+SLEEPER = "import sys; print('up'); sys.stdin.read()"
+NODE = """
+import nep, sys
+with nep.node("stranger") as node:
+    node.new_pub("topic")
+    print("up")
+    sys.stdin.readline()
+"""
+
+
+def test_a_master_ends_with_its_owner_when_nobody_else_needs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    with running(SLEEPER) as owner:
+        owner.line()
+        with Master("127.0.0.1:0", owner_pid=owner.process.pid, learn_s=0.0) as master:
+            monkeypatch.setenv("NEP_MASTER", master.address)
+            with running(NODE) as stranger:
+                stranger.line()
+                owner.kill()
+                assert not master.wait(1.0)
+                stranger.say("")
+                stranger.end()
+                assert master.wait(3.0)
+
+
+def test_a_master_of_this_process_outlives_nothing_it_should_not() -> None:
+    with Master("127.0.0.1:0", owner_pid=os.getpid()) as master:
+        assert not master.wait(0.6)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs the POSIX meaning of kill")
+def test_a_process_that_is_no_master_is_given_up(tmp_path: object) -> None:
+    with Master("127.0.0.1:0") as probe:
+        address = probe.address
+    with pytest.raises(nep.MasterUnreachable):
+        nep.start_process(address, command=[sys.executable, "-c", "raise SystemExit(3)"], timeout_s=5.0)

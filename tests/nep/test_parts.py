@@ -1,0 +1,238 @@
+"""The small parts: inbox, sources, plug-ins, wakers, the I/O thread, addresses, errors."""
+
+from __future__ import annotations
+
+import select
+import sys
+import threading
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nep
+from nep import addresses
+from nep.backends.base import Backend
+from nep.errors import PluginsMissingError, did_you_mean
+from nep.inbox import Inbox
+from nep.message import Message
+from nep.native.io import IoThread, Rest
+from nep.native.sources import Sources
+from nep.plugins import discover
+from nep.records import PublisherRecord, RemotePublisher
+from nep.waker import Waker
+
+
+def message(n: int, size: int = 1) -> Message:
+    return Message("t", bytes(size), "bytes", "bytes", seq=n)
+
+
+@given(st.lists(st.integers(0, 50), max_size=40), st.integers(1, 10), st.integers(1, 100))
+def test_an_inbox_keeps_the_newest_within_both_bounds(sizes: list[int], most: int, max_bytes: int) -> None:
+    inbox = Inbox("all", most, max_bytes)
+    dropped = sum(inbox.put(message(n, size)) for n, size in enumerate(sizes))
+    kept = inbox.take_all()
+    assert len(kept) + dropped == len(sizes)
+    assert [each.seq for each in kept] == list(range(dropped, len(sizes)))
+    assert len(kept) <= most
+    assert sum(each.size_bytes for each in kept) <= max_bytes or len(kept) == 1
+    assert inbox.take() is None
+
+
+def test_an_inbox_of_the_latest_drops_nothing() -> None:
+    inbox = Inbox("latest")
+    assert [inbox.put(message(n)) for n in range(3)] == [0, 0, 0]
+    assert [each.seq for each in inbox.take_all()] == [2]
+
+
+def remote(id: int, node: str = "n", name: str = "N") -> RemotePublisher:
+    return RemotePublisher(PublisherRecord(id, "t", "json", "json", ("tcp://x",)), node, name)
+
+
+def test_gaps_are_losses_counted_from_the_echo() -> None:
+    sources = Sources()
+    sources.reached(1, 10)
+    for seq in (11, 12, 15):
+        assert sources.arrived(1, seq, is_resent=False)
+    assert (sources.received, sources.lost) == (3, 2)
+    sources.reached(1, 17)  # it reconnected: two were published meanwhile
+    assert sources.lost == 4
+
+
+def test_counting_starts_at_the_first_message_when_there_is_no_echo_yet() -> None:
+    sources = Sources()
+    assert sources.arrived(1, 100, is_resent=False)
+    sources.reached(1, 100)
+    assert (sources.received, sources.lost) == (1, 0)
+
+
+def test_a_latched_message_that_is_sent_again_is_dropped() -> None:
+    sources = Sources()
+    assert sources.arrived(1, 5, is_resent=True)
+    assert not sources.arrived(1, 5, is_resent=True)
+    assert (sources.received, sources.lost) == (1, 0)
+
+
+def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late() -> None:
+    sources = Sources()
+    sources.reached(1, 0)
+    sources.get(1).has_echoed = True
+    sources.arrived(1, 1, is_resent=False)
+    sources.promised(1, 3)
+    assert sources.lost == 0  # they may be on their way
+    sources.promised(1, 3)
+    assert sources.lost == 2
+    assert sources.arrived(1, 2, is_resent=False)
+    assert (sources.received, sources.lost) == (2, 1)
+    sources.promised(99, 5)  # nobody we know
+
+
+def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
+    sources = Sources()
+    sources.get(1).remote = remote(1)
+    assert sources.replaced_by(remote(2)) == []
+    sources.get(1).is_lapsed = True
+    assert sources.replaced_by(remote(2)) == [1]
+    assert sources.replaced_by(remote(2, name="other")) == []
+    sources.closing(1, 7, now=10.0)
+    assert (sources.ended(12.9), sources.ended(13.0)) == ([], [1])
+
+
+def test_back_ends_are_found() -> None:
+    assert set(discover("nep.backends", "BACKEND", Backend)) >= {"memory", "zeromq"}
+    with pytest.raises(nep.UnknownBackendError, match="no back end 'zeromk'; did you mean 'zeromq'"):
+        nep.node("n", "zeromk")
+    with nep.node("n", "ZMQ") as node:
+        assert "zeromq" in repr(node)
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    home = tmp_path / "plugs_for_test"
+    home.mkdir()
+    (home / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield home  # type: ignore[misc]
+    for name in [name for name in sys.modules if name.startswith("plugs_for_test")]:
+        del sys.modules[name]
+
+
+def test_an_empty_package_is_an_error(package: Path) -> None:
+    (package / "base.py").write_text("x = 1\n")
+    with pytest.raises(PluginsMissingError, match="no module of 'plugs_for_test' binds 'BACKEND'"):
+        discover("plugs_for_test", "BACKEND", Backend)
+
+
+def test_one_file_is_a_plug_in(package: Path) -> None:
+    (package / "mine.py").write_text(
+        "from nep.backends.base import Backend\nBACKEND = Backend('mine', lambda node: None)\n"
+    )
+    assert set(discover("plugs_for_test", "BACKEND", Backend)) == {"mine"}
+    (package / "wrong.py").write_text("BACKEND = 5\n")
+    with pytest.raises(TypeError, match=r"'plugs_for_test.wrong.BACKEND' is no 'Backend'"):
+        discover("plugs_for_test", "BACKEND", Backend)
+
+
+def test_a_waker_wakes_and_is_cleared() -> None:
+    waker = Waker()
+    assert select.select([waker.fd], [], [], 0)[0] == []
+    for _ in range(100_000):
+        waker.wake()
+    assert select.select([waker.fd], [], [], 0)[0] == [waker.fd]
+    waker.clear()
+    assert select.select([waker.fd], [], [], 0)[0] == []
+    waker.close()
+    waker.wake()
+    waker.clear()
+
+
+class Bell:
+    """Something served that counts its servings."""
+
+    def __init__(self, rests: list[Rest]) -> None:
+        self.waker = Waker()
+        self.fd = self.waker.fd
+        self.rests = rests
+        self.served = threading.Semaphore(0)
+
+    def serve(self, now: float) -> Rest:
+        self.waker.clear()
+        self.served.release()
+        if not self.rests:
+            return Rest()
+        rest = self.rests.pop(0)
+        if rest.due == -1.0:
+            raise ZeroDivisionError
+        return Rest(rest.is_quiet, None if rest.due is None else now + rest.due)
+
+
+def test_the_io_thread_serves_on_descriptors_orders_and_times() -> None:
+    io = IoThread("nep-io-test")
+    io.start()
+    bell = Bell([Rest(), Rest(is_quiet=True, due=0.05), Rest(), Rest()])
+    io.add(bell)
+    assert bell.served.acquire(timeout=2.0)
+    bell.waker.wake()
+    assert bell.served.acquire(timeout=2.0)
+    bell.waker.wake()  # it is quiet: the descriptor is not looked at
+    assert not bell.served.acquire(timeout=0.01)
+    assert bell.served.acquire(timeout=2.0)
+    io.serve_soon(bell)
+    assert bell.served.acquire(timeout=2.0)
+    io.remove(bell)
+    bell.waker.wake()
+    assert not bell.served.acquire(timeout=0.02)
+    io.close()
+    bell.waker.close()
+
+
+def test_one_broken_socket_does_not_silence_the_others(caplog: pytest.LogCaptureFixture) -> None:
+    io = IoThread("nep-io-test")
+    io.start()
+    broken, fine = Bell([Rest(due=-1.0)]), Bell([])
+    io.add(broken)
+    io.add(fine)
+    assert broken.served.acquire(timeout=2.0)
+    assert fine.served.acquire(timeout=2.0)
+    fine.waker.wake()
+    assert fine.served.acquire(timeout=2.0)
+    io.close()
+    assert "a socket could not be served" in caplog.text
+    for each in (broken, fine):
+        each.waker.close()
+
+
+@pytest.mark.parametrize(
+    ("given_", "address"),
+    [(None, "127.0.0.1:7780"), ("10.0.0.5", "10.0.0.5:7780"), ("tcp://h:1", "h:1"), ("", "127.0.0.1:7780")],
+)
+def test_addresses(monkeypatch: pytest.MonkeyPatch, given_: str | None, address: str) -> None:
+    monkeypatch.delenv("NEP_MASTER", raising=False)
+    assert addresses.master_address(given_) == address
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:5")
+    assert addresses.master_address(None) == "127.0.0.1:5"
+
+
+@pytest.mark.parametrize("address", [":5", "host:port", "host:99999"])
+def test_what_is_no_address(address: str) -> None:
+    with pytest.raises(nep.NepError, match="is no address of a master"):
+        addresses.master_address(address)
+
+
+def test_did_you_mean() -> None:
+    assert did_you_mean("jsn", ["json", "string"]) == "did you mean 'json'?"
+    assert did_you_mean("xyz", ["json", "string"]) == "known are 'json', 'string'"
+
+
+def test_names_of_nodes() -> None:
+    for name in ("", "x" * 201):
+        with pytest.raises(nep.NepError, match="cannot be a node's name"):
+            nep.node(name)
+
+
+def test_the_public_names_are_there() -> None:
+    assert isinstance(nep, ModuleType)
+    for name in nep.__all__:
+        assert getattr(nep, name) is not None
