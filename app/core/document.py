@@ -189,10 +189,7 @@ class Document:
             self.journal_error = None
 
     def _keep_used_robots(self) -> None:
-        """The file carries the descriptions of the robots in it, so that their blocks are known without them.
-
-        He file carries the descriptions of the robots in it, so that their blocks are known without them.
-        """
+        """Keep the descriptions of the robots that the blocks name: they are known without them later."""
         text = json.dumps(self.workspace, ensure_ascii=False)
         for robot in self._connected:
             if json.dumps(robot.name, ensure_ascii=False) in text:

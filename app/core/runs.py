@@ -214,8 +214,8 @@ class Runs:
 
     def _on_end(self, event: RunnerEvent) -> None:
         self._runner = None
-        if self._run.state == "stopping":
-            return
+        if not self.active:
+            return  # Stop was first
         if not event.ok and not self.block_errors:
             self._alerts.put("program", "error", "The behaviour ended by itself.", event.text)
         finished = event.ok and not self.block_errors

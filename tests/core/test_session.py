@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
@@ -172,6 +173,14 @@ def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
     tick_until(session, lambda: session.runs.view().state == "proven")
     assert session.runs.view().result_ok
     assert session.runs.view().title.startswith("Stopped after")
+    # the end of the program, which is told later, is no second stop
+    stops = [record for record in session.console.records if "stopped (" in record.text]
+    ended = threading.Event()
+    for _ in range(40):
+        ended.wait(0.01)
+        session.tick()
+    assert [record for record in session.console.records if "stopped (" in record.text] == stops
+    assert session.runs.view().state == "proven"
 
 
 def test_a_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:
