@@ -113,6 +113,8 @@ class _Compiler:
         if block.shape != "hat":
             self._notes.unattached(first, block)
             return None
+        if self._notes.missing(first, block) is not None:
+            return None
         self._in_message = bool(block.parameters)
         try:
             expressions = self._expressions(first, block)

@@ -204,6 +204,7 @@ class Runner:
         self._finish(process)
 
     def _finish(self, process: subprocess.Popen[bytes]) -> None:
+        self._orders.put(None)  # its input ends, and with it a child that still waits for orders
         try:
             code = process.wait(END_S)
         except subprocess.TimeoutExpired:
@@ -211,7 +212,6 @@ class Runner:
             code = process.wait()
         if process.stdout is not None:
             process.stdout.close()
-        self._orders.put(None)
         self._threads[-1].join(timeout=END_S)  # its last words
         was_stopped = self.state == "stopping"
         self.state = "ended"

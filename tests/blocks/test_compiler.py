@@ -277,6 +277,12 @@ def test_an_empty_gap_is_an_error_and_the_program_stops_there(it, sentence):
     assert run.runtime.error.block == compile_behaviour(saved, [robot()]).problems[0].block_id
 
 
+def test_a_hat_with_an_empty_gap_does_not_start():
+    saved = workspace(stack(block("events_becomes_true"), say("Hi")), started())
+    assert sentences(saved) == [("error", "when needs a condition. Put one into the gap.")]
+    assert compile_behaviour(saved, [robot()]).starts == 1
+
+
 def test_what_the_robot_would_refuse_is_told_before_run():
     turn = block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="left", ANGLE=number(900))
     assert sentences(workspace(started(turn))) == [("error", "turn: angle must be between 0 and 360 °.")]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -46,6 +47,17 @@ def types(saved):
     elif isinstance(saved, list):
         for inner in saved:
             yield from types(inner)
+
+
+def test_the_behaviour_of_the_designs_picture_has_the_problems_of_the_picture():
+    saved = json.loads(Path("tests/data/behaviours/picture-02.nepb").read_text("utf-8"))
+    pepper, absent = (parse(saved["robots"][name]) for name in ("Pepper", "NAO"))
+    program = compile_behaviour(saved["workspace"], [pepper], absent=[absent], name=saved["name"])
+    assert [problem.sentence for problem in program.problems] == [
+        "NAO is not connected, so wave will be skipped.",
+        "wait until may wait for ever if nobody comes.",
+    ]
+    assert program.starts == 3
 
 
 def run(number: int) -> tuple[Play, FakeLink]:
