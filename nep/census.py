@@ -1,8 +1,8 @@
-"""Census: the tables behind the graph: nodes, their publishers and subscribers, statistics, alerts."""
+"""Census: the tables behind the graph: nodes, their publishers and subscribers, and their statistics."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from nep.rates import Meter
@@ -14,7 +14,6 @@ from nep.records import (
     SubscriberCount,
     SubscriberRecord,
 )
-from nep.views import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 __all__ = ["Census", "Member", "Publisher", "Subscriber"]
 
@@ -73,6 +72,16 @@ class Census:
             for known, member in found.items()
             if member.publishers[known].record.endpoints
         )
+
+    @property
+    def topics(self) -> list[str]:
+        """The names of all topics that somebody publishes or subscribes."""
+        return sorted(set(self._publishing) | set(self._subscribing))
+
+    def publishing(self, topic: str) -> list[tuple[Member, Publisher]]:
+        """All publishers of a topic, also those that cannot be connected to, each with its node."""
+        found = self._publishing.get(topic, {})
+        return [(member, member.publishers[known]) for known, member in found.items()]
 
     def subscribers_of(self, topic: str) -> Iterator[tuple[Member, Subscriber]]:
         """The subscribers of a topic, each with its node."""
@@ -190,122 +199,6 @@ class Census:
     def _changed(self, topic: str) -> None:
         self.revision += 1
         self._topic_revisions[topic] = self.revision
-
-    # ---- the view
-
-    def view(self, epoch: int) -> GraphView:
-        """Everything, as frozen values."""
-        nodes = {
-            each.node.id: NodeInfo(
-                each.node.id,
-                each.node.name,
-                each.node.host,
-                each.node.pid,
-                each.node.language,
-                each.node.generation,
-                each.node.since_ns,
-            )
-            for each in self.members.values()
-        }
-        names = sorted(set(self._publishing) | set(self._subscribing))
-        topics = {name: self._topic(name) for name in names}
-        return GraphView(epoch, self.revision, nodes, topics, tuple(self._alerts(topics)))
-
-    def _topic(self, name: str) -> TopicInfo:
-        publishing = self._publishing.get(name, {})
-        publishers = [(member, member.publishers[known]) for known, member in publishing.items()]
-        subscribers = [(member, each) for member, each in self.subscribers_of(name)]
-        records = [each.record for _member, each in publishers]
-        msg_type = records[0].msg_type if records else subscribers[0][1].record.msg_type
-        # The gateway's own publishers repeat what the originals sent: they do not count twice.
-        originals = [
-            each for member, each in publishers if member.node.generation not in {"native", "gateway"}
-        ]
-        counted = [
-            each for member, each in publishers if not (originals and member.node.generation == "gateway")
-        ]
-        rates = [rate for each in counted if (rate := each.meter.rates()) is not None]
-        stamps = [each.last_stamp_ns for each in counted if each.last_stamp_ns is not None]
-        lost = [each.lost for _member, each in subscribers if each.lost is not None]
-        received = [each.received for _member, each in subscribers if each.received is not None]
-        all_lost = sum(lost) if lost else None
-        total = sum(lost) + sum(received)
-        return TopicInfo(
-            name,
-            msg_type,
-            records[0].codec if records else "",
-            tuple(_publisher_info(member, each) for member, each in publishers),
-            tuple(
-                SubscriberInfo(each.record.id, member.node.id, each.received, each.lost)
-                for member, each in subscribers
-            ),
-            sum(rate for rate, _ in rates) if rates else None,
-            sum(size for _, size in rates) if rates else None,
-            max(stamps) if stamps else None,
-            all_lost,
-            None if all_lost is None else (all_lost / total if total else 0.0),
-        )
-
-    def _alerts(self, topics: Mapping[str, TopicInfo]) -> Iterator[Alert]:
-        by_name: dict[str, list[Member]] = {}
-        for member in self.members.values():
-            by_name.setdefault(member.node.name, []).append(member)
-        for name, members in sorted(by_name.items()):
-            if len(members) > 1:
-                yield Alert(
-                    f"name:{name}",
-                    f"{len(members)} programs call themselves “{name}”",
-                    "Give each program a name of its own; both go on working.",
-                )
-        for topic in topics.values():
-            yield from self._topic_alerts(topic)
-        for member in self.members.values():
-            if member.hung:
-                yield Alert(
-                    f"missing:{member.node.id}",
-                    f"“{member.node.name}” does not answer {_names(member.hung)}",
-                    "It may be busy or stopped in a debugger. What is published meanwhile may not reach it.",
-                )
-
-    def _topic_alerts(self, topic: TopicInfo) -> Iterator[Alert]:
-        types: dict[str, list[str]] = {}
-        for known, member in self._publishing.get(topic.name, {}).items():
-            types.setdefault(member.publishers[known].record.msg_type, []).append(member.node.name)
-        if len(types) > 1:
-            said = " and ".join(f"{_names(names)} as “{kind}”" for kind, names in sorted(types.items()))
-            yield Alert(
-                f"type:{topic.name}",
-                f"The topic “{topic.name}” has two types: it is published by {said}",
-                "Use the same type in all programs, or give one of the topics another name.",
-            )
-        for member, subscriber in self.subscribers_of(topic.name):
-            if subscriber.problem:
-                yield Alert(
-                    f"message:{topic.name}",
-                    f"“{member.node.name}” cannot read “{topic.name}”: {subscriber.problem}",
-                    "Look at the program that publishes them.",
-                )
-                return
-
-
-def _publisher_info(member: Member, publisher: Publisher) -> PublisherInfo:
-    rates = publisher.meter.rates()
-    return PublisherInfo(
-        publisher.record.id,
-        member.node.id,
-        publisher.record.endpoints,
-        publisher.record.latched,
-        publisher.count,
-        publisher.bytes,
-        publisher.last_seq,
-        publisher.last_stamp_ns,
-        None if rates is None else rates[0],
-        None if rates is None else rates[1],
-    )
-
-
-def _names(names: Iterable[str]) -> str:
-    return ", ".join(f"“{name}”" for name in sorted(names))
 
 
 def _take_out(table: dict[str, dict[int, Member]], topic: str, known: int) -> None:

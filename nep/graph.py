@@ -13,11 +13,10 @@ seconds of any clock that does not jump.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
-from typing import NamedTuple
 
 from nep.census import Census, Member
 from nep.errors import WireError
+from nep.outgoing import Outgoing
 from nep.records import Expected, NodeRecord, PublisherRecord, SubscriberRecord
 from nep.requests import (
     Added,
@@ -44,6 +43,7 @@ from nep.requests import (
     Seen,
     TopicPublishers,
 )
+from nep.viewing import view_of
 from nep.views import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 from nep.wire import check_topic
 
@@ -63,14 +63,6 @@ LEASE_S = 3.0
 """A node that has not renewed for so long is unlisted."""
 SILENT_S = 1.4
 """A node that has not renewed for so long is probed: a renewal is due every second."""
-
-
-class Outgoing(NamedTuple):
-    """One thing to send: a push (call is None), or the reply to `call`. `to` is a node id, or who asked."""
-
-    to: str
-    answer: Reply | Push
-    call: int | None = None
 
 
 class Graph:
@@ -152,7 +144,7 @@ class Graph:
 
     def view(self) -> GraphView:
         """The whole graph as a value."""
-        return self._census.view(self.epoch)
+        return view_of(self._census, self.epoch)
 
     # ---- requests
 
@@ -278,21 +270,6 @@ class Graph:
             if not member.is_managed and member.node.id not in told:
                 told.add(member.node.id)
                 out.append(Outgoing(member.node.id, push))
-
-
-def without(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
-    """`answer` that expects nothing from these nodes: they turned out to be dead while it was on its way."""
-    if isinstance(answer, Found) and node_ids:
-        return replace(
-            answer, publishers=tuple(each for each in answer.publishers if each.node_id not in node_ids)
-        )
-    if isinstance(answer, Added) and node_ids:
-        return replace(
-            answer,
-            expected=tuple(each for each in answer.expected if each.node_id not in node_ids),
-            hung=tuple(each for each in answer.hung if each.node_id not in node_ids),
-        )
-    return answer
 
 
 def _check(record: PublisherRecord | SubscriberRecord) -> None:

@@ -16,7 +16,8 @@ import zmq
 from nep.addresses import endpoint_of
 from nep.bodies import Asked, decode_request, encode_answer
 from nep.errors import AddressInUseError, ClosedError, WaitTimeoutError
-from nep.graph import Graph, GraphView, Outgoing, without
+from nep.graph import Graph, GraphView
+from nep.outgoing import Outgoing, without
 from nep.requests import Join, Refused, Reply, Request, node_of
 from nep.starting import Owner
 from nep.waker import Waker

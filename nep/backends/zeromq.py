@@ -10,16 +10,16 @@ from contextlib import contextmanager
 import zmq
 
 from nep.backends.base import HANDSHAKE_S, Backend, Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.backends.native.direct import OriginalInlet, OriginalOutlet, OriginalSub, attach
+from nep.backends.native.inlet import NativeInlet
+from nep.backends.native.io import IoThread
+from nep.backends.native.link import MasterLink
+from nep.backends.native.outlet import NativeOutlet
+from nep.backends.native.reading import SocketInlet
+from nep.backends.native.sockets import Socket, bind_free_port, host_towards
+from nep.backends.native.subsocket import SubSocket
 from nep.configuration import Configuration, Direct
 from nep.errors import NepError
-from nep.native.direct import OriginalInlet, OriginalOutlet, OriginalSub, attach
-from nep.native.inlet import NativeInlet
-from nep.native.io import IoThread
-from nep.native.link import MasterLink
-from nep.native.outlet import NativeOutlet
-from nep.native.reading import SocketInlet
-from nep.native.sockets import Socket, bind_free_port, host_towards
-from nep.native.subsocket import SubSocket
 from nep.records import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.views import GraphView
 from nep.waker import Waker

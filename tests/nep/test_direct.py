@@ -11,8 +11,8 @@ import pytest
 import zmq
 
 import nep
+from nep.backends.native.framing import from_frame, to_frame
 from nep.errors import WireError
-from nep.native.framing import from_frame, to_frame
 
 
 @pytest.fixture

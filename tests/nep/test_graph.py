@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from nep import bodies
 from nep.errors import WireError
-from nep.graph import Graph, GraphView, Outgoing, without
+from nep.graph import Graph, GraphView
+from nep.outgoing import Outgoing, without
 from nep.packing import pack
 from nep.rates import Meter
 from nep.records import (

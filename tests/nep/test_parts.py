@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 import nep
 from nep import addresses
 from nep.backends.base import Backend
+from nep.backends.native.io import IoThread, Rest
+from nep.backends.native.sources import Sources
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.inbox import Inbox
 from nep.message import Message
-from nep.native.io import IoThread, Rest
-from nep.native.sources import Sources
 from nep.plugins import discover
 from nep.records import PublisherRecord, RemotePublisher
 from nep.waker import Waker

@@ -240,16 +240,21 @@ def test_what_could_not_be_delivered_is_said(master: Master) -> None:
     code = """
     import nep, sys
     pub = nep.node("p").new_pub("topic", "bytes")
+    print("ready")
+    sys.stdin.readline()
     for n in range(20):
         pub.publish(bytes(4_000_000))
     """
     with running(COLLECT, "topic", "0", "20") as hung:
         hung.line()
         with running(code) as program:
-            # Stopped once it has answered: new_pub has returned by then, or waits half a second in vain.
+            program.line()
             hung.signal(signal.SIGSTOP)
+            started = monotonic()
+            program.say("go")
             _out, error = program.end()
-    assert "messages not delivered" in error or "subscriber" in error or error == ""
+            assert 1.9 < monotonic() - started < 4.0
+    assert "closed before 1 subscriber(s) took everything: up to 20 messages not delivered" in error
 
 
 def test_ctrl_c_ends_a_blocking_listen_at_once(master: Master) -> None:

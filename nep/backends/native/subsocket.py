@@ -10,11 +10,11 @@ import errno
 import zmq
 
 from nep.backends.base import SubscriberSpec
+from nep.backends.native.sockets import Socket, receive_mark
+from nep.backends.native.sources import Sources
 from nep.codecs import codec_for, codec_numbered
 from nep.errors import WireError
 from nep.message import Message
-from nep.native.sockets import Socket, receive_mark
-from nep.native.sources import Sources
 from nep.records import RemotePublisher
 from nep.wire import BYE, EXTENSION, LATCHED, Header, hello_part, read_extension, read_header, topic_part
 

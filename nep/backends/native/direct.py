@@ -9,15 +9,15 @@ from collections.abc import Callable
 import zmq
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.native.framing import from_frame, to_frame
+from nep.backends.native.io import Rest
+from nep.backends.native.reading import SocketInlet
+from nep.backends.native.sockets import SendMark, Socket, bind, connect, receive_mark, wait_until
 from nep.codecs import codec_for
 from nep.configuration import Direct
 from nep.encoded import Encoded
 from nep.errors import ClosedError, WireError
 from nep.message import Message
-from nep.native.framing import from_frame, to_frame
-from nep.native.io import Rest
-from nep.native.reading import SocketInlet
-from nep.native.sockets import SendMark, Socket, bind, connect, receive_mark, wait_until
 
 __all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach"]
 

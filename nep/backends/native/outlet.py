@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterable
 import zmq
 
 from nep.backends.base import PublisherSpec
+from nep.backends.native.io import Rest
+from nep.backends.native.sockets import SendMark, Socket, wait_until
 from nep.encoded import Encoded
 from nep.errors import ClosedError
-from nep.native.io import Rest
-from nep.native.sockets import SendMark, Socket, wait_until
 from nep.records import Expected, PublisherCount
 from nep.wire import BYE, LATCHED, Header, extension_part, hello_part, parse_hello, topic_part
 from nep.wire import EXTENSION as EXTENSION_FLAG

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable
 
-from nep.native.reading import SocketInlet
-from nep.native.subsocket import SubSocket
+from nep.backends.native.reading import SocketInlet
+from nep.backends.native.subsocket import SubSocket
 from nep.records import RemotePublisher
 from nep.waker import Waker
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import zmq
 
 from nep.addresses import endpoint_of, is_loopback
+from nep.backends.native.sockets import Socket, wait_until
 from nep.bodies import decode_answer, encode_request
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
-from nep.native.sockets import Socket, wait_until
 from nep.requests import Push, Refused, Reply, Request
 
 __all__ = ["Answer", "Calls", "Then"]

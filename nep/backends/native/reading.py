@@ -15,10 +15,10 @@ from typing import Generic, Protocol, TypeVar
 import zmq
 
 from nep.backends.base import SubscriberSpec
+from nep.backends.native.io import IoThread, Rest
+from nep.backends.native.sockets import wait_until
 from nep.inbox import Inbox
 from nep.message import Message
-from nep.native.io import IoThread, Rest
-from nep.native.sockets import wait_until
 from nep.records import SubscriberCount
 from nep.waker import Waker
 

@@ -9,12 +9,12 @@ import logging
 import threading
 from collections.abc import Iterable
 
+from nep.backends.native.calls import Calls
+from nep.backends.native.inlet import NativeInlet
+from nep.backends.native.io import IoThread, Rest
+from nep.backends.native.outlet import NativeOutlet
+from nep.backends.native.sockets import Socket
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError
-from nep.native.calls import Calls
-from nep.native.inlet import NativeInlet
-from nep.native.io import IoThread, Rest
-from nep.native.outlet import NativeOutlet
-from nep.native.sockets import Socket
 from nep.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
 from nep.requests import (
     Added,
