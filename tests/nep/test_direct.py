@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 from collections.abc import Iterator
 
 import cv2
@@ -17,9 +18,13 @@ from nep.errors import WireError
 
 @pytest.fixture
 def port() -> int:
-    """A port that was free just now."""
-    with zmq.Context() as context, context.socket(zmq.REP) as socket:
-        return int(socket.bind_to_random_port("tcp://127.0.0.1"))
+    """A port that was free just now, and the next one too."""
+    while True:
+        with zmq.Context() as context, context.socket(zmq.REP) as one, context.socket(zmq.REP) as two:
+            found = int(one.bind_to_random_port("tcp://127.0.0.1"))
+            with contextlib.suppress(zmq.ZMQError):
+                two.bind(f"tcp://127.0.0.1:{found + 1}")
+                return found
 
 
 @pytest.fixture
