@@ -9,6 +9,7 @@ from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.mend import mend
+from app.core import deep_json
 from app.core.files import write_atomically
 from app.core.journal import Journal, Unsaved
 from app.errors import DescriptionError, DocumentError
@@ -56,7 +57,7 @@ class Document:
 
     def edited(self, workspace: Workspace) -> None:
         """The editor changed the blocks. They are in the journal when this returns."""
-        if workspace == self.workspace:
+        if deep_json.same(workspace, self.workspace):
             return
         self.workspace = workspace
         self.dirty = True
@@ -102,7 +103,7 @@ class Document:
             "workspace": self.workspace,
             "robots": self.robots,
         }
-        data = json.dumps(content, indent=1, ensure_ascii=False).encode("utf-8", "surrogatepass")
+        data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
         try:
             write_atomically(target, data)
         except OSError as error:
@@ -190,7 +191,7 @@ class Document:
 
     def _keep_used_robots(self) -> None:
         """Keep the descriptions of the robots that the blocks name: they are known without them later."""
-        text = json.dumps(self.workspace, ensure_ascii=False)
+        text = deep_json.dumps(self.workspace)
         for robot in self._connected:
             if json.dumps(robot.name, ensure_ascii=False) in text:
                 self.robots[robot.name] = dict(robot.source)
@@ -217,7 +218,7 @@ def read(path: Path) -> tuple[str, Workspace, Descriptions]:
     if size > LARGEST_BYTES:
         raise DocumentError(path, f"is {size // 1_000_000} MB; a behaviour has at most 32 MB")
     try:
-        content = json.loads(data.decode("utf-8", "surrogatepass"))
+        content = deep_json.loads(data.decode("utf-8", "surrogatepass"))
     except (ValueError, RecursionError) as error:
         raise DocumentError(path, "is damaged or no behaviour; open a copy from before") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:

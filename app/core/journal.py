@@ -6,7 +6,6 @@ that a second Studio does not offer what the first one still holds.
 
 from __future__ import annotations
 
-import json
 import os
 import time
 import uuid
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import psutil
 
+from app.core import deep_json
 from app.core.files import write_atomically
 from app.core.settings import home
 
@@ -58,7 +58,7 @@ class Journal:
             "workspace": workspace,
             "robots": robots,
         }
-        data = json.dumps(entry, ensure_ascii=False).encode("utf-8", "surrogatepass")
+        data = deep_json.dumps(entry).encode("utf-8", "surrogatepass")
         write_atomically(self._file, data, durable=False)
 
     def discard(self) -> None:
@@ -75,7 +75,9 @@ def left_behind(folder: Path | None = None) -> list[Unsaved]:
 
 def _read(file: Path) -> Unsaved | None:
     try:
-        entry = json.loads(file.read_bytes().decode("utf-8", "surrogatepass"))
+        entry = deep_json.loads(file.read_bytes().decode("utf-8", "surrogatepass"))
+        if not isinstance(entry, dict):
+            return None
         if _alive(int(entry["pid"]), float(entry["born_s"])):
             return None
         path = entry["path"]

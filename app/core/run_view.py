@@ -134,7 +134,7 @@ def _stopping(run: RunState, now: float) -> RunView:
 
 
 def _proven(run: RunState, _now: float) -> RunView:
-    words, good = result_words(run.report) if run.report is not None else ("", True)
+    words, good = result_words(run.report) if run.report is not None and run.report.robots else ("", True)
     after = f" after {seconds(run.elapsed_s)}" if run.elapsed_s is not None else ""
     title, detail = f"Stopped{after}", "The dashed outline shows where" if run.dashed else ""
     if run.errors:

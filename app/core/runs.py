@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 from app.core.alerts import Alerts
@@ -36,6 +37,13 @@ class RobotAnswered:
     robot: RobotStop
 
 
+@dataclass(frozen=True, slots=True)
+class OneStopped:
+    """One robot was told to stop while nothing ran."""
+
+    report: StopReport
+
+
 class Network(Protocol):
     """What a run needs of the network."""
 
@@ -61,6 +69,7 @@ class Runs:
         self._document, self._fleet, self._network = document, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._runner: Runner | None = None
+        self._used: tuple[str, ...] = ()
         self._run = RunState()
         self._stop_number = 0
         self._stop_thread: threading.Thread | None = None
@@ -115,14 +124,19 @@ class Runs:
 
     def stop(self) -> None:
         """End the program and tell every robot to stop; what they answer is the run bar's result."""
-        run = self._run
-        run.pressed_s = self._clock()
+        self._stop(None)
+
+    def stop_robot(self, name: str) -> None:
+        """Stop one robot; while a program runs this is `stop`, because it would move the robot again."""
         if self.active:
-            run.elapsed_s = run.elapsed(run.pressed_s)
-        run.state, run.report, run.answered, run.finished = "stopping", None, [], False
-        run.asked = tuple(link.name for link in self._fleet.connected)
-        self._mark(stopped=self.running_blocks or self.stopped_blocks)
-        self._start_stopping()
+            self.stop()
+        elif self._network.stopper is not None:
+            stopper, post = self._network.stopper, self._post_event
+
+            def stop_it() -> None:
+                post(OneStopped(stopper.stop_all([name], timeout_s=STOP_TIMEOUT_S)))
+
+            threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
 
     def confirm_still(self) -> None:
         """A person says that the robot that did not answer stands still."""
@@ -161,8 +175,12 @@ class Runs:
             case _:
                 pass
 
-    def on_stop(self, event: StopDone | RobotAnswered) -> None:
+    def on_stop(self, event: StopDone | RobotAnswered | OneStopped) -> None:
         """Take over what robots answered to the newest stop."""
+        if isinstance(event, OneStopped):
+            self._tell_fleet(event.report)
+            self._tell_person(event.report, "stop")
+            return
         if event.number != self._stop_number:
             return
         run = self._run
@@ -174,12 +192,7 @@ class Runs:
         run.state = "proven" if good else "unanswered"
         run.dashed = bool(self.stopped_blocks)
         self._tell_fleet(event.report)
-        self._console.add("info" if good else "error", run.name or "stop", words)
-        if good:
-            self._alerts.cure("stop")
-        else:
-            title, detail, _, _ = unanswered_words(event.report)
-            self._alerts.put("stop", "error", f"{title}.", detail, button="Stop again", action="run.stop")
+        self._tell_person(event.report, run.name or "stop")
 
     # -- inside ------------------------------------------------------------------------------------------
 
@@ -199,7 +212,7 @@ class Runs:
         except AppError as error:
             self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
             return
-        self._runner = runner
+        self._runner, self._used = runner, program.robots
         self._run = RunState(
             "running", self._document.name, started_s=self._clock(), last_words=self._run.last_words
         )
@@ -221,21 +234,29 @@ class Runs:
         finished = event.ok and not self.block_errors
         if finished:
             self._mark()
-        # the end of a program is a stop like any other: every robot is told and must answer
-        self.stop()
+        # the end of a program is a stop like any other: every robot that it used is told and must answer
+        self._stop(self._used)
         self._run.finished = finished
 
-    def _start_stopping(self) -> None:
+    def _stop(self, names: tuple[str, ...] | None) -> None:
+        """Stop these robots, or all."""
+        run = self._run
+        run.pressed_s = self._clock()
+        if self.active:
+            run.elapsed_s = run.elapsed(run.pressed_s)
+        elif run.state not in {"stopping", "unanswered"}:
+            run.elapsed_s = None
+        run.state, run.report, run.answered, run.finished = "stopping", None, [], False
+        run.asked = names if names is not None else tuple(link.name for link in self._fleet.connected)
+        self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
-        self._stop_thread = threading.Thread(
-            target=self._stop_all,
-            args=(self._stop_number, self._runner, self._network.stopper),
-            name="studio-stop",
-            daemon=True,
-        )
+        work = partial(self._stop_all, self._stop_number, self._runner, self._network.stopper, names)
+        self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
         self._stop_thread.start()
 
-    def _stop_all(self, number: int, runner: Runner | None, stopper: RobotStopper | None) -> None:
+    def _stop_all(
+        self, number: int, runner: Runner | None, stopper: RobotStopper | None, names: tuple[str, ...] | None
+    ) -> None:
         def answered(robot: RobotStop) -> None:
             self._post_event(RobotAnswered(number, robot))
 
@@ -246,8 +267,17 @@ class Runs:
             runner.stop()
         report = StopReport((), 0.0)
         if stopper is not None:
-            report = stopper.stop_all(timeout_s=STOP_TIMEOUT_S, on_answer=answered, ends=ends)
+            report = stopper.stop_all(names, timeout_s=STOP_TIMEOUT_S, on_answer=answered, ends=ends)
         self._post_event(StopDone(number, report))
+
+    def _tell_person(self, report: StopReport, origin: str) -> None:
+        words, good = result_words(report)
+        self._console.add("info" if good else "error", origin, words)
+        if good:
+            self._alerts.cure("stop")
+        else:
+            title, detail, _, _ = unanswered_words(report)
+            self._alerts.put("stop", "error", f"{title}.", detail, button="Stop again", action="run.stop")
 
     def _tell_fleet(self, report: StopReport) -> None:
         now = time.localtime()

@@ -22,7 +22,7 @@ from app.core.images import Images
 from app.core.journal import Journal
 from app.core.mailbox import Drained, Mailbox
 from app.core.runner import RunnerEvent
-from app.core.runs import RobotAnswered, Runs, StopDone
+from app.core.runs import OneStopped, RobotAnswered, Runs, StopDone
 from app.core.settings import Settings
 from app.core.source import (
     GraphSeen,
@@ -196,7 +196,7 @@ class Session:
                 self._on_master_lost(event)
             case RunnerEvent():
                 self.runs.on_runner(event)
-            case StopDone() | RobotAnswered():
+            case StopDone() | RobotAnswered() | OneStopped():
                 self.runs.on_stop(event)
             case CompanionFailed():
                 self.console.add("error", event.what, f"{event.sentence} {event.detail}".strip())

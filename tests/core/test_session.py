@@ -200,7 +200,7 @@ def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
             tick_until(session, lambda: session.stopper and session.stopper.robots)
             session.document.edited(json.loads(json.dumps(_forever())))
             session.runs.run()
-            tick_until(session, lambda: session.runs.running_blocks)
+            tick_until(session, lambda: "w" in session.runs.running_blocks)
             runner = session.runs._runner
             assert runner is not None
             assert runner.pid is not None
@@ -210,6 +210,31 @@ def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
             assert [alert.id for alert in session.alerts.active] == ["program"]
         finally:
             driver.close()
+
+
+def test_the_end_of_a_program_stops_its_own_robots_only(session: Session) -> None:
+    with nep.node("lamps") as node:
+        drivers = [Driver(LAMP, name, node) for name in ("Lamp", "Other")]
+        for driver in drivers:
+            driver.start()
+        used, other = Lamp.made[-2:]
+        try:
+            tick_until(session, lambda: session.stopper and len(session.stopper.robots) == 2)
+            blink = {"type": "robot_lamp_do_blink", "id": "b", "fields": {"ROBOT": "Lamp"}}
+            started = {"type": "events_started", "id": "s", "next": {"block": blink}}
+            session.document.edited({"blocks": {"languageVersion": 0, "blocks": [started]}})
+            session.runs.run()
+            tick_until(session, lambda: session.runs.view().title.startswith("Finished"))
+            assert session.runs.view().result is not None
+            assert session.runs.view().result.startswith("Lamp stopped")
+            assert (used.stops >= 1, other.stops) == (True, 0)
+            session.runs.stop_robot("Other")
+            tick_until(session, lambda: other.stops == 1)
+            link = session.fleet.link("Other")
+            tick_until(session, lambda: link is not None and link.last_stop is not None)
+        finally:
+            for driver in drivers:
+                driver.close()
 
 
 def test_a_robot_that_does_not_answer_is_named_and_run_stays_locked(session: Session) -> None:
@@ -231,7 +256,8 @@ def test_a_robot_that_does_not_answer_is_named_and_run_stays_locked(session: Ses
 
 def _forever() -> dict[str, object]:
     wait = {"type": "control_wait", "id": "w", "inputs": {"SECONDS": {"shadow": _number(1)}}}
-    loop = {"type": "control_forever", "id": "f", "inputs": {"BODY": {"block": wait}}}
+    blink = {"type": "robot_lamp_do_blink", "id": "b", "fields": {"ROBOT": "Lamp"}, "next": {"block": wait}}
+    loop = {"type": "control_forever", "id": "f", "inputs": {"BODY": {"block": blink}}}
     started = {"type": "events_started", "id": "s", "next": {"block": loop}}
     return {"blocks": {"languageVersion": 0, "blocks": [started]}}
 

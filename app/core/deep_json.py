@@ -1,0 +1,72 @@
+"""JSON as deep as a long stack of blocks: Blockly nests every block in the one above it.
+
+Python's json gives up at about 1000 levels, which is a stack of 480 blocks. What is deeper is read and
+written in a thread of its own with a larger stack, up to `LEVELS` (less in early releases of Python 3.12);
+beyond that it is a RecursionError as ever.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+LEVELS = 9_000
+STACK_BYTES = 256 * 1024 * 1024
+
+T = TypeVar("T")
+_one_at_a_time = threading.Lock()
+
+
+def loads(text: str | bytes) -> object:
+    """The value of a JSON text. ValueError for what is none, RecursionError beyond 9000 levels."""
+    return _deeply(lambda: json.loads(text))
+
+
+def dumps(value: object, indent: int | None = None) -> str:
+    """The JSON text of a value, not escaped beyond what JSON asks for. RecursionError beyond 9000 levels.
+
+    A deep value is not indented: its text would be mostly spaces.
+    """
+    try:
+        return json.dumps(value, indent=indent, ensure_ascii=False)
+    except RecursionError:
+        return _deeply(lambda: json.dumps(value, ensure_ascii=False))
+
+
+def same(one: object, other: object) -> bool:
+    """Whether two values are equal, however deep."""
+    return _deeply(lambda: one == other)
+
+
+def _deeply(work: Callable[[], T]) -> T:
+    try:
+        return work()
+    except RecursionError:
+        pass
+    made: list[T] = []
+    failed: list[Exception] = []
+
+    def run() -> None:
+        try:
+            made.append(work())
+        except (ValueError, RecursionError) as error:
+            failed.append(error)
+
+    # the limit is the whole process's, and the stack's size is that of the next thread: one at a time
+    with _one_at_a_time:
+        limit, size = sys.getrecursionlimit(), threading.stack_size(STACK_BYTES)
+        sys.setrecursionlimit(max(limit, LEVELS))
+        try:
+            thread = threading.Thread(target=run, name="deep json")
+            thread.start()
+            threading.stack_size(size)
+            thread.join()
+        finally:
+            threading.stack_size(size)
+            sys.setrecursionlimit(limit)
+    if failed:
+        raise failed[0]
+    return made[0]
