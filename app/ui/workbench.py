@@ -53,6 +53,9 @@ class Workbench(QMainWindow):
         self._tabs_timer = QTimer(self)
         self._tabs_timer.setSingleShot(True)
         self._tabs_timer.timeout.connect(self._show_tabs)
+        self._size_timer = QTimer(self)  # sizes hold only when Qt has laid the docks out
+        self._size_timer.setSingleShot(True)
+        self._size_timer.timeout.connect(self._size)
 
     @property
     def arrangement(self) -> Layout:
@@ -82,7 +85,7 @@ class Workbench(QMainWindow):
         self._arranged = True
         self._narrow = False
         self._size()
-        QTimer.singleShot(0, self, self._size)
+        self._size_timer.start(0)
         self._adapt()
 
     def _put(self, names: Sequence[str], above: Dock | None, left: Dock | None) -> Dock | None:
@@ -196,7 +199,7 @@ class Workbench(QMainWindow):
             first.raise_()
         elif second in self.tabifiedDockWidgets(first):
             self.splitDockWidget(first, second, self._split_of(first.description.name))
-            QTimer.singleShot(0, self, self._size)
+            self._size_timer.start(0)
         self._tabs_soon()
 
     def _split_of(self, name: str) -> Qt.Orientation:
@@ -267,6 +270,7 @@ class Workbench(QMainWindow):
         if not self.restoreState(QByteArray(state), STATE_VERSION):
             self.arrange()
             return False
+        self._size_timer.stop()  # a person's sizes, not those of `arrange`
         self._narrow = saved.get("narrow") is True
         for name, dock in self.docks.items():
             state_of = panels.get(name) if isinstance(panels, Mapping) else None
