@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 
 Block = dict[str, object]
+EXAMPLES = Path(__file__).resolve().parents[2] / "resources" / "examples"
+PEPPER = json.loads((EXAMPLES / "1-greeting.nepb").read_text("utf-8"))["robots"]
 
 
 def block(kind: str, *, below: Block | None = None, fields: Block | None = None, **inputs: Block) -> Block:
@@ -39,14 +41,14 @@ def forever(first: Block) -> Block:
     return block("control_forever", BODY={"block": first})
 
 
-def write(path: Path, *scripts: Block, robots: dict[str, object] | None = None) -> Path:
-    """The scripts as a file."""
+def write(path: Path, *scripts: Block, robots: dict[str, object] = PEPPER) -> Path:
+    """The scripts as a file, which describes its robots as files saved by Studio do."""
     content = {
         "format": "nep-behaviour",
         "version": 1,
         "name": path.stem,
         "workspace": {"blocks": {"languageVersion": 0, "blocks": list(scripts)}},
-        "robots": robots or {},
+        "robots": robots,
     }
     path.write_text(json.dumps(content), encoding="utf-8")
     return path

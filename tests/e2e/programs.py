@@ -50,7 +50,7 @@ class Program:
         """Wait for a line with these words."""
         return until(
             lambda: next((line for line in self.lines if words in line), ""),
-            f"{self.process.args} says {words!r}: {self.lines[-5:]}",
+            lambda: f"{self.process.args} says {words!r}: {self.lines[-5:]}",
             within_s,
         )
 

@@ -11,11 +11,12 @@ T = TypeVar("T")
 LOOK_S = 0.05
 
 
-def until(true: Callable[[], T], what: str, within_s: float = 20.0) -> T:
-    """Ask until the answer is true, and return it; fails with `what` when it never is."""
+def until(true: Callable[[], T], what: str | Callable[[], str], within_s: float = 20.0) -> T:
+    """Ask until the answer is true, and return it; fails with `what`, or what it says then."""
     pause = threading.Event()
     end = time.monotonic() + within_s
     while not (found := true()):
-        assert time.monotonic() < end, f"within {within_s:g} s: {what}"
+        if time.monotonic() >= end:
+            raise AssertionError(f"not within {within_s:g} s: {what if isinstance(what, str) else what()}")
         pause.wait(LOOK_S)
     return found

@@ -116,6 +116,7 @@ def _tell(widget, application) -> dict:
         "focus": widget is application.focusWidget(),
         "checked": bool(getattr(widget, "isChecked", bool)()),
         "in": _panel(widget),
+        "window": widget.isWindow(),
     }
     if isinstance(widget, QAbstractItemView):
         told["rows"] = _rows(widget)

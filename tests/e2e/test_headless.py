@@ -1,0 +1,60 @@
+"""`python -m app run FILE`: a behaviour with no window, on the virtual robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.masters import Master
+from tests.e2e.behaviours import EXAMPLES, forever, say, started, turn, write
+from tests.e2e.programs import Program
+
+pytestmark = pytest.mark.timeout(110)
+
+
+@pytest.fixture
+def pepper(master: Master) -> Iterator[Program]:
+    with Program("-m", "app.robots.simulated", "--name", "Pepper") as program:
+        yield program
+
+
+def run(file: Path, *arguments: str) -> Program:
+    return Program("-m", "app", "run", str(file), *arguments)
+
+
+def test_an_example_runs_to_its_end(pepper: Program) -> None:
+    with run(EXAMPLES / "1-greeting.nepb", "--robot-wait", "30") as program:
+        program.says("“Greeting” runs", 40)
+        program.says("Pepper says “Hello! I am Pepper.”")
+        assert program.wait(60) == 0, program.lines
+        assert any(line.startswith("Pepper stopped (") for line in program.lines)
+        assert any(line.startswith("ended after ") for line in program.lines)
+
+
+def test_ctrl_c_stops_program_and_robot(pepper: Program, tmp_path: Path) -> None:
+    with run(write(tmp_path / "Turning.nepb", started(forever(turn(300)))), "--robot-wait", "30") as program:
+        program.says("Pepper turns left by 300 °", 40)
+        program.interrupt()
+        assert program.wait(10) == 130, program.lines
+        program.says("Pepper stopped (")
+    with nep.node("listener") as node:
+        states = node.new_sub("/Pepper/state", "json")
+        heard = [states.receive(5.0).payload for _ in range(4)]
+    assert not any(state["moving"] for state in heard)
+    assert len({state["theta_deg"] for state in heard}) == 1
+
+
+def test_without_its_robot_it_says_so(master: Master, tmp_path: Path) -> None:
+    with run(write(tmp_path / "Hello.nepb", started(say("Hello"))), "--robot-wait", "0.5") as program:
+        assert program.wait(20) == 3, program.lines
+        program.says("Pepper not found. Switch it on, or start the virtual robot.")
+
+
+def test_a_file_that_is_no_behaviour(master: Master, tmp_path: Path) -> None:
+    (tmp_path / "x.nepb").write_text("{", encoding="utf-8")
+    with run(tmp_path / "x.nepb") as program:
+        assert program.wait(20) == 2, program.lines
+        assert "Traceback" not in "\n".join(program.lines)

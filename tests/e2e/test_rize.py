@@ -1,0 +1,68 @@
+"""A driver in 30 lines on the original nep 0.5.3.5 is a robot like any other: found, driven, stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from app.robots import rize
+from tests.e2e.behaviours import block, number, say, started, write
+from tests.e2e.programs import Program
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+from tests.interop.conftest import CACHE, Peers, fixed_ports, peers, start_master
+from tests.interop.conftest import Program as Peer
+
+__all__ = ["fixed_ports", "peers"]
+pytestmark = [pytest.mark.ports, pytest.mark.interop, pytest.mark.timeout(300)]
+ROOT = Path(__file__).resolve().parents[2]
+VERSION = "0.5.3.5"
+
+
+@pytest.fixture
+def driver(peers: Peers, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Peer]:
+    """The driver of the example in an environment of its own, and a master with its gateway."""
+    monkeypatch.setenv("NEP_STATE_DIR", str(tmp_path / "state"))
+    peers.start(VERSION, "subscriber", "warming/up").kill()  # installs the peer, or skips the test
+    start_master(peers, address)
+    python = CACHE / VERSION / "bin" / "python"
+    driver = peers.run([str(python), str(ROOT / "examples" / "rize_driver.py"), "Turtle"])
+    yield driver
+    assert "Traceback" not in driver.printed, driver.printed
+
+
+def turtle(tmp_path: Path) -> Path:
+    """Says hello and walks, once."""
+    fields = {"ROBOT": "Turtle", "DIRECTION": "forwards"}
+    walk = block("robot_rize_do_walk", fields=fields, METERS=number(0.5))
+    first = started(say("Hello from blocks", walk, "Turtle", "rize"))
+    return write(tmp_path / "Turtle.nepb", first, robots={"Turtle": dict(rize.robot("Turtle").source)})
+
+
+def heard(driver: Peer) -> None:
+    until(lambda: "Turtle says: Hello from blocks" in driver.printed, lambda: f"it says it: {driver.printed}")
+    until(
+        lambda: "Turtle walks forwards: {'meters': 0.5}" in driver.printed,
+        lambda: f"it walks: {driver.printed}",
+    )
+
+
+def test_blocks_drive_it_without_a_window(driver: Peer, tmp_path: Path) -> None:
+    with Program("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30") as program:
+        assert program.wait(60) == 0, program.lines
+        program.says("Turtle cannot confirm")
+    heard(driver)
+
+
+def test_the_window_finds_it_and_blocks_drive_it(
+    driver: Peer, start: Callable[..., Studio], tmp_path: Path
+) -> None:
+    studio = start(str(turtle(tmp_path)))
+    studio.says("Turtle ready", 40)
+    studio.open_category("Speech")
+    studio.screen.key("Escape")
+    studio.click("Run", kind="RunButton")
+    heard(driver)
+    studio.says("Turtle cannot confirm")
