@@ -34,6 +34,9 @@ while True:
     arrived, command = commands.listen(True)
     if not arrived or name not in listed(command["robots"]):
         continue
+    if command["node"] == "cancel":  # Stop was pressed
+        print(f"{name} stops", flush=True)
+        continue
     parts = listed(command["primitives"])
     known = all(part["primitive"] in does for part in parts)
     for part in parts if known else []:
