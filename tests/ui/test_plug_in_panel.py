@@ -1,0 +1,78 @@
+"""A panel is one file: the window lists it, docks it, refreshes it and keeps its place."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+from app.core.session import Session
+from app.ui.application import find_panels
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+from app.ui.theme import Theme
+from tests.ui.shell_parts import PANELS, Answers
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+SOURCE = '''
+"""A panel that counts its refreshes."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QLabel, QVBoxLayout
+
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+
+
+class Counter(PanelWidget):
+    """Counts."""
+
+    def __init__(self, context: PanelContext) -> None:
+        """Start with none."""
+        super().__init__(context, "Counter")
+        self.count = 0
+        self.label = QLabel(self)
+        QVBoxLayout(self).addWidget(self.label)
+
+    def refresh(self) -> None:
+        """One more."""
+        self.count += 1
+        self.label.setText(str(self.count))
+
+
+PANEL = Panel("counter", "Counter", "hash", (), Counter)
+'''
+
+
+@pytest.fixture
+def plug_in(tmp_path: Path) -> Iterator[None]:
+    (tmp_path / "counter.py").write_text(dedent(SOURCE), encoding="utf-8")
+    home = importlib.import_module("app.ui.panels")
+    home.__path__.append(str(tmp_path))
+    yield
+    home.__path__.remove(str(tmp_path))
+    sys.modules.pop("app.ui.panels.counter", None)
+    if hasattr(home, "counter"):
+        delattr(home, "counter")
+
+
+def test_a_panel(qtbot, plug_in: None, theme: Theme, session: Session) -> None:
+    window = MainWindow(session, theme, {**PANELS, "counter": find_panels()["counter"]}, [])
+    qtbot.addWidget(window)
+    commands = Commands(window, Answers())
+    window.show_layout("developer")
+    window.show()
+    commands._menus["View"].aboutToShow.emit()
+    entries = {action.text().replace("&", ""): action for action in commands._panels.actions()}
+    entries["Counter"].trigger()
+    dock = window.bench.docks["counter"]
+    assert dock is not None
+    qtbot.waitUntil(dock.shown)
+    window.tick()
+    assert dock.panel.count >= 1
+    window.close()
