@@ -171,7 +171,7 @@ class Node:
             sink=sink,
         )
         carrier = self._open_carrier()
-        return Subscriber(carrier, carrier.subscriber(spec), spec)
+        return Subscriber(carrier.subscriber(spec), spec)
 
     def new_callback(
         self,
@@ -186,7 +186,7 @@ class Node:
             _new_id(), check_topic(topic), msg_type, configuration or self.hybrid(), self._wait_s
         )
         inlet = carrier.subscriber(spec)
-        subscriber = Subscriber(carrier, inlet, spec)
+        subscriber = Subscriber(inlet, spec)
         with self._lock:
             self._callbacks = (*self._callbacks, (subscriber, inlet, callback))
         return subscriber

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from nep.backends.base import Carrier, Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
 from nep.codecs import codec_for
 from nep.encoded import Encoded
 from nep.errors import ClosedError, DecodeError
@@ -100,8 +100,7 @@ class Publisher:
 class Subscriber:
     """Receives from one topic, in order. Iterating yields `Message`s until it is closed."""
 
-    def __init__(self, carrier: Carrier, inlet: Inlet, spec: SubscriberSpec) -> None:
-        self._carrier = carrier
+    def __init__(self, inlet: Inlet, spec: SubscriberSpec) -> None:
         self._inlet = inlet
         self._spec = spec
         self._empty = codec_for(spec.msg_type).empty
@@ -160,18 +159,18 @@ class Subscriber:
 
         Raises `ClosedError`.
         """
-        message = self._poll()
-        if message is not None or timeout_s == 0.0:
-            return message
+        if timeout_s == 0.0 or self._inlet.is_closed:
+            return self._poll()
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 return None
-            self._carrier.wait((self._inlet,), left)
-            message = self._poll()
+            message = self._inlet.receive(left)
             if message is not None:
                 return message
+            if self._inlet.is_closed:
+                raise ClosedError(f"subscriber '{self.topic}'")
 
     def _poll(self) -> Message | None:
         if self._inlet.is_closed:

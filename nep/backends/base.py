@@ -108,6 +108,9 @@ class Inlet(Protocol):
     def poll(self) -> Message | None:
         """The next message if one is there. Does not wait."""
 
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message; waits at most `timeout_s` seconds, may return None earlier."""
+
     def report(self, problem: str) -> None:
         """The reader could not read a message, and why; an empty sentence means that it can again."""
 

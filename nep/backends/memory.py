@@ -153,6 +153,11 @@ class MemoryInlet:
         with self._carrier.changed:
             return self._inbox.take()
 
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message, waited for."""
+        self._carrier.wait((self,), timeout_s)
+        return self.poll()
+
     def take_all(self) -> list[Message]:
         """All messages that are there."""
         with self._carrier.changed:

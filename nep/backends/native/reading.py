@@ -81,6 +81,8 @@ class SocketInlet(Generic[R]):
         self._leased_until = 0.0
         self._io_comes = False
         self._waiters: list[Waker] = []
+        self._waker: Waker | None = None
+        self._woken: set[Waker] = set()
         self._lock = threading.Condition(threading.Lock())
 
     # ---- what the reader sees
@@ -107,17 +109,40 @@ class SocketInlet(Generic[R]):
     def poll(self) -> Message | None:
         """The next message if one is there, read in the caller's thread."""
         with self._lock:
+            return None if self.is_closed else self._next()
+
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message, read in the caller's thread; waits at most `timeout_s` seconds."""
+        with self._lock:
             if self.is_closed:
                 return None
-            self._leased_until = time.monotonic() + LEASE_S
-            if not self._io_comes:
-                # Reading one message and not the rest leaves the descriptor silent for those that follow:
-                # the node's thread has to look when the lease is over.
-                self._io_comes = True
-                self._io.serve_soon(self)
-            if self.spec.keep == "latest":
-                self._fill()
-            return self._inbox.take() or self._readable.read()
+            message = self._next()
+            if message is not None:
+                return message
+            # Under the same lock: the socket was empty, so its descriptor tells of what comes next.
+            waker, self._waker = self._waker or Waker(), None
+            self._waiters.append(waker)
+        try:
+            polled = [(self.fd, zmq.POLLIN), (waker.fd, zmq.POLLIN)]
+            zmq.zmq_poll(polled, int(timeout_s * 1000) + 1)
+        finally:
+            message = self._waited(waker)
+        return message
+
+    def _waited(self, waker: Waker) -> Message | None:
+        with self._lock:
+            self._waiters = [each for each in self._waiters if each is not waker]
+            if self._waker is not None or self.is_closed:
+                waker.close()
+            else:
+                self._waker = waker
+            if self.is_closed:
+                self._lock.notify_all()
+                return None
+            if waker in self._woken:
+                self._woken.discard(waker)
+                waker.clear()
+            return self._next()
 
     # ---- waiting
 
@@ -135,6 +160,7 @@ class SocketInlet(Generic[R]):
         """After its descriptor was polled."""
         with self._lock:
             self._waiters = [each for each in self._waiters if each is not waker]
+            self._woken.discard(waker)
             self._lock.notify_all()
 
     def read_until(self, is_met: Callable[[], bool], timeout_s: float, waker: Waker) -> bool:
@@ -193,8 +219,22 @@ class SocketInlet(Generic[R]):
         with self._lock:
             wait_until(self._lock, lambda: not self._waiters, 1.0)  # they poll its descriptor
             self._readable.close()
+            if self._waker is not None:
+                self._waker.close()
+                self._waker = None
 
     # ---- with the lock held
+
+    def _next(self) -> Message | None:
+        self._leased_until = time.monotonic() + LEASE_S
+        if not self._io_comes:
+            # Reading one message and not the rest leaves the descriptor silent for those that follow:
+            # the node's thread has to look when the lease is over.
+            self._io_comes = True
+            self._io.serve_soon(self)
+        if self.spec.keep == "latest":
+            self._fill()
+        return self._inbox.take() or self._readable.read()
 
     def _fill(self) -> int:
         """Read into the inbox until the socket has nothing more, or a batch is full; how many."""
@@ -217,5 +257,6 @@ class SocketInlet(Generic[R]):
             self._io.serve_soon(self)
 
     def _wake_waiters(self) -> None:
+        self._woken.update(self._waiters)
         for waker in self._waiters:
             waker.wake()
