@@ -2,8 +2,8 @@
 
     python bench/nep_roundtrip.py [--samples 200]
 
-Both sides run in this process's child and in this process, over loopback. All variants are interleaved in random
-order within each block; the row "plain again" is plain pyzmq against itself and shows how far to trust the rest.
+One side runs in this process, the other in its child, over loopback. All variants are interleaved in random
+order within each block; "plain again" is plain pyzmq against itself and shows how far to trust the rest.
 """
 
 from __future__ import annotations
@@ -127,9 +127,8 @@ def compare(variants: dict[str, Callable[[bytes], None]], samples: int) -> None:
                 taken[name] += measure(variants[name], data, samples // 10)
         medians = {name: statistics.median(each) for name, each in taken.items()}
         ratios = {name: median / medians["plain"] for name, median in medians.items()}
-        print(
-            f"{size:>9} {medians['plain'] * 1e3:>9.3f} {ratios['plain again']:>12.2f} {ratios['native']:>7.2f}"
-        )
+        row = f"{medians['plain'] * 1e3:>9.3f} {ratios['plain again']:>12.2f} {ratios['native']:>7.2f}"
+        print(f"{size:>9} {row}")
 
 
 if __name__ == "__main__":
