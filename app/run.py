@@ -6,6 +6,7 @@ it is not there, 130 it was stopped by Ctrl+C.
 
 from __future__ import annotations
 
+import re
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -15,6 +16,7 @@ from typing import TextIO
 import nep
 from app.blocks import Program, compile_behaviour
 from app.blocks.fleet_search import find_robots
+from app.blocks.workspace import Workspace, parse_workspace
 from app.core.document import read
 from app.core.runner import Runner, RunnerEvent
 from app.core.stopping import RobotStopper, StopReport
@@ -26,6 +28,7 @@ OK, FAILED, UNUSABLE, ROBOT_MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 ROBOT_WAIT_S = 10.0
 STOP_S = 1.0
 SLICE_S = 0.1
+_STARTER = re.compile(r"events_|robot_.*_when_")
 
 
 def run_file(
@@ -46,7 +49,7 @@ def run_file(
     try:
         name, workspace, descriptions = read(Path(path))
         known = _known(descriptions)
-        wanted = compile_behaviour(workspace, known, name=name).robots
+        wanted = robots_named(workspace)
         with nep.node("behaviour runner", master=master) as node:
             robots = find_robots(node, robot_wait_s, wanted=wanted, known=known) if wanted else ()
             program = compile_behaviour(workspace, robots, absent=known, name=name)
@@ -65,6 +68,14 @@ def run_file(
     except (AppError, NepError) as error:
         say(f"{error}.")
         return UNUSABLE
+
+
+def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
+    """The robots that the scripts name which something starts, described in the file or not."""
+    parsed = parse_workspace(workspace)
+    started = tuple(script for script in parsed.scripts if _STARTER.match(script[0].type))
+    blocks = Workspace(started, parsed.variables).all_blocks()
+    return tuple(sorted({block.field_id("ROBOT") for block in blocks if block.enabled} - {""}))
 
 
 def _writer(stream: TextIO) -> Callable[[str], None]:

@@ -96,6 +96,15 @@ def test_a_robot_that_is_not_there(master, saved):
     assert "Pepper not found." in out
 
 
+def test_a_robot_that_the_file_names_but_does_not_describe_is_waited_for(master, saved):
+    path = saved(workspace(started(say("Hi"))))
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"robots": {}}))
+    code, out = run(path, robot_wait_s=0.2)
+    assert code == ROBOT_MISSING
+    assert "Pepper not found" in out
+
+
 def test_what_cannot_run(master, saved, tmp_path):
     code, out = run(saved(workspace(started(block("control_wait")))))
     assert (code, "error: wait needs a number." in out) == (UNUSABLE, True)
