@@ -54,7 +54,7 @@ class Registration:
     @property
     def node_id(self) -> str:
         """Tells nodes apart, also those of one name."""
-        return f"original:{self.generation}:{self.node}:{self.pid if self.pid is not None else '-'}"
+        return f"original:{self.node}:{self.pid if self.pid is not None else '-'}"
 
 
 class PortMap:
