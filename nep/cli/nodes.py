@@ -14,7 +14,7 @@ from nep.graph import GraphView, NodeInfo
 
 app = typer.Typer(no_args_is_help=True, help="The programs that are there.")
 _COLUMNS = (
-    Column("node", style="bold"),
+    Column("node", style="bold", is_whole=True),
     Column("language"),
     Column("wire"),
     Column("pid", "right"),

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from nep.graph import Alert
 
+_GAP = 3
+_NARROWEST = 6
+_ENDLESS = 10_000
 UNKNOWN = "\N{EN DASH}"
 """What stands where nothing is known."""
 
@@ -26,6 +29,8 @@ class Column:
     head: str
     justify: Literal["left", "right"] = "left"
     style: str = ""
+    is_whole: bool = False
+    """Never folded, however narrow the terminal: others give way. Numbers never are."""
 
 
 def console(*, stderr: bool = False) -> Console:
@@ -56,12 +61,34 @@ def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
+    out = console()
+    if not out.is_terminal:  # a file or a program: nothing to fold for
+        out.width = _ENDLESS
     table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
-    for column in columns:
-        table.add_column(column.head, justify=column.justify, style=column.style, overflow="fold")
-    for row in rows:
+    lines = list(rows)
+    for column, width in zip(columns, _widths(columns, lines, out.width), strict=True):
+        table.add_column(
+            column.head, justify=column.justify, style=column.style, overflow="fold", width=width
+        )
+    for row in lines:
         table.add_row(*(Text(cell, style="dim" if cell == UNKNOWN else "") for cell in row))
-    console().print(table, soft_wrap=False)
+    out.print(table, soft_wrap=False)
+
+
+def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], room: int) -> list[int]:
+    """How wide each column may be: what it needs, or less where others than whole ones have to give way."""
+    widths = [
+        max(len(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))
+        for at, column in enumerate(columns)
+    ]
+    kept = [column.is_whole or column.justify == "right" for column in columns]
+    while sum(widths) + _GAP * (len(widths) - 1) > room:
+        giving = [at for at, width in enumerate(widths) if width > _NARROWEST and not kept[at]]
+        giving = giving or [at for at, width in enumerate(widths) if width > _NARROWEST]
+        if not giving:
+            break
+        widths[max(giving, key=lambda at: widths[at])] -= 1
+    return widths
 
 
 def show_alerts(alerts: Iterable[Alert]) -> None:

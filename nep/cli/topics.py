@@ -17,7 +17,7 @@ app = typer.Typer(no_args_is_help=True, help="What is published: list it, look i
 app.command("echo")(echo)
 app.command("pub")(publish)
 _COLUMNS = (
-    Column("topic", style="bold"),
+    Column("topic", style="bold", is_whole=True),
     Column("type"),
     Column("publishers", style="green"),
     Column("subscribers", style="cyan"),

@@ -59,6 +59,25 @@ def test_a_table_has_a_head_and_a_row_for_each(capsys):
     assert any("[red]odd[/red]" in line for line in lines)
 
 
+def test_topics_are_never_folded_on_a_narrow_terminal(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "72")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    columns = [Column("topic", is_whole=True), Column("type"), Column("subscribers"), Column("rate", "right")]
+    show_table(
+        columns, [("/Pepper/a_very_long_name_of_a_topic", "robot/description", "nep-topic-echo-1", "30.0 /s")]
+    )
+    out = capsys.readouterr().out
+    assert "/Pepper/a_very_long_name_of_a_topic" in out
+    assert "30.0 /s" in out
+    assert all(len(line) <= 80 for line in out.splitlines())
+
+
+def test_nothing_is_folded_for_a_file_or_a_program(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "40")
+    show_table([Column("topic"), Column("publishers")], [("t" * 50, "p" * 50)])
+    assert "p" * 50 in capsys.readouterr().out
+
+
 def test_alerts_go_beside_the_results_with_what_to_do(capsys):
     show_alerts([Alert("port:7000", "Port 7000 is taken", "Close that program.")])
     captured = capsys.readouterr()
