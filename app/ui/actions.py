@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QMenuBar, QWidget
 
+from app.ui.menus import Menu
 from app.ui.theme import Theme
 
 MENUS = ("File", "Edit", "View", "Run", "Robots", "Help")
@@ -39,8 +40,8 @@ TABLE: tuple[Row, ...] = (
     Row("file.save_as", "File", "Save as", "Ctrl+Shift+S"),
     Row("file.start_page", "File", "Start page", "", "house", above=True),
     Row("file.quit", "File", "Quit", "Ctrl+Q", above=True),
-    Row("edit.undo", "Edit", "Undo", "Ctrl+Z", "undo-2"),
-    Row("edit.redo", "Edit", "Redo", "Ctrl+Shift+Z", "redo-2"),
+    Row("edit.undo", "Edit", "Undo", "Ctrl+Z", "rotate-ccw"),
+    Row("edit.redo", "Edit", "Redo", "Ctrl+Shift+Z", "rotate-cw"),
     Row("layout.behaviour", "View", "Behaviour layout", "Alt+1", "blocks", group="layout"),
     Row("layout.developer", "View", "Developer layout", "Alt+2", "activity", group="layout"),
     Row("layout.reset", "View", "Put the panels back"),
@@ -70,6 +71,7 @@ class Actions:
     """QActions of the table, in menus; every row needs a handler, KeyError names the first without one."""
 
     def __init__(self, window: QWidget, theme: Theme, handlers: Mapping[str, Handler]) -> None:
+        self._theme = theme
         self._groups: dict[str, QActionGroup] = {}
         self._actions: dict[str, QAction] = {}
         for row in TABLE:
@@ -115,7 +117,9 @@ class Actions:
 
     def fill(self, bar: QMenuBar) -> dict[str, QMenu]:
         """Make the menus of the table in a menu bar; they are returned by name."""
-        menus = {name: bar.addMenu(name) for name in MENUS}
+        menus: dict[str, QMenu] = {name: Menu(self._theme, bar, name) for name in MENUS}
+        for made in menus.values():
+            bar.addMenu(made)
         for row in TABLE:
             menu = menus[row.menu]
             if row.above:

@@ -132,6 +132,7 @@ class BannerPlace(QWidget):
         super().__init__()
         self.banner = banner if banner is not None else Banner(theme)
         self._alert: AlertLike | None = None
+        self._alerts: Sequence[AlertLike] = ()
         self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
         self.on_action: Callable[[str], object] = lambda _name: None
         self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
@@ -164,6 +165,7 @@ class BannerPlace(QWidget):
 
     def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
         """The alerts that are active and not closed, worst first."""
+        self._alerts = alerts
         if self._offer is not None:
             return
         first = alerts[0] if alerts else None
@@ -179,8 +181,8 @@ class BannerPlace(QWidget):
         if self._offer is not None:
             answer = self._offer[which]
             self._offer = None
-            self.hide()
             answer()
+            self.show_alerts(self._alerts)
 
     def _next_step(self) -> None:
         if self._offer is not None:
@@ -191,10 +193,11 @@ class BannerPlace(QWidget):
     def _close(self) -> None:
         if self._offer is not None:
             self._offer = None
+            self.show_alerts(self._alerts)
         elif self._alert is not None:
-            self.on_dismiss(self._alert.id)
-        self._alert = None
-        self.hide()
+            closed = self._alert.id
+            self.show_alerts([alert for alert in self._alerts if alert.id != closed])
+            self.on_dismiss(closed)
 
     def _more(self) -> None:
         self.on_more()

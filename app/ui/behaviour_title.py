@@ -34,7 +34,8 @@ class BehaviourTab(QWidget):
 
     def sizeHint(self) -> QSize:
         width = min(LONGEST_NAME, paint.width_of(self._theme.font("label"), self._name) + 8)
-        return QSize(round(width) + 12 + 16 + 8 + 10 + (12 if self._dirty else 0), 28)
+        height = max(28, round(paint.height_of(self._theme.font("label"))) + 6)
+        return QSize(round(width) + 12 + 16 + 8 + 10 + (12 if self._dirty else 0), height)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -57,8 +58,8 @@ class BehaviourTitle(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.tab = BehaviourTab(theme)
-        self.undo = IconButton(theme, "undo-2", "Undo", "Ctrl+Z", size=32)
-        self.redo = IconButton(theme, "redo-2", "Redo", "Ctrl+Shift+Z", size=32)
+        self.undo = IconButton(theme, "rotate-ccw", "Undo", "Ctrl+Z", size=32)
+        self.redo = IconButton(theme, "rotate-cw", "Redo", "Ctrl+Shift+Z", size=32)
         self.copy = Button(theme, "Copy", "copy", size="small")
         self.copy.setAccessibleName("Copy the program")
         self.copy.hide()

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QMenu
 
 from app.core.journal import Unsaved
 from app.ui.actions import Actions, Handler, shortcuts
 from app.ui.docks import Dock
 from app.ui.files import Asks, Files, SystemDialogs
 from app.ui.main_window import MainWindow
+from app.ui.menus import Menu
 from app.ui.popup import Sheet
 from app.ui.theme import Mode
 
@@ -64,9 +64,9 @@ class Commands:
             "run.confirm": lambda _nothing: self._session.runs.confirm_still(),
         }
         self._menus = self.actions.fill(window.bar.menus)
-        self._recent = QMenu("Recent", window)
+        self._recent = Menu(window.theme, window, "Recent")
         self._menus["File"].insertMenu(self.actions["file.save"], self._recent)
-        self._panels = QMenu("Panels", window)
+        self._panels = Menu(window.theme, window, "Panels")
         self._menus["View"].insertMenu(self.actions["layout.reset"], self._panels)
         self._menus["File"].aboutToShow.connect(self._list_recent)
         self._menus["View"].aboutToShow.connect(self._list_panels)

@@ -10,6 +10,7 @@ from PySide6.QtGui import QDoubleValidator
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLineEdit, QWidget
 
 from app.robots.description import Parameter
+from app.ui.menus import EditMenu
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Choice, ColourSwatches, Segments, SliderWithUnit, Switch, label
 
@@ -63,7 +64,7 @@ def control_for(theme: Theme, parameter: Parameter, options: Sequence[str] = ())
         return _colour(theme, parameter)
     if parameter.kind == "image":
         return _picture(theme, parameter)
-    return _text(parameter)
+    return _text(theme, parameter)
 
 
 def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Control:
@@ -96,7 +97,7 @@ def _number(theme: Theme, parameter: Parameter) -> Control:
     whole = parameter.kind == "integer"
     low, high = parameter.minimum, parameter.maximum
     if low is None or high is None or high <= low:
-        return _open_number(parameter, whole=whole)
+        return _open_number(theme, parameter, whole=whole)
     default = parameter.default if isinstance(parameter.default, (int, float)) else None
     slider = SliderWithUnit(
         theme,
@@ -119,9 +120,9 @@ def _number(theme: Theme, parameter: Parameter) -> Control:
     return _Made(slider, value, show, lambda tell: _connect(slider.changed, tell))
 
 
-def _open_number(parameter: Parameter, *, whole: bool) -> Control:
+def _open_number(theme: Theme, parameter: Parameter, *, whole: bool) -> Control:
     """A number without limits: a field of its own; what can't be read is left as it was typed."""
-    field = _field(parameter)
+    field = _field(theme, parameter)
     field.setFixedWidth(VALUE_WIDTH)
     if not whole:
         field.setValidator(QDoubleValidator(field))
@@ -176,7 +177,7 @@ def _colour(theme: Theme, parameter: Parameter) -> Control:
 
 
 def _picture(theme: Theme, parameter: Parameter) -> Control:
-    field = _field(parameter)
+    field = _field(theme, parameter)
     field.setPlaceholderText("A file or an address")
     choose = Button(theme, "Choose", "folder-open", size="form")
     choose.setAccessibleName(f"Choose a file for {parameter.title}")
@@ -200,8 +201,8 @@ def _picture(theme: Theme, parameter: Parameter) -> Control:
     )
 
 
-def _text(parameter: Parameter) -> Control:
-    field = _field(parameter)
+def _text(theme: Theme, parameter: Parameter) -> Control:
+    field = _field(theme, parameter)
     many = parameter.kind == "list"
     if many:
         field.setPlaceholderText("Words with commas between them")
@@ -222,8 +223,9 @@ def _text(parameter: Parameter) -> Control:
     return made
 
 
-def _field(parameter: Parameter) -> QLineEdit:
+def _field(theme: Theme, parameter: Parameter) -> QLineEdit:
     field = QLineEdit()
+    EditMenu(theme, field)
     field.setAccessibleName(parameter.title)
     field.setMinimumHeight(ROW_HEIGHT - 2)
     if parameter.max_length is not None:

@@ -5,10 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QAction, QPainter, QPainterPath, QPaintEvent, QPen
-from PySide6.QtWidgets import QDockWidget, QMenu, QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtGui import QAction, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtWidgets import (
+    QApplication,
+    QDockWidget,
+    QLineEdit,
+    QStackedLayout,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.ui.dock_title import DockTitle
+from app.ui.menus import Menu
 from app.ui.panels.base import Density, Panel, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
@@ -139,9 +147,20 @@ class Dock(QDockWidget):
     def _try_again(self) -> None:
         self.failed = False
 
-    def menu(self) -> QMenu:
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """``/`` goes to the panel's filter, Esc leaves a field; also while the panel floats."""
+        if event.text() == "/" and self.panel.focus_filter():
+            event.accept()
+        elif event.key() == Qt.Key.Key_Escape:
+            if isinstance(QApplication.focusWidget(), QLineEdit):
+                self.panel.setFocus(Qt.FocusReason.OtherFocusReason)
+            event.accept()
+        else:
+            super().keyPressEvent(event)
+
+    def menu(self) -> Menu:
         """The panel's own actions, then floating and closing."""
-        menu = QMenu(self)
+        menu = Menu(self._theme, self)
         own: list[QAction] = list(self.panel.more_actions())
         menu.addActions(own)
         if own:

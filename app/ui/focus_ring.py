@@ -6,11 +6,12 @@ Style sheets cannot move an outline outwards, so one small overlay follows the w
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
-from PySide6.QtGui import QGuiApplication, QPainter, QPaintEvent
+from PySide6.QtGui import QGuiApplication, QPainter, QPaintEvent, QWindow
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractScrollArea,
     QApplication,
+    QDockWidget,
     QMainWindow,
     QMenu,
     QMenuBar,
@@ -24,10 +25,14 @@ from app.ui.widgets import paint
 _MOVES = frozenset(
     {QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide, QEvent.Type.ParentChange}
 )
+_PRESSES = frozenset({QEvent.Type.KeyPress, QEvent.Type.MouseButtonPress, QEvent.Type.TouchBegin})
 
 
 class FocusRing(QWidget):
-    """One ring for one top-level window; widgets tell their corners by the property ``focusRadius``.
+    """One ring for a window and the panels that float over it; ``focusRadius`` tells a widget's corners.
+
+    Whether the keyboard led somewhere is told by the newest key or mouse button: Qt's reason of a focus says
+    "Tab" too when a widget with the focus is hidden and the next one gets it.
 
     Widgets with the property ``ownFocus`` (and tables and trees) draw their focus themselves; ``focusInset``
     is the margin between a widget's edge and what it paints.
@@ -36,7 +41,8 @@ class FocusRing(QWidget):
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
         self._theme = theme
-        self._window = window
+        self._home = self._window = window
+        self._by_mouse = False
         self._target: QWidget | None = None
         self._chain: list[QWidget] = []
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -46,18 +52,34 @@ class FocusRing(QWidget):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._focus_changed)
+            application.focusWindowChanged.connect(self._window_changed)
+        self._window_changed(window.windowHandle())
 
     @property
     def target(self) -> QWidget | None:
         """The widget that is ringed now."""
         return self._target
 
+    def _window_changed(self, window: QWindow | None) -> None:
+        """Listen to the keys and buttons of every window of ours that a person uses."""
+        if window is not None:
+            window.removeEventFilter(self)
+            window.installEventFilter(self)
+
     def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
-        by_mouse = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
-        self._follow(None if by_mouse or new is None or not self._rings(new) else new)
+        pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
+        if pressed or self._by_mouse or new is None or not self._rings(new):
+            self._follow(None)
+            return
+        if new.window() is not self._window:
+            self._window = new.window()
+            self.setParent(self._window)
+        self._follow(new)
 
     def _rings(self, widget: QWidget) -> bool:
-        if widget.window() is not self._window or widget is self._window or widget.property("ownFocus"):
+        window = widget.window()
+        ours = window is self._home or (isinstance(window, QDockWidget) and self._home.isAncestorOf(window))
+        if not ours or widget is window or widget.property("ownFocus"):
             return False
         parent = widget.parentWidget()
         if parent is not None and parent.inherits("QWebEngineView"):  # the page shows its own focus
@@ -82,7 +104,13 @@ class FocusRing(QWidget):
         self._place()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() in _MOVES:
+        kind = event.type()
+        if isinstance(watched, QWindow):
+            if kind in _PRESSES:
+                self._by_mouse = kind != QEvent.Type.KeyPress
+                if self._by_mouse:
+                    self._follow(None)
+        elif kind in _MOVES:
             self._place()
         return super().eventFilter(watched, event)
 

@@ -6,9 +6,9 @@ import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QKeyEvent
-from PySide6.QtWidgets import QApplication, QLineEdit, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize, QTimer
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.session import Session
 from app.ui.app_bar import AppBar
@@ -115,9 +115,12 @@ class MainWindow(QMainWindow):
             if not saved or not bench.restore(saved):
                 bench.arrange()
         bench = self.benches[layout.name]
+        focus = QApplication.focusWidget()
+        inside = focus is None or self.pages.isAncestorOf(focus)
         self.showing = layout.name
         self.pages.setCurrentWidget(bench)
-        bench.setFocus(Qt.FocusReason.OtherFocusReason)
+        if inside:  # not from the switch or a menu, which people go on using
+            bench.focus_home()
         self._show_bars(layout.name)
         self.state.keep_layout(layout.name)
         return bench
@@ -253,17 +256,6 @@ class MainWindow(QMainWindow):
             return
         for dock in self.bench.docks.values():
             dock.title.set_active(dock is new or dock.isAncestorOf(new))
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        dock = self.focused_dock()
-        if event.text() == "/" and dock is not None and dock.panel.focus_filter():
-            event.accept()
-        elif event.key() == Qt.Key.Key_Escape and dock is not None:
-            if isinstance(QApplication.focusWidget(), QLineEdit):
-                dock.panel.setFocus(Qt.FocusReason.OtherFocusReason)
-            event.accept()
-        else:
-            super().keyPressEvent(event)
 
     # -- beginning and end ------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from PySide6.QtCore import QRegularExpression
 from PySide6.QtGui import QSyntaxHighlighter, QTextCharFormat, QTextDocument
 from PySide6.QtWidgets import QFrame, QPlainTextEdit
 
+from app.ui.menus import EditMenu
 from app.ui.theme import Theme
 
 # The first rule that fits a place colours it: text and comments before the words inside them.
@@ -50,6 +51,7 @@ class ProgramView(QPlainTextEdit):
         self.setAccessibleName("The program in Python")
         self.document().setDocumentMargin(16)
         self._colours = _Colours(self.document(), theme)
+        EditMenu(theme, self)
         theme.changed.connect(self._restyle)
         self._restyle()
 

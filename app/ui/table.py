@@ -21,7 +21,10 @@ _ROOT = QModelIndex()
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text."""
+    """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text.
+
+    Text that does not fit is shortened at its end, or in its ``middle``.
+    """
 
     text: str = ""
     icon: str | None = None
@@ -30,6 +33,7 @@ class Cell:
     bold: bool = False
     struck: bool = False
     chip: str | None = None
+    middle: bool = False
 
 
 @dataclass(frozen=True, slots=True)

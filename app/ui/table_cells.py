@@ -81,7 +81,8 @@ class CellDelegate(QStyledItemDelegate):
         metrics = QFontMetricsF(font)
         colour = theme.colour(role)
         taken = (ICON + 5.0 if cell.icon else 0.0) + (self._chip_width(cell.chip) + 8 if cell.chip else 0.0)
-        text = metrics.elidedText(cell.text, Qt.TextElideMode.ElideRight, max(0.0, box.width() - taken))
+        shorten = Qt.TextElideMode.ElideMiddle if cell.middle else Qt.TextElideMode.ElideRight
+        text = metrics.elidedText(cell.text, shorten, max(0.0, box.width() - taken))
         advance = metrics.horizontalAdvance(text)
         x = box.right() - advance - taken if figures else box.left()
         if cell.icon:

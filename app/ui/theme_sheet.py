@@ -43,7 +43,10 @@ class Look(Protocol):
 
 
 SHEET = """
-QToolTip {{ background: {tooltip}; color: {tooltipText}; border: 1px solid {tooltip}; padding: 4px 6px; }}
+QToolTip {{
+    background: {tooltip}; color: {tooltipText}; border: 1px solid {tooltip}; padding: 4px 8px;
+    font-size: {small_text}px;
+}}
 QMainWindow, QDialog {{ background: {window}; }}
 QMainWindow::separator {{ background: {window}; width: 8px; height: 8px; }}
 QMainWindow[density="compact"]::separator {{ width: 6px; height: 6px; }}
@@ -54,8 +57,11 @@ QMenuBar {{ background: transparent; color: {textSecondary}; border: none; spaci
 QMenuBar::item {{ background: transparent; padding: 5px 10px; margin: 0; border-radius: {small}px; }}
 QMenuBar::item:selected {{ background: {hover}; color: {text}; }}
 QMenuBar::item:pressed {{ background: {pressed}; color: {text}; }}
-QMenu {{ background: {raised}; color: {text}; border: 1px solid {border}; padding: 4px; }}
-QMenu::item {{ padding: 6px 24px 6px 10px; border-radius: {small}px; min-width: 140px; }}
+QMenu {{
+    background: {raised}; color: {text}; border: 1px solid {borderStrong}; padding: 5px;
+    border-radius: {panel_radius}px;
+}}
+QMenu::item {{ padding: 6px 28px 6px 10px; border-radius: {small}px; min-width: 150px; }}
 QMenu::item:selected {{ background: {hover}; color: {text}; }}
 QMenu::item:disabled {{ color: {textDisabled}; }}
 QMenu::icon {{ padding-left: 8px; }}
@@ -71,7 +77,7 @@ QLineEdit[wrong="true"] {{ border-color: {error}; }}
 QLineEdit:disabled {{ color: {textDisabled}; border-color: {border}; }}
 QPlainTextEdit[bare="true"], QTextEdit[bare="true"] {{ border: none; border-radius: 0; background: {panel}; }}
 QComboBox QAbstractItemView {{
-    background: {raised}; color: {text}; border: 1px solid {border}; padding: 4px; outline: none;
+    background: {raised}; color: {text}; border: 1px solid {borderStrong}; padding: 4px; outline: none;
     selection-background-color: {selected}; selection-color: {selectedText};
 }}
 
@@ -138,6 +144,7 @@ def build(look: Look) -> str:
     roles.update(
         small=str(look.radius("small")),
         control=str(look.radius("control")),
+        panel_radius=str(look.radius("panel")),
         field=look.hex("sunken") if look.dark else look.hex("panel"),
         small_text=str(round(look.scaled(look.text_kinds()["small"].size_px))),
     )

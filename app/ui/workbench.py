@@ -231,6 +231,12 @@ class Workbench(QMainWindow):
             if sentence is not None:
                 self.panel_failed.emit(name, sentence)
 
+    def focus_home(self) -> None:
+        """Give the keyboard to the panel that the layout is about: the first that shows."""
+        dock = next((dock for dock in self.docks.values() if not dock.isHidden()), None)
+        target = dock.panel if dock is not None else self
+        target.setFocus(Qt.FocusReason.OtherFocusReason)
+
     def focus_panel(self, dock: Dock) -> None:
         """Bring a panel to the front and give it the keyboard."""
         dock.show()

@@ -314,8 +314,9 @@ class Session:
         self.document = Document(self.calls)
         self.document.known = lambda: [link.robot for link in self.fleet.connected]
         self.runs = SimpleNamespace(
-            running_blocks=(), stopped_blocks=(), block_errors={}, blocks_revision=0, active=False
-        )
+            running_blocks=(), stopped_blocks=(), block_errors={}, blocks_revision=0, active=False,
+            stop_robot=lambda name: self.calls.append(("stop_robot", name)),
+        )  # fmt: skip
         self.companions = SimpleNamespace(
             ensure_master=lambda: self.calls.append(("ensure_master",)),
             start_virtual_robot=lambda name="Pepper": self.calls.append(("start_virtual_robot", name)),

@@ -87,9 +87,24 @@ def test_an_offer_waits_for_its_answer_and_alerts_wait_behind_it(place: QWidget,
     assert "Put it back?" in banner.banner.accessibleName()
     QTest.mouseClick(banner.banner.second, Qt.MouseButton.LeftButton)
     assert done == ["no"]
-    banner.show_alerts([Said("a", title="Alert.")])
+    assert banner.isVisible()
     assert banner.banner.accessibleName() == "Alert."
     assert not banner.banner.second.isVisible()
+
+
+def test_a_closed_offer_and_a_closed_alert_make_room_for_the_next(place: QWidget, theme: Theme) -> None:
+    banner = BannerPlace(theme)
+    place.layout().addWidget(banner)
+    dismissed: list[str] = []
+    banner.on_dismiss = dismissed.append
+    banner.offer("Put it back?", "", ("Yes", lambda: None), ("No", lambda: None))
+    banner.show_alerts([Said("a", title="First."), Said("b", title="Second.")])
+    for shown in ("First.", "Second."):
+        QTest.mouseClick(banner.banner.close_button, Qt.MouseButton.LeftButton)
+        assert banner.banner.accessibleName() == shown
+    QTest.mouseClick(banner.banner.close_button, Qt.MouseButton.LeftButton)
+    assert not banner.isVisible()
+    assert dismissed == ["a", "b"]
 
 
 def test_words_of_an_alert_are_no_markup(place: QWidget, theme: Theme) -> None:
@@ -142,6 +157,23 @@ def test_the_mouse_makes_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
     QTest.mouseRelease(field, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
     QTest.keyClick(field, Qt.Key.Key_Tab)
     qtbot.waitUntil(lambda: ring.target is other)
+
+
+def test_after_the_mouse_a_hidden_widget_hands_on_no_ring(qtbot, place: QWidget, theme: Theme) -> None:
+    ring = FocusRing(theme, place)
+    first, second = Button(theme, "One"), Button(theme, "Two")
+    place.layout().addWidget(first)
+    place.layout().addWidget(second)
+    QTest.qWait(1)
+    at = second.mapTo(place, second.rect().center())
+    QTest.mouseClick(place.windowHandle(), Qt.MouseButton.LeftButton, pos=at)
+    second.hide()  # Qt moves the focus on and calls it a Tab
+    qtbot.waitUntil(first.hasFocus)
+    assert ring.target is None
+    QTest.keyClick(place.windowHandle(), Qt.Key.Key_Shift)
+    first.clearFocus()
+    first.setFocus()
+    assert ring.target is first
 
 
 def test_the_ring_ends_where_a_scrolled_place_ends(qtbot, place: QWidget, theme: Theme) -> None:

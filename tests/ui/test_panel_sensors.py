@@ -72,6 +72,18 @@ def test_one_row_for_each_sensor_but_pictures(qtbot, window) -> None:
     assert window.session.fleet.looked_at == []
 
 
+def test_what_people_look_for_comes_first_and_no_row_is_cut(qtbot, window) -> None:
+    panel = window.make(PANEL, (384, 130))
+    qtbot.addWidget(panel)
+    assert isinstance(panel, SensorsPanel)
+    panel.set_density("comfortable")
+    assert [row.title for row in panel.rows[:3]] == ["Head touch", "Distance", "Battery"]
+    qtbot.waitUntil(lambda: panel.rows[4].visibleRegion().isEmpty())
+    assert panel.rows[3].visibleRegion().boundingRect().height() >= 28
+    panel.resize(384, 600)
+    qtbot.waitUntil(lambda: panel.rows[-1].visibleRegion().boundingRect().height() == 28)
+
+
 def test_values_follow_and_the_last_yes_is_remembered(qtbot, window, monkeypatch) -> None:
     panel = window.make(PANEL)
     qtbot.addWidget(panel)

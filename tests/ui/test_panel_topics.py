@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QSignalSpy, QTest
 
-from app.ui.panels.topics import PANEL, TopicsPanel, age_cell, loss_cell, name_cell
+from app.ui.panels.topics import PANEL, TopicsPanel, age_cell, loss_cell, name_cell, type_cell
 from app.ui.table import CELL_ROLE
 from tests.ui.fakes import Session, Topic
 from tests.ui.panel_case import Window, button, press, ticks
@@ -58,6 +58,29 @@ def test_new_ones_are_bold_until_somebody_looks(panel, window) -> None:
     cell = panel.model.data(panel.model.index_of("/speech/words"), CELL_ROLE)
     assert (cell.bold, cell.chip) == (False, None)
     assert window.opened == ["/speech/words"]
+
+
+def test_what_studio_itself_brought_is_no_news(panel, window) -> None:
+    window.session.companions.virtual_robots = ("Pepper",)
+    topics = [
+        Topic("/Pepper/pose", new=True, publisher_nodes=("Pepper",)),
+        Topic("/Pepper/command", new=True, publisher_nodes=("Pepper", "studio")),
+        Topic("/Pepper/world", new=True, publisher_nodes=()),
+        Topic("/Turtle/pose", new=True, publisher_nodes=("Turtle",)),
+        Topic("/nobody", new=True, publisher_nodes=()),
+    ]
+    for topic in topics:
+        window.session.topics.put(topic)
+    panel.refresh()
+    cells = [panel.model.data(panel.model.index_of(topic.name), CELL_ROLE) for topic in topics]
+    assert [cell.chip for cell in cells] == [None, None, None, "new", "new"]
+
+
+def test_a_type_says_its_last_word_and_has_an_icon_without_a_publisher() -> None:
+    cell = type_cell(Topic("/a", "robot/answer", "json"))
+    assert (cell.text, cell.icon, cell.middle) == ("answer", "braces", True)
+    assert type_cell(Topic("/a", "json", "")).icon == "braces"
+    assert type_cell(Topic("/a", "own/kind", "")).icon == "box"
 
 
 def test_vanished_ones_are_struck_through_and_say_since_when() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol, cast
 
-from PySide6.QtCore import QPoint, SignalInstance
+from PySide6.QtCore import QPoint, Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
@@ -140,8 +140,11 @@ class BehaviourPanel(PanelWidget):
         editor.key_pressed.connect(self._key)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
+            had_focus = self.hasFocus()
             self._place_column.addWidget(editor)
             self.setFocusProxy(editor)
+            if had_focus:
+                editor.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _program_changed(self) -> None:
         """The program is another one: its problems, the sensors it reads, its text."""

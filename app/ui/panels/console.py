@@ -7,12 +7,20 @@ from collections.abc import Mapping
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QRect, QRectF, QSize, Qt
+from PySide6.QtCore import (
+    QAbstractListModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPoint,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+)
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QListView,
-    QMenu,
     QStackedWidget,
     QStyle,
     QStyledItemDelegate,
@@ -21,6 +29,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.icons import paint_icon
+from app.ui.menus import Menu
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyState, IconButton, paint
@@ -141,7 +150,8 @@ class ConsolePanel(PanelWidget):
         copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
         copy.triggered.connect(self.copy)
         self.list.addAction(copy)
-        self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+        self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.list.customContextMenuRequested.connect(self._show_actions)
         self.empty = EmptyState(
             self.theme, "terminal", "Nothing happened yet", "What programs and robots say appears here."
         )
@@ -179,7 +189,7 @@ class ConsolePanel(PanelWidget):
             self.refresh()
 
     def _show_menu(self) -> None:
-        menu = QMenu(self)
+        menu = Menu(self.theme, self)
         for level, words in WORDS.items():
             action = menu.addAction(words)
             action.setCheckable(True)
@@ -187,6 +197,12 @@ class ConsolePanel(PanelWidget):
             action.triggered.connect(lambda _on=False, level=level: self.set_level(level))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.filter.mapToGlobal(self.filter.rect().bottomLeft()))
+
+    def _show_actions(self, at: QPoint) -> None:
+        menu = Menu(self.theme, self)
+        menu.addActions(self.list.actions())
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(self.list.viewport().mapToGlobal(at))
 
     def copy(self) -> None:
         """Put the chosen lines on the clipboard, oldest first."""

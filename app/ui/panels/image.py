@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QMenu, QStackedWidget, QVBoxLayout
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
+from app.ui.menus import Menu
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_view import PictureView
 from app.ui.robot_boxes import boxes_on, owner_of
@@ -97,7 +98,7 @@ class ImagePanel(PanelWidget):
         self.pages.setCurrentWidget(self.empty)
 
     def _show_menu(self) -> None:
-        menu = QMenu(self)
+        menu = Menu(self.theme, self)
         for name in self.topics():
             action = menu.addAction(name)
             action.setCheckable(True)

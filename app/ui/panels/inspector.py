@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.hex_view import HexView
 from app.ui.inspector_parts import (
@@ -19,6 +19,7 @@ from app.ui.inspector_parts import (
     plain_words,
     tells_its_shape,
 )
+from app.ui.menus import Menu
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.tree import Node, TreeModel
 from app.ui.tree_values import search
@@ -246,10 +247,10 @@ class InspectorPanel(PanelWidget):
             self.context.toast(f"Copied the path {node.path}")
 
     def _show_menu(self, at: QPoint) -> None:
-        menu = QMenu(self)
+        menu = Menu(self.theme, self)
         menu.addActions(self.tree.actions())
-        menu.exec(self.tree.viewport().mapToGlobal(at))
-        menu.deleteLater()
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(self.tree.viewport().mapToGlobal(at))
 
     def look_for(self, words: str) -> None:
         """Choose the first key or value with these words."""

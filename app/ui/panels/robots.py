@@ -94,19 +94,26 @@ class RobotsPanel(PanelWidget):
         self.name = label("", "heading")
         self.chip = Chip(theme)
         self.about = label("", "body", role="textSecondary")
+        self.health = label("", "small", role="textTertiary")
+        self.health.hide()
+        about = QVBoxLayout()
+        about.setSpacing(0)
+        about.addWidget(self.about)
+        about.addWidget(self.health)
         self.finder = SearchField(theme, "Find an action")
         self.finder.setFixedWidth(180)
         self.finder.setMinimumHeight(theme.size("control", "form"))
         self.finder.textChanged.connect(self._filter)
         self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
         self.stop.fill_icon = True
-        self.stop.clicked.connect(lambda: self.context.run("run.stop"))
+        self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
         head = QWidget()
         row = QHBoxLayout(head)
         row.setContentsMargins(16, 7, 16, 8)
         row.setSpacing(10)
-        for widget in (self.name, self.chip, self.about):
-            row.addWidget(widget)
+        row.addWidget(self.name)
+        row.addWidget(self.chip)
+        row.addLayout(about)
         row.addStretch(1)
         row.addWidget(self.finder)
         row.addWidget(self.stop)
@@ -190,7 +197,7 @@ class RobotsPanel(PanelWidget):
             self._card_column.insertWidget(place, card)
         self._set_first(next(iter(self.cards.values()), None))
         self.name.setText(link.name)
-        self.stop.set_word("Stop")
+        self.stop.set_word(f"Stop {link.name}")
         kind = "virtual, " if link.virtual else ""
         self.about.setText(f"{kind}{plural(len(actions), 'action')}")
         self._filter()
@@ -198,6 +205,9 @@ class RobotsPanel(PanelWidget):
     def _show_link(self, link: RobotLink) -> None:
         if self._new("head", link.state):
             self.chip.set(link.state, STATUS.get(link.state, "ok"))
+        if self._new("health", link.name, link.last_stop):
+            self.health.setText(f"Stop {link.last_stop}" if link.last_stop else "")
+            self.health.setVisible(bool(link.last_stop))
         for name, card in self.cards.items():
             made = link.invocations.get(name)
             now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()

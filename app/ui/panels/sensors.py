@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description import Sensor
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from app.core.watches import Watch
 
 ROW = {"compact": 26, "comfortable": 28}
+FIRST = ("touch", "distance", "battery")  # what people look for; the others keep their order
 TITLE_WIDTH, VALUE_WIDTH = 100, 96
 ICON = 18
 
@@ -35,6 +36,7 @@ class SensorRow(QWidget):
         self.title = sensor.title[:1].upper() + sensor.title[1:]
         self.reading = Reading()
         self.large = True
+        self.height_px = 0
         self._yes_s: float | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(self.title)
@@ -52,8 +54,18 @@ class SensorRow(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
+        return QSize(260, max(self.height_px, self.least_height()))
+
+    def least_height(self) -> int:
+        """The height that its words need."""
         least = ROW["comfortable" if self.large else "compact"]
-        return QSize(260, max(least, round(self._theme.scaled(least))))
+        return max(least, round(self._theme.scaled(least)))
+
+    def set_height(self, pixels: int) -> None:
+        """Be as high as this, when the words fit."""
+        if pixels != self.height_px:
+            self.height_px = pixels
+            self.updateGeometry()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -100,7 +112,7 @@ class SensorsPanel(PanelWidget):
         self._column.setContentsMargins(0, 6, 0, 6)
         self._column.setSpacing(0)
         self._column.addStretch(1)
-        scroll = QScrollArea()
+        self._scroll = scroll = QScrollArea()
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -142,15 +154,35 @@ class SensorsPanel(PanelWidget):
         for place, row in enumerate(self.rows):
             row.large = self.density == "comfortable"
             self._column.insertWidget(place, row)
+        self._fit_rows()
         self.pages.setCurrentIndex(1 if self.rows else 0)
         if not self.rows:
             self.empty.say(f"{link.name} has no sensors", "Its description names none.")
 
+    def _fit_rows(self) -> None:
+        """Whole rows fill the place, so that none is cut; the others are scrolled to, row by row."""
+        if not self.rows:
+            return
+        room = self.height() - self._column.contentsMargins().top()
+        least = self.rows[0].least_height()
+        fitting = max(1, room // least)
+        height = -(-room // fitting) if fitting < len(self.rows) else least
+        for row in self.rows:
+            row.set_height(height)
+        self._scroll.verticalScrollBar().setSingleStep(height)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_rows()
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self._fit_rows()
+
     def set_density(self, density: Density) -> None:
-        super().set_density(density)
         for row in self.rows:
             row.large = density == "comfortable"
-            row.updateGeometry()
+        super().set_density(density)
 
     def shut(self) -> None:
         if self._watch is not None:
@@ -160,8 +192,13 @@ class SensorsPanel(PanelWidget):
 
 
 def _shown(link: RobotLink) -> list[Sensor]:
-    """Everything that fits a row: no pictures."""
-    return [sensor for sensor in link.robot.sensors if not sensor.is_image]
+    """Everything that fits a row (no pictures), what people look for first."""
+
+    def rank(sensor: Sensor) -> int:
+        words = f"{sensor.name} {sensor.title}".casefold()
+        return next((place for place, word in enumerate(FIRST) if word in words), len(FIRST))
+
+    return sorted((sensor for sensor in link.robot.sensors if not sensor.is_image), key=rank)
 
 
 PANEL = Panel("sensors", "Sensors now", "eye", (), SensorsPanel)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
+from app.core.source import NODE_NAME
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.table import Cell, Column, TableModel
 from app.ui.table_view import TableView
@@ -37,8 +39,9 @@ def name_cell(topic: Topic) -> Cell:
 
 
 def type_cell(topic: Topic) -> Cell:
-    """The type's icon and word."""
-    return Cell(topic.msg_type, ICONS.get(topic.codec, "box"), _ink(topic, "textTertiary"))
+    """The type's icon and word; of "robot/answer" the last one, the tooltip has the whole."""
+    icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
+    return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"), middle=True)
 
 
 def publishers_cell(topic: Topic) -> Cell:
@@ -91,21 +94,31 @@ def _loss_tip(topic: Topic) -> str:
 
 COLUMNS: tuple[Column[Topic], ...] = (
     Column("topic", "Topic", 150, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
-    Column("type", "Type", 88, type_cell, lambda t: t.msg_type),
+    Column("type", "Type", 102, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
     Column(
         "publishers",
         "Publishers",
-        74,
+        76,
         publishers_cell,
         lambda t: t.publishers,
         figures=True,
         tip=_publishers_tip,
     ),
-    Column("rate", "Rate /s", 58, rate_cell, lambda t: t.rate_hz, figures=True),
-    Column("bandwidth", "Bandwidth", 78, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True),
-    Column("age", "Age", 58, age_cell, lambda t: t.age_s, figures=True),
-    Column("loss", "Loss", 66, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip),
+    Column("rate", "Rate /s", 56, rate_cell, lambda t: t.rate_hz, figures=True),
+    Column("bandwidth", "Bandwidth", 77, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True),
+    Column("age", "Age", 56, age_cell, lambda t: t.age_s, figures=True),
+    Column("loss", "Loss", 60, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip),
 )
+
+
+def columns(own: Callable[[Topic], bool]) -> tuple[Column[Topic], ...]:
+    """The columns; what is Studio's ``own`` is no news."""
+
+    def named(topic: Topic) -> Cell:
+        cell = name_cell(topic)
+        return replace(cell, bold=False, chip=None) if cell.chip and own(topic) else cell
+
+    return (replace(COLUMNS[0], cell=named), *COLUMNS[1:])
 
 
 class TopicsPanel(PanelWidget):
@@ -118,7 +131,7 @@ class TopicsPanel(PanelWidget):
         self.filter.textChanged.connect(self._rebuild)
         self.count = label("", "small", role="textSecondary")
         self.header = [self.count, self.filter]
-        self.model: TableModel[Topic] = TableModel(COLUMNS, lambda topic: topic.name)
+        self.model: TableModel[Topic] = TableModel(columns(self._own), lambda topic: topic.name)
         self.table: TableView[Topic] = TableView(theme, self.model)
         self.table.setAccessibleName("Topics")
         self.table.opened.connect(self._open)
@@ -131,6 +144,7 @@ class TopicsPanel(PanelWidget):
         self._stack = QStackedWidget()
         self._stack.addWidget(self.table)
         self._stack.addWidget(self.empty)
+        self.setFocusProxy(self.table)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -139,7 +153,14 @@ class TopicsPanel(PanelWidget):
         column.addWidget(self._line)
         column.addWidget(self.foot)
         self._seen = (-1, -1, "")
+        self._ours: tuple[str, ...] = ()
         self._ticks = 0
+
+    def _own(self, topic: Topic) -> bool:
+        """Whether only virtual robots that Studio itself started publish it, or Studio."""
+        if not topic.publisher_nodes:
+            return topic.name.startswith(tuple(f"/{robot}/" for robot in self._ours))
+        return {*self._ours, NODE_NAME}.issuperset(topic.publisher_nodes)
 
     def refresh(self) -> None:
         self._ticks += 1
@@ -155,6 +176,7 @@ class TopicsPanel(PanelWidget):
     def _rebuild(self) -> None:
         topics = self.session.topics
         self._seen = (topics.revision, len(topics), self.session.master.kind)
+        self._ours = self.session.companions.virtual_robots
         words = self.filter.text().casefold().split()
         rows = [topic for topic in topics if all(word in _haystack(topic) for word in words)]
         self.model.set_rows(self.table.order.sort(rows))
@@ -219,7 +241,7 @@ class TopicsPanel(PanelWidget):
         return {"sort": order.column.name if order.column else "", "falling": order.falling}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        self.table.order.column = next((c for c in COLUMNS if c.name == state.get("sort")), None)
+        self.table.order.column = next((c for c in self.table.columns if c.name == state.get("sort")), None)
         self.table.order.falling = state.get("falling") is True
         self._rebuild()
 

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QHBoxLayout, QLineEdit, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
+from app.ui.menus import EditMenu, cut, make_round
 from app.ui.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.button import Button
@@ -39,6 +40,7 @@ class Choice(QComboBox):
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         for value, words in options:
             self.addItem(words, value)
+        make_round(self.view().window())
 
     @property
     def value(self) -> str:
@@ -60,6 +62,10 @@ class Choice(QComboBox):
 
     def minimumSizeHint(self) -> QSize:
         return QSize(min(80, self.sizeHint().width()), self.sizeHint().height())
+
+    def showPopup(self) -> None:
+        super().showPopup()
+        cut(self.view().window(), self._theme.radius("panel"))
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if self.hasFocus():
@@ -136,6 +142,7 @@ class ColourSwatches(QWidget):
         row.addWidget(self._name)
         self._other = Button(theme, "Other", kind="ghost", size="small")
         self._field = QLineEdit()
+        EditMenu(theme, self._field)
         self._field.setAccessibleName(f"{name}, as a number like #33aaff")
         self._field.setPlaceholderText("#33aaff")
         self._field.setMaxLength(7)

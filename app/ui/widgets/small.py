@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QAbstractButton, QFrame, QLabel, QLineEdit, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
+from app.ui.menus import EditMenu
 from app.ui.theme import Theme
 from app.ui.widgets import paint
 
@@ -254,6 +255,7 @@ class SearchField(QLineEdit):
         self.setProperty("quiet", "true")
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumHeight(26)
+        EditMenu(theme, self)
         self._arrange()
         theme.changed.connect(self._arrange)
 
