@@ -87,11 +87,6 @@ class Graph:
         """All nodes that are registered now."""
         return tuple(member.node for member in self._census.members.values())
 
-    def node(self, node_id: str) -> NodeRecord | None:
-        """The node of this id, if it is registered."""
-        member = self._census.members.get(node_id)
-        return None if member is None else member.node
-
     def apply(self, request: Request, call: int, now: float, sender: str) -> tuple[Outgoing, ...]:
         """Carry out a request of `sender`. What is wrong with it becomes a `Refused`, never an exception."""
         if isinstance(request, AddPublisher | AddSubscriber) and now < self._learnt_at:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import logging
 import os
-import platform
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 
-import psutil
 import zmq
 
 from nep.addresses import endpoint_of
@@ -51,7 +49,6 @@ class MasterLoop:
         owner: Owner | None,
     ) -> None:
         self._graph = graph
-        self._host = platform.node()
         self._listeners = listeners
         self._owner = owner
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -215,8 +212,6 @@ class MasterLoop:
 
     def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
         """Send one answer; False when its node has no connection any more."""
-        if each.call is None and self._is_dead(each.to):
-            return False
         body = encode_answer(without(each.answer, dead), each.call or 0)
         try:
             self._router.send_multipart((each.to.encode("utf-8", "surrogateescape"), body), zmq.DONTWAIT)
@@ -225,16 +220,6 @@ class MasterLoop:
         except zmq.ZMQError as error:
             return error.errno != zmq.EHOSTUNREACH
         return True
-
-    def _is_dead(self, node_id: str) -> bool:
-        """Whether a node of this computer has no process any more: its connection may not know that yet."""
-        node = self._graph.node(node_id)
-        return (
-            node is not None
-            and node.pid is not None
-            and node.host == self._host
-            and not psutil.pid_exists(node.pid)
-        )
 
     def _tell_listeners(self) -> None:
         if self._listeners and self._graph.revision != self._told_revision:

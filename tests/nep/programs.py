@@ -13,6 +13,8 @@ from pathlib import Path
 from threading import Event
 from time import monotonic
 
+import psutil
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -46,6 +48,12 @@ class Program:
 
     def signal(self, number: signal.Signals) -> None:
         self.process.send_signal(number)
+
+    def stop(self) -> None:
+        """Halt it as a debugger does; when this returns none of its threads runs."""
+        self.signal(signal.SIGSTOP)
+        process = psutil.Process(self.process.pid)
+        eventually(lambda: process.status() == psutil.STATUS_STOPPED)
 
     def end(self, timeout_s: float = 10.0) -> tuple[str, str]:
         """Wait for its end; what else it printed."""

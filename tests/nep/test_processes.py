@@ -112,7 +112,7 @@ def test_a_killed_publisher_costs_a_new_subscriber_nothing(node: nep.Node) -> No
 def test_a_hung_subscriber_costs_half_a_second_once_and_is_named(node: nep.Node) -> None:
     with running(COLLECT, "topic", "0", "2") as program:
         program.line()
-        program.signal(signal.SIGSTOP)
+        program.stop()
         started = monotonic()
         pub = node.new_pub("topic")
         assert 0.4 < monotonic() - started < 0.8
@@ -144,7 +144,7 @@ def test_a_stopped_publisher_is_unlisted_but_not_cut_off(node: nep.Node) -> None
         program.line()
         program.say("one")
         assert sub.listen(timeout_s=2.0) == (True, "one")
-        program.signal(signal.SIGSTOP)
+        program.stop()
         eventually(lambda: not node.graph().topics["topic"].publishers)
         program.say("two")
         program.signal(signal.SIGCONT)
@@ -249,7 +249,7 @@ def test_what_could_not_be_delivered_is_said(master: Master) -> None:
         hung.line()
         with running(code) as program:
             program.line()
-            hung.signal(signal.SIGSTOP)
+            hung.stop()
             started = monotonic()
             program.say("go")
             _out, error = program.end()
