@@ -6,10 +6,12 @@ subscribers' inboxes, in the publisher's thread.
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Sequence
 
+from nep import requests
 from nep.backends.base import Backend, Inlet, PublisherSpec, SubscriberSpec
 from nep.configuration import Configuration, Hybrid
 from nep.encoded import Encoded
@@ -18,18 +20,10 @@ from nep.graph import Graph, GraphView
 from nep.inbox import Inbox
 from nep.message import Message
 from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.requests import (
-    AddPublisher,
-    AddSubscriber,
-    Leave,
-    Refused,
-    RemovePublisher,
-    RemoveSubscriber,
-    Renew,
-    Request,
-)
 
 __all__ = ["BACKEND"]
+
+_logger = logging.getLogger("nep")
 
 _BATCH_S = 0.005
 """Sinks are called 200 times a second at most."""
@@ -45,11 +39,11 @@ class _Hub:
         self.outlets: dict[str, list[MemoryOutlet]] = {}
         self.inlets: dict[str, tuple[MemoryInlet, ...]] = {}
 
-    def ask(self, request: Request) -> None:
+    def ask(self, request: requests.Request) -> None:
         """Tell the graph. Raises `RequestRefusedError`."""
         with self.lock:
             for each in self.graph.apply(request, 0, time.monotonic(), ""):
-                if isinstance(each.answer, Refused):
+                if isinstance(each.answer, requests.Refused):
                     raise RequestRefusedError(each.answer.reason)
 
     def view(self) -> GraphView:
@@ -124,7 +118,7 @@ class MemoryOutlet:
             if not self.is_closed:
                 self.is_closed = True
                 self.hub.outlets[self.spec.topic].remove(self)
-                self.hub.ask(RemovePublisher(self._carrier.node.id, self.spec.id, self.count))
+                self.hub.ask(requests.RemovePublisher(self._carrier.node.id, self.spec.id, self.count))
 
 
 class MemoryInlet:
@@ -180,7 +174,7 @@ class MemoryInlet:
             self.is_closed = True
             others = tuple(each for each in self.hub.inlets[self.spec.topic] if each is not self)
             self.hub.inlets[self.spec.topic] = others
-            self.hub.ask(RemoveSubscriber(self._carrier.node.id, self.spec.id))
+            self.hub.ask(requests.RemoveSubscriber(self._carrier.node.id, self.spec.id))
         self._carrier.wake()
 
 
@@ -205,7 +199,7 @@ class MemoryCarrier:
             record = PublisherRecord(
                 spec.id, spec.topic, spec.msg_type, spec.codec.name, ("memory",), spec.is_latched
             )
-            hub.ask(AddPublisher(self.node, record))
+            hub.ask(requests.AddPublisher(self.node, record))
             outlet = MemoryOutlet(self, hub, spec)
             hub.outlets.setdefault(spec.topic, []).append(outlet)
             self._outlets.append(outlet)
@@ -215,7 +209,7 @@ class MemoryCarrier:
         """Register a subscriber, and hand it what is latched."""
         hub = self._join(spec.configuration)
         with hub.lock:
-            hub.ask(AddSubscriber(self.node, SubscriberRecord(spec.id, spec.topic, spec.msg_type)))
+            hub.ask(requests.AddSubscriber(self.node, SubscriberRecord(spec.id, spec.topic, spec.msg_type)))
             inlet = MemoryInlet(self, hub, spec)
             for outlet in hub.outlets.get(spec.topic, ()):
                 if outlet.latched is not None:
@@ -245,9 +239,9 @@ class MemoryCarrier:
         """Who is there."""
         return _hub(configuration).view()
 
-    def renewal(self, hub: _Hub) -> Renew:
+    def renewal(self, hub: _Hub) -> requests.Renew:
         """This node's statistics on one hub."""
-        return Renew(
+        return requests.Renew(
             self.node.id,
             hub.graph.epoch,
             hub.graph.revision,
@@ -274,7 +268,7 @@ class MemoryCarrier:
         for hub in self._hubs:
             with hub.lock:
                 hub.carriers.pop(self.node.id, None)
-                hub.ask(Leave(self.node.id))
+                hub.ask(requests.Leave(self.node.id))
         self.wake()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
@@ -298,7 +292,10 @@ class MemoryCarrier:
             for inlet in self._sinks:
                 messages = inlet.take_all()
                 if messages and inlet.spec.sink is not None:
-                    inlet.spec.sink(messages)
+                    try:
+                        inlet.spec.sink(messages)
+                    except Exception:  # a sink that fails gets the next batch all the same
+                        _logger.exception("the sink of '%s' failed", inlet.spec.topic)
             self._closing.wait(_BATCH_S)
 
 

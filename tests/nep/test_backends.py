@@ -224,6 +224,21 @@ def test_a_sink_gets_batches_in_a_thread_of_the_node(make: Make) -> None:
     assert len(batches) < 1000
 
 
+def test_a_sink_that_fails_gets_the_next_batch(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    got = threading.Semaphore(0)
+
+    def sink(_messages: object) -> None:
+        got.release()
+        raise ZeroDivisionError
+
+    make("b").new_sub("topic", sink=sink)
+    pub = make("a").new_pub("topic")
+    for n in range(2):
+        pub.publish(n)
+        assert got.acquire(timeout=2.0)
+    eventually(lambda: caplog.text.count("the sink of 'topic' failed") == 2)
+
+
 def test_bad_bytes_are_skipped_by_listen_and_become_an_alert(make: Make) -> None:
     sub, node = make("b").new_sub("topic"), make("a")
     pub = node.new_pub("topic")

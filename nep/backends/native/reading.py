@@ -7,6 +7,7 @@ thread moves messages into the inbox, which is bounded in bytes.
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -23,6 +24,8 @@ from nep.records import SubscriberCount
 from nep.waker import Waker
 
 __all__ = ["Readable", "SocketInlet"]
+
+_logger = logging.getLogger("nep")
 
 LEASE_S = 0.02
 _WAITING_S = 0.1
@@ -202,7 +205,10 @@ class SocketInlet(Generic[R]):
             if count and sink is None:
                 self._wake_waiters()
         if sink is not None and batch:
-            sink(batch)
+            try:
+                sink(batch)
+            except Exception:  # a sink that fails gets the next batch all the same
+                _logger.exception("the sink of '%s' failed", self.spec.topic)
         return Rest(is_quiet=True, due=now + _BATCH_S) if count or batch else Rest()
 
     # ---- closing
