@@ -1,7 +1,6 @@
 """The back end `memory`: nodes of one process, without sockets. The template for other back ends.
 
-Nodes that name the same master meet; nothing listens there. Publishing puts the message straight into the
-subscribers' inboxes, in the publisher's thread.
+Nodes that name the same master meet; nothing listens there. A message is put straight into the inboxes.
 """
 
 from __future__ import annotations
@@ -25,8 +24,7 @@ __all__ = ["BACKEND"]
 
 _logger = logging.getLogger("nep")
 
-_BATCH_S = 0.005
-"""Sinks are called 200 times a second at most."""
+_BATCH_S = 0.005  # sinks are called 200 times a second at most
 
 
 class _Hub:
@@ -45,6 +43,12 @@ class _Hub:
             for each in self.graph.apply(request, 0, time.monotonic(), ""):
                 if isinstance(each.answer, requests.Refused):
                     raise RequestRefusedError(each.answer.reason)
+
+    def forget(self, node_id: str) -> None:
+        """A node leaves."""
+        with self.lock:
+            self.carriers.pop(node_id, None)
+            self.ask(requests.Leave(node_id))
 
     def view(self) -> GraphView:
         """The graph with everybody's statistics of this moment."""
@@ -127,7 +131,7 @@ class MemoryInlet:
     def __init__(self, carrier: MemoryCarrier, hub: _Hub, spec: SubscriberSpec) -> None:
         self._carrier = carrier
         self.hub = hub
-        self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
+        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self.spec = spec
         self.received = 0
         self.lost = 0
@@ -137,7 +141,7 @@ class MemoryInlet:
     def put(self, message: Message) -> None:
         """Called by publishers."""
         with self._carrier.changed:
-            dropped = self._inbox.put(message)
+            dropped = self.inbox.put(message)
             self.received += 1 - dropped
             self.lost += dropped
             self._carrier.changed.notify_all()
@@ -145,7 +149,7 @@ class MemoryInlet:
     def poll(self) -> Message | None:
         """The next message if one is there."""
         with self._carrier.changed:
-            return self._inbox.take()
+            return self.inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
         """The next message, waited for."""
@@ -155,12 +159,7 @@ class MemoryInlet:
     def take_all(self) -> list[Message]:
         """All messages that are there."""
         with self._carrier.changed:
-            return self._inbox.take_all()
-
-    @property
-    def waiting(self) -> int:
-        """How many messages are there."""
-        return len(self._inbox)
+            return self.inbox.take_all()
 
     def report(self, problem: str) -> None:
         """Shown as an alert in the graph."""
@@ -226,7 +225,7 @@ class MemoryCarrier:
         with self.changed:
             before = self._wakes
             self.changed.wait_for(
-                lambda: self._wakes != before or any(each.waiting for each in mine), timeout_s
+                lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
             )
 
     def wake(self) -> None:
@@ -266,9 +265,7 @@ class MemoryCarrier:
         for outlet in self._outlets:
             outlet.close(timeout_s)
         for hub in self._hubs:
-            with hub.lock:
-                hub.carriers.pop(self.node.id, None)
-                hub.ask(requests.Leave(self.node.id))
+            hub.forget(self.node.id)
         self.wake()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
