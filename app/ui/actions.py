@@ -9,8 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QMenuBar, QWidget
 
-from app.ui.menus import Menu
 from app.ui.theme import Theme
+from app.ui.widgets.menus import Menu
 
 MENUS = ("File", "Edit", "View", "Run", "Robots", "Help")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ from PySide6.QtWidgets import QApplication
 from app import resources
 from app.core.journal import left_behind
 from app.core.session import Session
-from app.ui import fonts
+from app.ui import fonts, messages
 from app.ui.blockly_scheme import register_scheme
 from app.ui.commands import Commands
 from app.ui.logo import LogoEngine
@@ -25,6 +26,8 @@ from app.ui.self_drive import SelfDrive
 from app.ui.start_page import read_examples
 from app.ui.theme import MODES, Theme
 from nep.plugins import discover
+
+LOG_EVERY_MS = 500
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ def make_window(session: Session, options: Options) -> tuple[MainWindow, Command
 
 def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order."""
+    log = messages.listen()
+    messages.quiet_chromium(os.environ)
     application = make_application()
     session = Session()
     window, commands = make_window(session, options)
@@ -87,6 +92,9 @@ def run(options: Options) -> int:
     window.on_shut = lambda: QTimer.singleShot(0, application.quit)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: QTimer.singleShot(0, window.close))
+    hearing = QTimer(window)
+    hearing.timeout.connect(lambda: log.take(session.console.add))
+    hearing.start(LOG_EVERY_MS)
     window.show()
     window.begin()
     if options.file is not None:

@@ -13,9 +13,9 @@ from app.ui.actions import Actions, Handler, shortcuts
 from app.ui.docks import Dock
 from app.ui.files import Asks, Files, SystemDialogs
 from app.ui.main_window import MainWindow
-from app.ui.menus import Menu
 from app.ui.popup import Sheet
 from app.ui.theme import Mode
+from app.ui.widgets.menus import Menu
 
 TEXT_STEP = 25
 ABOUT = (

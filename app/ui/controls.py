@@ -10,9 +10,9 @@ from PySide6.QtGui import QDoubleValidator
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLineEdit, QWidget
 
 from app.robots.description import Parameter
-from app.ui.menus import EditMenu
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Choice, ColourSwatches, Segments, SliderWithUnit, Switch, label
+from app.ui.widgets.menus import EditMenu
 
 VALUE_WIDTH, ROW_HEIGHT = 104, 36
 SEGMENTS_AT_MOST = 4

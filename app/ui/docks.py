@@ -16,10 +16,10 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.dock_title import DockTitle
-from app.ui.menus import Menu
 from app.ui.panels.base import Density, Panel, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
+from app.ui.widgets.menus import Menu
 
 LEAST_BODY = QSize(160, 60)
 

@@ -9,8 +9,8 @@ from PySide6.QtCore import QRegularExpression
 from PySide6.QtGui import QSyntaxHighlighter, QTextCharFormat, QTextDocument
 from PySide6.QtWidgets import QFrame, QPlainTextEdit
 
-from app.ui.menus import EditMenu
 from app.ui.theme import Theme
+from app.ui.widgets.menus import EditMenu
 
 # The first rule that fits a place colours it: text and comments before the words inside them.
 _RULES: tuple[tuple[str, str], ...] = (

@@ -12,7 +12,7 @@ from app.ui.theme import Theme
 from app.ui.widgets import paint
 
 ART_HEIGHT = 158
-ROOM_HEIGHT = 330  # the whole room is painted this high; the card shows its upper part
+ROOM_HEIGHT = 296  # the whole room is painted this high; the card shows its upper part
 
 
 class Art(QWidget):
@@ -58,7 +58,7 @@ class RobotArt(Art):
         self.setAccessibleName("A small white robot in a room, waving")
 
     def picture(self, painter: QPainter, area: QRectF) -> None:
-        room = QRectF(area.left(), area.top() - 62, area.width(), ROOM_HEIGHT)
+        room = QRectF(area.left(), area.top() - 55, area.width(), ROOM_HEIGHT)
         painter.drawPixmap(area.topLeft(), self._still(room, area))
 
     def _still(self, room: QRectF, area: QRectF) -> QPixmap:

@@ -96,11 +96,11 @@ class StartPage(QWidget):
         content.setProperty("bare", "true")
         content.setMaximumWidth(WIDTH)
         column = QVBoxLayout(content)
-        column.setContentsMargins(0, 32, 0, 24)
+        column.setContentsMargins(0, 35, 0, 24)
         column.setSpacing(0)
         self._question = label("What would you like to do?", "display")
         column.addWidget(self._question)
-        column.addSpacing(2)
+        column.addSpacing(7)
         lead = "Build what a robot says and does, by putting blocks together. No programming needed."
         column.addWidget(label(lead, "lead", role="textSecondary", wrap=True))
         column.addSpacing(24)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy,
 
 from app.core.settings import RecentFile
 from app.ui.icons import paint_icon
-from app.ui.miniature import Row, paint_grid, paint_rows
+from app.ui.miniature import Row, paint_rows
 from app.ui.start_art import Art, upper_corners
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Card, Chip, label, paint
@@ -86,7 +86,6 @@ class ExampleCard(QAbstractButton):
         art = QRectF(1, 1, rect.width() - 2, EXAMPLE_ART)
         painter.save()
         painter.setClipPath(upper_corners(art, theme.radius("card") - 1))
-        paint_grid(painter, art, theme)
         painter.fillRect(art, theme.colour("workspace"))
         paint_rows(painter, art.adjusted(19, 16, -19, 0), theme, self._rows)
         painter.restore()

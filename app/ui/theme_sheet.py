@@ -61,7 +61,7 @@ QMenu {{
     background: {raised}; color: {text}; border: 1px solid {borderStrong}; padding: 5px;
     border-radius: {panel_radius}px;
 }}
-QMenu::item {{ padding: 6px 28px 6px 10px; border-radius: {small}px; min-width: 150px; }}
+QMenu::item {{ padding: 6px 22px 6px 33px; border-radius: {small}px; min-width: 150px; }}
 QMenu::item:selected {{ background: {hover}; color: {text}; }}
 QMenu::item:disabled {{ color: {textDisabled}; }}
 QMenu::icon {{ padding-left: 8px; }}

@@ -29,10 +29,10 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.icons import paint_icon
-from app.ui.menus import Menu
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyState, IconButton, paint
+from app.ui.widgets.menus import Menu
 
 if TYPE_CHECKING:
     from app.core.console import LogRecord

@@ -9,11 +9,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
-from app.ui.menus import Menu
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_view import PictureView
 from app.ui.robot_boxes import boxes_on, owner_of
 from app.ui.widgets import EmptyState, IconButton
+from app.ui.widgets.menus import Menu
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream

@@ -19,12 +19,12 @@ from app.ui.inspector_parts import (
     plain_words,
     tells_its_shape,
 )
-from app.ui.menus import Menu
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.tree import Node, TreeModel
 from app.ui.tree_values import search
 from app.ui.tree_view import TreeView
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton, Line, Segments, label
+from app.ui.widgets.menus import Menu
 from app.ui.words import size_words
 
 if TYPE_CHECKING:

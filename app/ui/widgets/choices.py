@@ -9,10 +9,10 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QHBoxLayout, QLineEdit, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
-from app.ui.menus import EditMenu, cut, make_round
 from app.ui.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.button import Button
+from app.ui.widgets.menus import EditMenu, cut, make_round
 from app.ui.widgets.small import label
 
 # What a robot's lamps show, not how Studio looks: values of the action, so they are no tokens.

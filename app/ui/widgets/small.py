@@ -9,9 +9,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QAbstractButton, QFrame, QLabel, QLineEdit, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
-from app.ui.menus import EditMenu
 from app.ui.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.menus import EditMenu
 
 SPARK = QSize(56, 16)
 SPARK_STROKE = 1.25

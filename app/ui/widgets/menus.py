@@ -6,13 +6,29 @@ does that, and would show them black: there the window itself is cut to its roun
 
 from __future__ import annotations
 
+import re
+
 from PySide6.QtCore import QObject, QPoint, QRectF, Qt
-from PySide6.QtGui import QGuiApplication, QPainterPath, QRegion, QResizeEvent, QShowEvent
+from PySide6.QtGui import (
+    QAction,
+    QGuiApplication,
+    QIcon,
+    QKeySequence,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QRegion,
+    QResizeEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import QLineEdit, QMenu, QPlainTextEdit, QWidget
 
+from app.ui.icons import paint_icon
 from app.ui.theme import Theme
+from app.ui.widgets.paint import RIGHT, box, words
 
 CUT_ON = frozenset({"xcb", "offscreen", "minimal"})
+MARK, TEXT_LEFT = 15, 33
 
 
 def make_round(widget: QWidget) -> None:
@@ -32,7 +48,7 @@ def cut(widget: QWidget, radius: float) -> None:
 
 
 class Menu(QMenu):
-    """A menu in the design's look."""
+    """A menu in the design's look: icons and checks in one column, shortcuts quiet at the right."""
 
     def __init__(self, theme: Theme, parent: QWidget | None = None, title: str = "") -> None:
         super().__init__(title, parent)
@@ -46,6 +62,42 @@ class Menu(QMenu):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         cut(self, self._theme.radius("panel"))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect())
+        box(painter, rect, theme.radius("panel"), theme.colour("raised"), theme.colour("borderStrong"))
+        painter.setClipRect(rect.adjusted(1, 1, -1, -1))
+        for action in self.actions():
+            if action.isVisible():
+                self._paint_action(painter, QRectF(self.actionGeometry(action)), action)
+        painter.end()
+
+    def _paint_action(self, painter: QPainter, place: QRectF, action: QAction) -> None:
+        theme = self._theme
+        if action.isSeparator():
+            line = QRectF(place.left() + 6, round(place.center().y()), place.width() - 12, 1)
+            painter.fillRect(line, theme.colour("border"))
+            return
+        if action is self.activeAction() and action.isEnabled():
+            box(painter, place, theme.radius("small"), theme.colour("hover"))
+        mark = QRectF(place.left() + 9, place.center().y() - MARK / 2, MARK, MARK)
+        if action.isChecked():
+            paint_icon(painter, mark, "check", theme.colour("accentText"))
+        elif not action.icon().isNull():
+            mode = QIcon.Mode.Normal if action.isEnabled() else QIcon.Mode.Disabled
+            action.icon().paint(painter, mark.toRect(), Qt.AlignmentFlag.AlignCenter, mode)
+        said, _, key = action.text().partition("\t")
+        key = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText) or key
+        ink = theme.colour("text" if action.isEnabled() else "textDisabled")
+        inside = place.adjusted(TEXT_LEFT, 0, -12, 0)
+        words(painter, inside, re.sub("&(.)", r"\1", said), self.font(), ink)
+        if action.menu() is not None:
+            chevron = QRectF(inside.right() - 12, place.center().y() - 7, 14, 14)
+            paint_icon(painter, chevron, "chevron-right", theme.colour("textTertiary"))
+        elif key:
+            quiet = theme.colour("textTertiary" if action.isEnabled() else "textDisabled")
+            words(painter, inside, key, self.font(), quiet, RIGHT)
 
 
 class EditMenu(QObject):

@@ -1,0 +1,77 @@
+"""What Qt, Chromium and our own log say: known noise is dropped, the rest goes to the log and the Console.
+
+Noise is what these libraries tell on machines without a graphics card or a message bus, where Studio works
+all the same. What is not known to be harmless is never dropped.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections import deque
+from collections.abc import Callable, MutableMapping
+
+from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
+
+FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
+QUIET = "--log-level=3"  # Chromium's own lines: only what ends it
+KEPT = 200
+
+NOISE = re.compile(
+    r"Failed to load vulkan:|initInstance: No Vulkan library available$"
+    r"|Failed to create platform Vulkan instance$|QVulkanInstance: Failed to initialize Vulkan$"
+    r"|Unable to detect GPU vendor|GBM is not supported with the current configuration"
+    r"|GPUInfo not initialized on GpuInfoUpdate|Sandboxing disabled by user"
+    r"|This plugin does not support (propagateSizeHints|raise|createPlatformVulkanInstance)"
+)
+LEVELS = {
+    QtMsgType.QtDebugMsg: logging.DEBUG,
+    QtMsgType.QtInfoMsg: logging.INFO,
+    QtMsgType.QtWarningMsg: logging.WARNING,
+    QtMsgType.QtCriticalMsg: logging.ERROR,
+    QtMsgType.QtFatalMsg: logging.CRITICAL,
+}
+
+_log = logging.getLogger("qt")
+
+
+def quiet_chromium(environ: MutableMapping[str, str]) -> None:
+    """Ask Chromium to keep its lines for itself, unless the user's flags say something about its log."""
+    flags = environ.get(FLAGS, "")
+    if "--log-level" not in flags and "--enable-logging" not in flags:
+        environ[FLAGS] = f"{flags} {QUIET}".strip()
+
+
+def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> None:
+    """Log one line of Qt, unless it is known noise."""
+    if kind == QtMsgType.QtFatalMsg or NOISE.match(words) is None:
+        _log.log(LEVELS.get(kind, logging.WARNING), "%s", words)
+
+
+class Log(logging.Handler):
+    """Keeps warnings and errors of any thread until the window's thread takes them to the Console."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self._kept: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep one line."""
+        level = "error" if record.levelno >= logging.ERROR else "warn"
+        self._kept.append((level, record.name.partition(".")[0], record.getMessage()))
+
+    def take(self, add: Callable[[str, str, str], object]) -> None:
+        """Give what was kept to ``add`` (level, origin, words), oldest first."""
+        while self._kept:
+            add(*self._kept.popleft())
+
+
+def listen() -> Log:
+    """From now on hear Qt, and keep what is logged; it also goes to the standard error output."""
+    qInstallMessageHandler(on_qt_message)
+    root = logging.getLogger()
+    if not root.handlers:
+        logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    log = Log()
+    root.addHandler(log)
+    return log

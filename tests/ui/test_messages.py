@@ -1,0 +1,63 @@
+"""What Qt and Chromium say on a machine without a graphics card, and what must be heard."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+from PySide6.QtCore import QMessageLogContext, QtMsgType
+
+from app.ui.messages import FLAGS, Log, on_qt_message, quiet_chromium
+
+
+@pytest.mark.parametrize(
+    ("words", "heard"),
+    [
+        ("Failed to load vulkan: Cannot load library vulkan: no such file", False),
+        ("initInstance: No Vulkan library available", False),
+        ("Unable to detect GPU vendor for device: Mesa/X.org llvmpipe", False),
+        ("Sandboxing disabled by user.", False),
+        ("QObject::connect: signal not found", True),
+        ("The page says: Failed to load vulkan:", True),
+    ],
+)
+def test_only_known_noise_is_dropped(caplog: pytest.LogCaptureFixture, words: str, heard: bool) -> None:
+    on_qt_message(QtMsgType.QtWarningMsg, QMessageLogContext(), words)
+    assert [record.getMessage() for record in caplog.records] == ([words] if heard else [])
+
+
+def test_what_ends_the_program_is_always_said(caplog: pytest.LogCaptureFixture) -> None:
+    on_qt_message(QtMsgType.QtFatalMsg, QMessageLogContext(), "Unable to detect GPU vendor")
+    assert caplog.records[0].levelno == logging.CRITICAL
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (None, "--log-level=3"),
+        ("--disable-gpu", "--disable-gpu --log-level=3"),
+        ("--enable-logging=stderr", "--enable-logging=stderr"),
+        ("--log-level=0", "--log-level=0"),
+    ],
+)
+def test_flags_of_the_user_stay_as_they_are(before: str | None, after: str) -> None:
+    environ = {} if before is None else {FLAGS: before}
+    quiet_chromium(environ)
+    assert environ[FLAGS] == after
+    assert "sandbox" not in environ[FLAGS]
+
+
+def test_the_log_is_kept_until_the_console_takes_it() -> None:
+    log = Log()
+    logger = logging.getLogger("qt.test_messages")
+    logger.addHandler(log)
+    try:
+        logger.warning("a %s", "warning")
+        logger.error("an error")
+        logger.info("nothing")
+    finally:
+        logger.removeHandler(log)
+    lines: list[tuple[str, str, str]] = []
+    log.take(lambda *line: lines.append(line))
+    log.take(lambda *line: lines.append(line))
+    assert lines == [("warn", "qt", "a warning"), ("error", "qt", "an error")]
