@@ -18,6 +18,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+from nep.masters import is_running
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 CACHE = REPOSITORY / ".cache" / "peers"
 SCRIPTS = Path(__file__).parent / "peers"
@@ -74,8 +76,7 @@ class Program:
     @property
     def printed(self) -> str:
         """What else it printed."""
-        with self._news:
-            return "".join(self._printed)
+        return "".join(self._printed)
 
     def wait(self, done: Callable[[], bool], what: str, timeout_s: float = LONG_S) -> None:
         """Wait until something is true of what it said."""
@@ -146,9 +147,8 @@ class Peers:
 
     def run(self, command: Sequence[str], **environment: str) -> Program:
         """Any program that speaks the same lines."""
-        program = Program(command, **environment)
-        self._running.append(program)
-        return program
+        self._running.append(Program(command, **environment))
+        return self._running[-1]
 
     def _have(self, version: str, install: Callable[[str, Path], str]) -> Path:
         folder = CACHE / version
@@ -184,9 +184,17 @@ def _install_javascript(version: str, folder: Path) -> str:
         return "the test peer nep-js needs node and npm, which this computer does not have"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    npm = shutil.which("npm") or "npm"
     commands = (
-        [npm, "install", "--silent", "--no-audit", "--no-fund", "--prefix", str(folder), JAVASCRIPT_PEER],
+        [
+            shutil.which("npm") or "npm",
+            "install",
+            "--silent",
+            "--no-audit",
+            "--no-fund",
+            "--prefix",
+            str(folder),
+            JAVASCRIPT_PEER,
+        ],
         ["node", "-e", f"require({json.dumps(str(folder / 'node_modules' / 'nep-js'))})"],
     )
     return _run_all(commands, "the test peer nep-js", folder)
@@ -260,9 +268,9 @@ def fixed_ports() -> Iterator[None]:
 @pytest.fixture
 def peers(fixed_ports: None) -> Iterator[Peers]:
     """Programs of the original NEP, ended after the test."""
-    peers = Peers()
-    yield peers
-    peers.close()
+    started = Peers()
+    yield started
+    started.close()
 
 
 @pytest.fixture
@@ -290,8 +298,6 @@ def start_again(peers: Peers, nep_home: str) -> Callable[[], Program]:
 
 def start_master(peers: Peers, address: str) -> Program:
     """Start `nep master` and wait until it answers."""
-    from nep.masters import is_running
-
     program = peers.run_native(["-m", "nep", "master"])
     if not is_running(address, LONG_S):
         raise AssertionError(f"the master does not answer\n{program.printed}")
