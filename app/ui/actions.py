@@ -59,7 +59,7 @@ TABLE: tuple[Row, ...] = (
     Row("run.step", "Run", "Step", "F10", "step-forward"),
     Row("run.stop", "Run", "Stop the program and all robots", "F12", "square", above=True, everywhere=True),
     Row("robots.virtual", "Robots", "Use the virtual robot", "", "bot"),
-    Row("robots.show", "Robots", "Show the robot", "", "eye"),
+    Row("robots.show", "Robots", "Try what a robot can do", "", "eye"),
     Row("help.shortcuts", "Help", "Keyboard shortcuts", "F1", "keyboard"),
     Row("help.about", "Help", "About NEP Studio", "", "info"),
 )

@@ -36,7 +36,6 @@ class SensorRow(QWidget):
         self.title = sensor.title[:1].upper() + sensor.title[1:]
         self.reading = Reading()
         self.large = True
-        self.height_px = 0
         self._yes_s: float | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(self.title)
@@ -54,18 +53,8 @@ class SensorRow(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
-        return QSize(260, max(self.height_px, self.least_height()))
-
-    def least_height(self) -> int:
-        """The height that its words need."""
         least = ROW["comfortable" if self.large else "compact"]
-        return max(least, round(self._theme.scaled(least)))
-
-    def set_height(self, pixels: int) -> None:
-        """Be as high as this, when the words fit."""
-        if pixels != self.height_px:
-            self.height_px = pixels
-            self.updateGeometry()
+        return QSize(260, max(least, round(self._theme.scaled(least))))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -123,9 +112,10 @@ class SensorsPanel(PanelWidget):
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(scroll)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages.setMinimumSize(1, 1)
+        self._frame = QVBoxLayout(self)
+        self._frame.setContentsMargins(0, 0, 0, 0)
+        self._frame.addWidget(self.pages)
 
     def refresh(self) -> None:
         fleet = self.session.fleet
@@ -160,15 +150,14 @@ class SensorsPanel(PanelWidget):
             self.empty.say(f"{link.name} has no sensors", "Its description names none.")
 
     def _fit_rows(self) -> None:
-        """Whole rows fill the place, so that none is cut; the others are scrolled to, row by row."""
+        """Leave the rest below the last whole row empty; the others are scrolled to, row by row."""
         if not self.rows:
             return
         room = self.height() - self._column.contentsMargins().top()
-        least = self.rows[0].least_height()
-        fitting = max(1, room // least)
-        height = -(-room // fitting) if fitting < len(self.rows) else least
-        for row in self.rows:
-            row.set_height(height)
+        height = self.rows[0].sizeHint().height()
+        fitting = max(1, room // height)
+        below = room - fitting * height if fitting < len(self.rows) else 0
+        self._frame.setContentsMargins(0, 0, 0, max(0, below))
         self._scroll.verticalScrollBar().setSingleStep(height)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -182,6 +171,7 @@ class SensorsPanel(PanelWidget):
     def set_density(self, density: Density) -> None:
         for row in self.rows:
             row.large = density == "comfortable"
+            row.updateGeometry()
         super().set_density(density)
 
     def shut(self) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from PySide6.QtCore import QObject, QPoint, QRectF, Qt
+from PySide6.QtCore import QObject, QPoint, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QAction,
     QGuiApplication,
@@ -27,7 +27,7 @@ from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets.paint import RIGHT, box, words
 
-CUT_ON = frozenset({"xcb", "offscreen", "minimal"})
+CUT_ON = frozenset({"xcb"})
 MARK, TEXT_LEFT = 15, 33
 
 
@@ -42,9 +42,14 @@ def make_round(widget: QWidget) -> None:
 def cut(widget: QWidget, radius: float) -> None:
     """Cut a popup to its round corners where nobody mixes windows."""
     if QGuiApplication.platformName() in CUT_ON:
-        path = QPainterPath()
-        path.addRoundedRect(QRectF(widget.rect()), radius, radius)
-        widget.setMask(QRegion(path.toFillPolygon().toPolygon()))
+        widget.setMask(round_region(widget.size(), radius))
+
+
+def round_region(size: QSize, radius: float) -> QRegion:
+    """The pixels of a box with round corners."""
+    path = QPainterPath()
+    path.addRoundedRect(QRectF(0, 0, size.width(), size.height()), radius, radius)
+    return QRegion(path.toFillPolygon().toPolygon())
 
 
 class Menu(QMenu):
@@ -113,6 +118,6 @@ class EditMenu(QObject):
         standard = self._field.createStandardContextMenu()
         menu = Menu(self._theme, self._field)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        standard.setParent(menu)  # its actions live as long as the menu that shows them
+        menu.destroyed.connect(standard.deleteLater)  # whose actions they are
         menu.addActions(standard.actions())
         menu.popup(self._field.mapToGlobal(at))

@@ -1,0 +1,91 @@
+"""Menus in the design's look, also those of fields."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
+
+from app.ui.theme import Theme
+from app.ui.widgets import Choice
+from app.ui.widgets.menus import EditMenu, Menu, round_region
+
+# without a screen nothing can grab the keyboard, which every popup asks for
+pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def shown(qtbot, theme: Theme, place: QWidget, *actions: QAction) -> Menu:
+    theme.apply()
+    qtbot.addWidget(place)
+    place.show()
+    menu = Menu(theme, place)
+    menu.addActions(list(actions))
+    menu.popup(QPoint(20, 20))
+    qtbot.waitUntil(menu.isVisible)
+    return menu
+
+
+def test_the_corners_are_round_and_the_edges_straight() -> None:
+    region = round_region(QSize(200, 100), 8)
+    for corner in (QPoint(0, 0), QPoint(199, 0), QPoint(1, 98), QPoint(199, 99)):
+        assert not region.contains(corner)
+    for edge in (QPoint(100, 0), QPoint(0, 50), QPoint(199, 50), QPoint(100, 99), QPoint(3, 3)):
+        assert region.contains(edge)
+
+
+def test_words_marks_and_keys_are_painted(qtbot, theme: Theme) -> None:
+    place = QWidget()
+    plain, marked = QAction("&Copy", place), QAction("&Copy", place)
+    marked.setCheckable(True)
+    marked.setChecked(True)
+    marked.setShortcut("Ctrl+C")
+    off = QAction("&Copy", place)
+    off.setEnabled(False)
+    menu = shown(qtbot, theme, place, plain, marked, off)
+    image = menu.grab().toImage()
+    looks = []
+    for action in (plain, marked, off):
+        rect = menu.actionGeometry(action).adjusted(4, 4, -4, -4)
+        left = image.copy(rect.left(), rect.top(), 24, rect.height())
+        middle = image.copy(rect.left() + 24, rect.top(), 60, rect.height())
+        right = image.copy(rect.right() - 60, rect.top(), 56, rect.height())
+        looks.append((left, middle, right))
+    assert looks[0][0] != looks[1][0]  # the check
+    assert looks[0][1] == looks[1][1]  # the words stand in one column
+    assert looks[0][2] != looks[1][2]  # the key
+    assert looks[0][1] != looks[2][1]  # what is off is paler
+    menu.close()
+
+
+def test_a_field_offers_its_editing_in_our_menu(qtbot, theme: Theme) -> None:
+    field = QLineEdit("hello")
+    EditMenu(theme, field)
+    theme.apply()
+    qtbot.addWidget(field)
+    field.show()
+    field.selectAll()
+    field.customContextMenuRequested.emit(QPoint(5, 5))
+    menu = QApplication.activePopupWidget()
+    assert isinstance(menu, Menu)
+    cut = next(action for action in menu.actions() if action.text().replace("&", "").startswith("Cut"))
+    cut.trigger()
+    assert field.text() == ""
+    with qtbot.waitSignal(menu.destroyed):
+        menu.close()
+
+
+def test_the_list_of_a_choice_has_no_frame_of_the_system(qtbot, theme: Theme) -> None:
+    theme.apply()
+    choice = Choice(theme, [(name, name) for name in ("one", "two", "three", "four", "five")])
+    qtbot.addWidget(choice)
+    choice.show()
+    choice.showPopup()
+    popup = choice.view().window()
+    qtbot.waitUntil(popup.isVisible)
+    assert popup.windowFlags() & Qt.WindowType.FramelessWindowHint
+    QTest.keyClick(choice.view(), Qt.Key.Key_Down)
+    QTest.keyClick(choice.view(), Qt.Key.Key_Return)
+    assert choice.value == "two"
