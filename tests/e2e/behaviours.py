@@ -25,7 +25,8 @@ def text(value: str) -> Block:
 
 
 def say(words: str, below: Block | None = None, robot: str = "Pepper", model: str = "pepper") -> Block:
-    return block(f"robot_{model}_do_say", below=below, fields={"ROBOT": robot}, TEXT=text(words))
+    made = block(f"robot_{model}_do_say", below=below, fields={"ROBOT": robot}, TEXT=text(words))
+    return {**made, "id": f"say {words}"}
 
 
 def turn(degrees: float) -> Block:

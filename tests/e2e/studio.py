@@ -96,16 +96,16 @@ class Person:
 
     def choose(self, menu: str, entry: str) -> None:
         """Choose an entry of a menu of the menu bar."""
-        self._entry("QMenuBar", menu)
-        self._entry("QMenu", entry)
+        self._entry("bar", menu)
+        self._entry("popup", entry)
 
     def pick(self, entry: str) -> None:
         """Choose an entry of the menu that is open."""
-        self._entry("QMenu", entry)
+        self._entry("popup", entry)
 
     def _entry(self, kind: str, text: str) -> None:
         def found() -> Seen | None:
-            bars = [each for each in self.look() if each["kind"] == kind]
+            bars = [each for each in self.look() if each.get("menu") == kind]
             entries = [entry for each in bars for entry in each.get("entries", [])]
             return next((e for e in entries if e["text"].replace("&", "").split("\t")[0] == text), None)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import nep
 from tests.e2e.studio import Studio, amber, middle
 from tests.e2e.waiting import until
+from tests.e2e.x11 import Picture
 
 pytestmark = pytest.mark.timeout(110)
 
@@ -88,12 +90,20 @@ def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address:
         until(lambda: 0 < (pose.listen()[1] or {}).get("theta", 0) < 30, "the robot turns")
         studio.click("Stop", kind="StopButton")
         studio.says("Pepper stopped (")
+        proof = studio.find(kind="Result")
+        until(lambda: green(studio.picture(proof)), "the result of the stop stands on green")
         answered = until(lambda: _stops(answers), "the robot answers the stop")
         assert {answer["state"] for answer in answered} <= {"accepted", "succeeded"}
         until(lambda: turning in studio.outlined("stopped"), "the block where it stopped is outlined")
         assert not studio.outlined("running")
         resting = until(lambda: pose.listen()[1], "the robot says where it is")["theta"]
         assert 0 < resting < 30
+
+
+def green(picture: Picture) -> bool:
+    """Whether most of it is a green tint."""
+    red, green, blue = (int(value) for value in np.median(picture.reshape(-1, 3), axis=0))
+    return green > red + 5 and green > blue
 
 
 def _stops(answers: nep.Subscriber) -> list[dict]:

@@ -118,9 +118,12 @@ def _tell(widget, application) -> dict:
         "in": _panel(widget),
         "window": widget.isWindow(),
     }
+    if widget in _web_views():
+        told["pid"] = widget.page().renderProcessPid()
     if isinstance(widget, QAbstractItemView):
         told["rows"] = _rows(widget)
     if isinstance(widget, (QMenu, QMenuBar)):
+        told["menu"] = "bar" if isinstance(widget, QMenuBar) else "popup"
         told["entries"] = [
             {"text": action.text(), "rect": _at(widget, QRect(widget.actionGeometry(action)))}
             for action in widget.actions()

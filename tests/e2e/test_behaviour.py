@@ -1,0 +1,107 @@
+"""Behaviours by mouse: pause and step, errors on their block, the Python text, examples, robots that go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+import nep
+from tests.e2e.behaviours import block, forever, number, say, started, turn, write
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(110)
+
+
+@pytest.fixture
+def with_robot(start: Callable[..., Studio], tmp_path: Path) -> Callable[[dict], Studio]:
+    """Studio with the virtual robot and this script."""
+
+    def open_script(script: dict) -> Studio:
+        studio = start(str(write(tmp_path / "Mine.nepb", script)))
+        studio.choose("Robots", "Use the virtual robot")
+        studio.says("Pepper ready", 40)
+        studio.spot("[data-id=started]")
+        return studio
+
+    return open_script
+
+
+def test_an_error_stands_on_its_block_as_a_sentence(with_robot: Callable[[dict], Studio]) -> None:
+    walk = block("robot_pepper_do_walk", fields={"ROBOT": "Pepper"}, DISTANCE=number(2))
+    studio = with_robot(started(walk))
+    studio.click("Run", kind="RunButton")
+    until(lambda: studio.outlined("error") == ["walk"], "the block has its error", 40)
+    assert "something is in the way" in str(studio.page("document.body.textContent"))
+    studio.says("Stopped by a problem")
+
+
+def test_pause_step_and_go_on(with_robot: Callable[[dict], Studio], address: str) -> None:
+    studio = with_robot(started(forever(say("One", say("Two")))))
+    studio.click("Run", kind="RunButton")
+    studio.says("Pepper says “")
+    studio.click("Pause")
+    studio.says("Paused at “")
+    (first,) = until(lambda: studio.outlined("stopped"), "the next block is outlined")
+    studio.click("Step")
+    until(lambda: studio.outlined("stopped") not in ([], [first]), "another block is next")
+    studio.click("Go on")
+    until(lambda: studio.outlined("running"), "it runs")
+    studio.screen.key("F12")
+    studio.says("Pepper stopped (")
+
+
+def test_the_python_of_the_blocks_can_be_read_and_copied(with_robot: Callable[[dict], Studio]) -> None:
+    studio = with_robot(started(say("Good morning")))
+    studio.click("Python")
+    studio.says("Good morning")
+    compile(studio.find(kind="ProgramView")["text"], "program", "exec")
+    studio.click("Copy")
+    studio.says("Copied the program")
+    studio.click("Blocks")
+    studio.spot("[data-id=started]")
+
+
+def test_an_example_of_the_start_page_runs_to_its_end(studio: Studio) -> None:
+    studio.click("Use the virtual robot")
+    studio.says("Pepper ready", 40)
+    studio.choose("File", "Start page")
+    card = studio.find(kind="ExampleCard")
+    studio.screen.click(card["rect"][0] + 60, card["rect"][1] + 60)
+    studio.says("Greeting")
+    until(studio.blocks, "its blocks are there")
+    studio.click("Run", kind="RunButton")
+    studio.says("Finished after", 60)
+    studio.says("Pepper stopped (")
+
+
+def test_a_robot_that_dies_is_missed_and_comes_back(with_robot: Callable[[dict], Studio]) -> None:
+    studio = with_robot(started(forever(turn(30))))
+    (robot,) = studio.children("app.robots.simulated")
+    robot.kill()
+    studio.says("The virtual robot Pepper has ended.")
+    until(lambda: "not connected" in str(studio.page("document.body.textContent")), "the toolbox says so")
+    studio.says("Pepper is not connected, so ")
+    studio.click("Connect Pepper")
+    studio.says("Pepper ready", 40)
+    studio.open_category("Movement")
+    studio.screen.key("Escape")
+    studio.click("Run", kind="RunButton")
+    until(lambda: "turn" in studio.outlined("running"), "its blocks run again")
+    with nep.node("listener", master=studio.master) as node:
+        states = node.new_sub("/Pepper/state", "json")
+        until(lambda: states.receive(1.0).payload["moving"], "it moves")
+    studio.screen.key("F12")
+    studio.says("Pepper stopped (")
+
+
+def test_the_page_that_is_killed_comes_back_with_its_blocks(with_robot: Callable[[dict], Studio]) -> None:
+    studio = with_robot(started(say("Good morning")))
+    before = set(studio.blocks())
+    page = studio.find(kind="QWebEngineView")["pid"]
+    psutil.Process(page).kill()
+    until(lambda: studio.find(kind="QWebEngineView")["pid"] not in (0, page), "there is another page")
+    until(lambda: set(studio.blocks()) == before, "every block is back")
