@@ -38,7 +38,7 @@ BEHAVIOUR = Layout(
     "blocks",
     "comfortable",
     (
-        Column(1032, ((("behaviour",), 626), (("problems",), 124))),
+        Column(0, ((("behaviour",), 626), (("problems",), 124))),
         Column(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140))),
     ),
     ("robot", "camera"),
@@ -52,7 +52,7 @@ DEVELOPER = Layout(
     (
         Column(640, ((("topics",), 780),)),
         Column(330, ((("inspector",), 780),)),
-        Column(446, ((("image",), 380), (("console", "alerts"), 394))),
+        Column(0, ((("image",), 380), (("console", "alerts"), 394))),
     ),
     ("topics", "inspector"),
     {"robots": "topics", "robot": "image", "camera": "image"},

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QHideEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow
+from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QApplication, QMainWindow
 
+from app.ui import dock_state
+from app.ui.dock_sizes import fit
 from app.ui.docks import Dock
 from app.ui.layouts import Layout
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -19,7 +19,6 @@ AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
 NARROW_PX = 1280
-STATE_VERSION = 1
 
 
 class Workbench(QMainWindow):
@@ -39,7 +38,9 @@ class Workbench(QMainWindow):
         self.docks: dict[str, Dock] = {}
         self._floating: list[Dock] = []
         self._narrow = False
+        self._wide = QByteArray()  # the state before a narrow window made tabs
         self._arranged = False
+        self._moved = False  # a person moved the lines between panels
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
         # the width of the gaps was asked for before the property was there, and is remembered
@@ -56,11 +57,6 @@ class Workbench(QMainWindow):
         self._size_timer = QTimer(self)  # sizes hold only when Qt has laid the docks out
         self._size_timer.setSingleShot(True)
         self._size_timer.timeout.connect(self._size)
-
-    @property
-    def arrangement(self) -> Layout:
-        """The layout that it shows."""
-        return self._layout
 
     # -- opening ----------------------------------------------------------------------------------
 
@@ -82,8 +78,7 @@ class Workbench(QMainWindow):
             above = head
             for names in rows:
                 above = self._put(names, above, None) or above
-        self._arranged = True
-        self._narrow = False
+        self._arranged, self._moved, self._narrow = True, False, False
         self._size()
         self._size_timer.start(0)
         self._adapt()
@@ -110,14 +105,14 @@ class Workbench(QMainWindow):
         return first
 
     def _size(self) -> None:
-        widths: list[tuple[QDockWidget, int]] = []
-        for column in self._layout.columns:
-            rows = [(self.docks[names[0]], high) for names, high in column.rows if names[0] in self.docks]
-            if not rows:
-                continue
-            widths.append((rows[0][0], column.width))
-            self.resizeDocks([dock for dock, _ in rows], [high for _, high in rows], DOWN)
-        self.resizeDocks([dock for dock, _ in widths], [wide for _, wide in widths], ACROSS)
+        """Give everything its size, unless a person moved the lines between the panels."""
+        if self._arranged and not self._moved:
+            fit(self, self._layout, self.docks, self._theme.size("gap", self._layout.density))
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
+            self._moved = self._moved or self.isSeparator(event.position().toPoint())
+        return super().event(event)
 
     def _dock(self, name: str) -> Dock | None:
         """The dock of a panel, made when it is the first time; None when there is no such panel."""
@@ -185,6 +180,7 @@ class Workbench(QMainWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._adapt()
+        self._size()
 
     def _adapt(self) -> None:
         narrow = self.width() < NARROW_PX
@@ -195,20 +191,24 @@ class Workbench(QMainWindow):
             return
         self._narrow = narrow
         if narrow:
+            self._wide = self.saveState(dock_state.VERSION)
             self.tabifyDockWidget(first, second)
             first.raise_()
         elif second in self.tabifiedDockWidgets(first):
-            self.splitDockWidget(first, second, self._split_of(first.description.name))
-            self._size_timer.start(0)
+            self._widen()
+        self._size_timer.start(0)
         self._tabs_soon()
 
-    def _split_of(self, name: str) -> Qt.Orientation:
-        second = self._layout.narrow[1]
-        same = any(
-            {name, second} <= {n for names, _ in column.rows for n in names}
-            for column in self._layout.columns
-        )
-        return DOWN if same else ACROSS
+    def _widen(self) -> None:
+        """Put back what was before the tabs: Qt makes a tab of whatever is split off a tab."""
+        opened = self.open_names()
+        if not self.restoreState(self._wide, dock_state.VERSION):
+            self.arrange()
+        for name, dock in self.docks.items():
+            if name not in opened:
+                dock.close()
+            elif dock.isHidden():
+                self.open(name)
 
     def hideEvent(self, event: QHideEvent) -> None:
         self._floating = [dock for dock in self.docks.values() if dock.isFloating() and dock.isVisible()]
@@ -255,29 +255,28 @@ class Workbench(QMainWindow):
             "open": [
                 name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
             ],
-            "docks": base64.b64encode(self.saveState(STATE_VERSION).data()).decode("ascii"),
+            "docks": dock_state.written(self.saveState(dock_state.VERSION)),
+            "wide": dock_state.written(self._wide),
             "panels": {name: dock.panel.save_state() for name, dock in self.docks.items()},
             "narrow": self._narrow,
+            "moved": self._moved,
         }
 
     def restore(self, saved: Mapping[str, object]) -> bool:
         """Put everything where `save` found it; False (and the first arrangement) if it does not fit."""
         self.arrange()
-        names, docks, panels = saved.get("open"), saved.get("docks"), saved.get("panels")
-        if not isinstance(names, list) or not isinstance(docks, str):
+        names, panels = saved.get("open"), saved.get("panels")
+        if not isinstance(names, list):
             return False
         for name in names:
             if isinstance(name, str) and name not in self.docks:
                 self.open(name)
-        try:
-            state = base64.b64decode(docks, validate=True)
-        except (binascii.Error, ValueError):
-            return False
-        if not self.restoreState(QByteArray(state), STATE_VERSION):
+        if not self.restoreState(dock_state.read(saved.get("docks")), dock_state.VERSION):
             self.arrange()
             return False
         self._size_timer.stop()  # a person's sizes, not those of `arrange`
-        self._narrow = saved.get("narrow") is True
+        self._wide = dock_state.read(saved.get("wide"))
+        self._narrow, self._moved = saved.get("narrow") is True, saved.get("moved") is True
         for name, dock in self.docks.items():
             state_of = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(state_of, Mapping):

@@ -243,7 +243,26 @@ def test_a_narrow_window_makes_tabs_and_a_wide_one_ends_them(
     window.resize(1150, 750)
     qtbot.waitUntil(lambda: docks["camera"] in bench.tabifiedDockWidgets(docks["robot"]))
     window.resize(1440, 900)
-    qtbot.waitUntil(lambda: bench.tabifiedDockWidgets(docks["robot"]) == [])
+    qtbot.waitUntil(lambda: docks["camera"].y() > docks["robot"].y())
+    QTest.qWait(50)  # Qt would make a tab again when control returns to the event loop
+    assert bench.tabifiedDockWidgets(docks["robot"]) == []
+    assert docks["sensors"].y() > docks["camera"].y()
+
+
+def test_what_was_closed_in_a_narrow_window_stays_closed_in_a_wide_one(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    window.resize(1440, 900)
+    bench = window.show_layout("developer")
+    window.resize(1150, 750)
+    qtbot.waitUntil(lambda: bench.docks["inspector"] in bench.tabifiedDockWidgets(bench.docks["topics"]))
+    bench.docks["console"].close()
+    bench.open("robots")
+    window.resize(1440, 900)
+    qtbot.waitUntil(lambda: bench.docks["inspector"].x() > bench.docks["topics"].x())
+    assert "console" not in bench.open_names()
+    assert "robots" in bench.open_names()
 
 
 def test_everything_comes_back_at_the_next_start(qtbot, theme: Theme, session: Session, home: Path) -> None:

@@ -1,0 +1,79 @@
+"""Which panel grows with the window."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.ui.commands import Commands
+from app.ui.dock_sizes import shares
+from app.ui.main_window import MainWindow
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "room", "keep", "sizes"),
+    [
+        ([120, 384], 1424, [False, True], [1040, 384]),
+        ([327, 275, 140], 742, [False, False, True], [327, 275, 140]),
+        ([327, 275, 140], 1042, [False, False, True], [490, 412, 140]),
+        ([120, 384], 300, [False, True], [120, 384]),
+    ],
+)
+def test_what_is_kept_and_what_grows(
+    wanted: list[int], room: int, keep: list[bool], sizes: list[int]
+) -> None:
+    assert shares(wanted, room, keep=keep) == sizes
+
+
+def widths(window: MainWindow, *names: str) -> list[int]:
+    bench = window.bench
+    assert bench is not None
+    return [bench.docks[name].width() for name in names]
+
+
+def test_side_columns_keep_their_width_in_every_window(qtbot, window: MainWindow, commands: Commands) -> None:
+    window.show()
+    commands.run("layout.behaviour")
+    for size in ((1440, 900), (1920, 1080), (1100, 700), (1440, 900)):
+        window.resize(*size)
+        qtbot.waitUntil(lambda: abs(widths(window, "robot")[0] - 384) <= 1)
+    assert window.bench is not None
+    docks = window.bench.docks
+    qtbot.waitUntil(lambda: abs(docks["sensors"].height() - 140) <= 1)
+    assert abs(docks["problems"].height() - 124) <= 1
+    commands.run("layout.developer")
+    names = ("topics", "inspector")
+    for size in ((1440, 900), (1920, 1080)):
+        window.resize(*size)
+        qtbot.waitUntil(
+            lambda: (
+                [
+                    abs(a - b) <= 1
+                    for a, b in zip(widths(window, "topics", "inspector"), (640, 330), strict=True)
+                ]
+                == [True, True]
+            )
+        )
+
+
+def test_a_line_that_a_person_moved_stays_there(qtbot, window: MainWindow, commands: Commands) -> None:
+    window.show()
+    commands.run("layout.behaviour")
+    bench = window.bench
+    assert bench is not None
+    qtbot.waitUntil(lambda: abs(bench.docks["robot"].width() - 384) <= 1)
+    line = QPoint(bench.docks["robot"].x() - 4, 300)
+    assert bench.isSeparator(line)
+    QTest.mousePress(bench, Qt.MouseButton.LeftButton, pos=line)
+    QTest.mouseMove(bench, line - QPoint(100, 0))
+    QTest.qWait(30)  # Qt moves the line when control returns to the event loop
+    QTest.mouseRelease(bench, Qt.MouseButton.LeftButton, pos=line - QPoint(100, 0))
+    qtbot.waitUntil(lambda: bench.docks["robot"].width() > 450)
+    window.resize(1460, 900)
+    QTest.qWait(20)
+    assert bench.docks["robot"].width() > 450
+    commands.run("layout.reset")
+    qtbot.waitUntil(lambda: abs(bench.docks["robot"].width() - 384) <= 1)
