@@ -50,10 +50,7 @@ def test_side_columns_keep_their_width_in_every_window(qtbot, window: MainWindow
         window.resize(*size)
         qtbot.waitUntil(
             lambda: (
-                [
-                    abs(a - b) <= 1
-                    for a, b in zip(widths(window, "topics", "inspector"), (640, 330), strict=True)
-                ]
+                [abs(a - b) <= 1 for a, b in zip(widths(window, *names), (640, 330), strict=True)]
                 == [True, True]
             )
         )
