@@ -14,6 +14,7 @@ from nep.records import (
     SubscriberCount,
     SubscriberRecord,
 )
+from nep.views import Alert
 
 __all__ = ["Census", "Member", "Publisher", "Subscriber"]
 
@@ -61,6 +62,7 @@ class Census:
         self._topic_revisions: dict[str, int] = {}
         self._publishing: dict[str, dict[int, Member]] = {}
         self._subscribing: dict[str, dict[int, Member]] = {}
+        self._reported: dict[str, tuple[Alert, ...]] = {}
 
     # ---- reading
 
@@ -195,6 +197,17 @@ class Census:
             member = self._subscribing.get(known.record.topic, {}).get(subscriber)
             if member is not None:
                 member.hung.add(reporter.node.name)
+
+    def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
+        """These are all alerts of `source` now."""
+        if self._reported.get(source, ()) != alerts:
+            self._reported[source] = alerts
+            self.revision += 1
+
+    @property
+    def reported_alerts(self) -> tuple[Alert, ...]:
+        """What is attached to the master reported."""
+        return tuple(alert for alerts in self._reported.values() for alert in alerts)
 
     def _changed(self, topic: str) -> None:
         self.revision += 1

@@ -38,6 +38,7 @@ from nep.requests import (
     Renew,
     Renewed,
     Reply,
+    ReportAlerts,
     ReportMissing,
     Request,
     Seen,
@@ -154,7 +155,9 @@ class Graph:
             return self._renew(request, now)
         if isinstance(request, Look):
             return Seen(self.epoch, self.revision, self.view())
-        if not isinstance(request, Ping):
+        if isinstance(request, ReportAlerts):
+            self._census.report_alerts(request.source, request.alerts)
+        elif not isinstance(request, Ping):
             self._note(request, out)
         return Done(self.epoch, self.revision)
 

@@ -18,7 +18,7 @@ from nep.records import (
     SubscriberCount,
     SubscriberRecord,
 )
-from nep.views import GraphView
+from nep.views import Alert, GraphView
 
 # ---- requests
 
@@ -99,6 +99,17 @@ class ReportMissing:
 
 
 @dataclass(frozen=True)
+class ReportAlerts:
+    """All alerts of something attached to the master (`source`) that are present now; earlier ones are cured.
+
+    Only for `Master.submit`: it has no form on the wire.
+    """
+
+    source: str
+    alerts: tuple[Alert, ...]
+
+
+@dataclass(frozen=True)
 class Look:
     """Ask for the whole graph. Answered by `Seen`."""
 
@@ -117,6 +128,7 @@ Request = (
     | Leave
     | Renew
     | ReportMissing
+    | ReportAlerts
     | Look
     | Ping
 )
@@ -237,6 +249,6 @@ def node_of(request: Request) -> str | None:
     """The id of the node that a request speaks for; None when it speaks for nobody."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id
-    if isinstance(request, Look | Ping):
+    if isinstance(request, ReportAlerts | Look | Ping):
         return None
     return request.node_id

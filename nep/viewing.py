@@ -81,6 +81,7 @@ def _publisher_info(member: Member, publisher: Publisher) -> PublisherInfo:
 
 
 def _alerts(census: Census) -> Iterator[Alert]:
+    yield from census.reported_alerts
     by_name: dict[str, int] = {}
     for member in census.members.values():
         by_name[member.node.name] = by_name.get(member.node.name, 0) + 1

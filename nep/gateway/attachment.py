@@ -17,7 +17,7 @@ from nep.gateway.processes import SystemProcesses
 from nep.graph import Alert, GraphView
 from nep.masters import Master
 from nep.nodes import Node
-from nep.requests import Reply, Request
+from nep.requests import Reply, ReportAlerts, Request
 
 _WANTED_FILES = 8192
 _WAIT_S = 3.0
@@ -50,7 +50,7 @@ class GatewayAttachment:
                 return None  # the master is ending, and the graph with it
 
         def report(alerts: tuple[Alert, ...]) -> None:
-            del alerts  # until the graph takes alerts
+            submit(ReportAlerts("gateway", alerts))
 
         native = Native(make_node, Listing(submit, master.epoch), report)
         file = self._file or default_file(int(address.rpartition(":")[2]))
