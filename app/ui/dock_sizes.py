@@ -29,10 +29,14 @@ def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[in
 def fit(bench: QMainWindow, layout: Layout, docks: Mapping[str, QDockWidget], gap: int) -> None:
     """Give every column and every panel in it the size of the layout, in the room that there is now."""
     columns = []
+    before: list[QDockWidget] = []
     for column in layout.columns:
-        rows = [(_first(docks, names), height) for names, height in column.rows]
-        there = [(dock, height) for dock, height in rows if dock is not None]
-        there = [pair for place, pair in enumerate(there) if not _with_one_before(bench, there, place)]
+        there = []
+        for names, height in column.rows:
+            dock = _first(docks, names)
+            if dock is not None and not any(dock in bench.tabifiedDockWidgets(b) for b in before):
+                before.append(dock)
+                there.append((dock, height))
         if there:
             columns.append((column.width, there))
     if not columns:
@@ -62,8 +66,3 @@ def _first(docks: Mapping[str, QDockWidget], names: Sequence[str]) -> QDockWidge
         if dock is not None and not dock.isHidden() and not dock.isFloating():
             return dock
     return None
-
-
-def _with_one_before(bench: QMainWindow, there: Sequence[tuple[QDockWidget, int]], place: int) -> bool:
-    """Whether a panel became a tab of one above it, as in narrow windows."""
-    return any(there[place][0] in bench.tabifiedDockWidgets(other) for other, _ in there[:place])

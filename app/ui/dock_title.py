@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.panels.base import Density, PanelWidget
 from app.ui.theme import Theme
-from app.ui.widgets import IconButton, label, paint, set_role
+from app.ui.widgets import Elided, IconButton, label, paint, set_role
 
 
 class TitleTab(QAbstractButton):
@@ -53,7 +53,7 @@ class DockTitle(QWidget):
         self._whole = panel.replaces_title()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name = label("", "titleLarge" if density == "comfortable" else "title", role="textSecondary")
-        self._subtitle = label("", "code", role="textTertiary")
+        self._subtitle = Elided("code", "textTertiary")
         self._tabs: list[TitleTab] = []
         self.more = IconButton(theme, "ellipsis", f"More about {panel.title()}")
         self.more.clicked.connect(lambda: self.menu_wanted.emit(self.more))

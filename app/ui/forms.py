@@ -35,7 +35,8 @@ class ActionForm(QWidget):
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(10)
         self._grid.setVerticalSpacing(ROW_GAP)
-        self._grid.setColumnMinimumWidth(0, LABEL_WIDTH)
+        self._fit()
+        theme.changed.connect(self._fit)
         self._grid.setColumnStretch(1, 1)
         self.more = Button(theme, "More", "chevron-down", kind="ghost", size="small")
         self.more.setCheckable(True)
@@ -59,7 +60,6 @@ class ActionForm(QWidget):
         control = control_for(self._theme, parameter, options)
         name = label(sentence_case(parameter.title), "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
-        name.setMaximumWidth(LABEL_WIDTH)
         wrong = label("", "small", role="error", wrap=True)
         wrong.hide()
         cell = QWidget()
@@ -78,6 +78,9 @@ class ActionForm(QWidget):
         self._sentences[parameter.name] = wrong
         self._rows[parameter.name] = (name, cell)
         control.changed(self._told)
+
+    def _fit(self) -> None:
+        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
 
     def _told(self) -> None:
         self.show_problems(())

@@ -12,7 +12,7 @@ from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.theme import Theme
-from app.ui.widgets import IconButton, Line, SearchField, label, paint
+from app.ui.widgets import Elided, IconButton, Line, SearchField, label, paint
 from app.ui.words import grouped, latency_words, size_words
 
 if TYPE_CHECKING:
@@ -94,7 +94,8 @@ class Legend(QWidget):
         self.setAccessibleName("A bar at the left marks changed values")
 
     def sizeHint(self) -> QSize:
-        return QSize(round(paint.width_of(self._theme.font("small"), self.WORDS)) + 10, 18)
+        font = self._theme.font("small")
+        return QSize(round(paint.width_of(font, self.WORDS)) + 10, max(18, round(paint.height_of(font)) + 2))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -117,8 +118,7 @@ class Foot(QWidget):
         self.copy_path = IconButton(theme, "link", "Copy path", "Ctrl+Shift+C", size=26)
         self.copy_value.clicked.connect(copy_value)
         self.copy_path.clicked.connect(copy_path)
-        self.facts = label("", "small", role="textTertiary")
-        self.facts.setToolTip("The latency is from publishing to being shown here")
+        self.facts = Elided("small", "textTertiary")
         self.legend = Legend(theme)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)

@@ -61,9 +61,9 @@ class RobotItem(QAbstractButton):
         bold = theme.font("bodyLarge")
         bold.setWeight(bold.Weight.DemiBold)
         ink = theme.colour("selectedText" if self.isChecked() else "text")
-        half = rect.height() / 2
-        words = QRectF(60, half - 19, rect.width() - 66 - self.chip.width() - 12, 19)
+        high = max(19.0, paint.height_of(bold) - 2)
+        words = QRectF(60, rect.center().y() - high, rect.width() - 66 - self.chip.width() - 12, high)
         paint.words(painter, words, self.name, bold, ink)
         where = theme.colour("textSecondary")
-        paint.words(painter, words.translated(0, 19), self._where, theme.font("small"), where)
+        paint.words(painter, words.translated(0, high), self._where, theme.font("small"), where)
         painter.end()

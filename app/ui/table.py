@@ -41,7 +41,8 @@ class Column(Generic[Row]):
     """One column: its head, its width, and what it shows of a row.
 
     ``key`` gives what it is sorted by (None at the end, whatever the direction); without it the column
-    can't be sorted. ``stretch`` takes the width that is left. ``tip`` is the tooltip's sentence.
+    can't be sorted. ``stretch`` takes the width that is left. ``tip`` is the tooltip's sentence. Where there
+    is too little room (large text) columns that ``yield`` are not shown, the largest number first.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Column(Generic[Row]):
     figures: bool = False
     stretch: bool = False
     tip: Callable[[Row], str] | None = None
+    yields: int = 0
 
 
 @dataclass(slots=True)

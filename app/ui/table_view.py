@@ -81,8 +81,7 @@ class TableView(QTableView, Generic[Row]):
         self.setMouseTracking(True)
         self.clicked.connect(self._open)
         self.set_row_height(26, large=False)
-        for place, column in enumerate(self.columns):
-            self.setColumnWidth(place, column.width)
+        self.fit_columns()
 
     @property
     def shown_columns(self) -> Sequence[Column[Row]]:
@@ -103,6 +102,7 @@ class TableView(QTableView, Generic[Row]):
         rows.setMinimumSectionSize(height)
         rows.setDefaultSectionSize(height)
         self.horizontalHeader().setFixedHeight(height + 1)
+        self.fit_columns()
         self.viewport().update()
 
     def cell_font(self, cell: Cell) -> QFont:
@@ -176,11 +176,17 @@ class TableView(QTableView, Generic[Row]):
         self.fit_columns()
 
     def fit_columns(self) -> None:
-        """Give the stretching column what the others leave, at least its own width."""
+        """Give the stretching column what the others leave, at least its own width; columns may give way."""
+        scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
+        shown = set(range(len(self.columns)))
+        yielding = sorted((c.yields, place) for place, c in enumerate(self.columns) if c.yields)
+        room = self.viewport().width()
+        while yielding and sum(scaled[place] for place in shown) > room:
+            shown.discard(yielding.pop()[1])
+        rest = room - sum(scaled[place] for place in shown if not self.columns[place].stretch)
         for place, column in enumerate(self.columns):
-            if column.stretch:
-                others = sum(self.columnWidth(other) for other in range(len(self.columns)) if other != place)
-                self.setColumnWidth(place, max(column.width, self.viewport().width() - others))
+            self.setColumnHidden(place, place not in shown)
+            self.setColumnWidth(place, max(scaled[place], rest) if column.stretch else scaled[place])
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

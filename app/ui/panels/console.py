@@ -120,8 +120,10 @@ class LineDelegate(QStyledItemDelegate):
         rect.setLeft(rect.left() + 18)
         paint.words(painter, rect, record.level, font, theme.colour(role))
         rect.setLeft(rect.left() + max(38.0, paint.width_of(font, "error")) + 12)
-        paint.words(painter, rect, record.origin, font, theme.colour("textTertiary"))
-        rect.setLeft(rect.left() + min(paint.width_of(font, record.origin), rect.width() * 0.4) + 7)
+        origin = QRectF(rect)
+        origin.setWidth(min(paint.width_of(font, record.origin) + 1, rect.width() * 0.4))
+        paint.words(painter, origin, record.origin, font, theme.colour("textTertiary"))
+        rect.setLeft(origin.right() + 7)
         paint.words(painter, rect, record.text, font, theme.colour("text"))
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 UNFOLDED = 4
 LIST_FROM_WIDTH = 760
+FINDER_FROM_WIDTH, ABOUT_FROM_WIDTH = 560, 440
 
 
 class RobotsPanel(PanelWidget):
@@ -132,7 +133,6 @@ class RobotsPanel(PanelWidget):
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         scroll.setWidget(inside)
         return scroll
 
@@ -256,10 +256,21 @@ class RobotsPanel(PanelWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        wide = event.size().width() >= LIST_FROM_WIDTH or len(self.items) > 1
+        self._fit()
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self._fit()
+
+    def _fit(self) -> None:
+        """Large text and narrow places: the actions first, then the list, then what is known of the robot."""
+        width = self.width() / self.theme.scaled(1.0)
+        wide = width >= LIST_FROM_WIDTH or len(self.items) > 1
         self.list.setVisible(wide)
         self._list_line.setVisible(wide)
-        self.finder.setVisible(event.size().width() >= 560)
+        room = width - (LIST_WIDTH if wide else 0)
+        self.finder.setVisible(room >= FINDER_FROM_WIDTH)
+        self.about.setVisible(room >= ABOUT_FROM_WIDTH)
 
     def focus_filter(self) -> bool:
         self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)

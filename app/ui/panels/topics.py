@@ -103,11 +103,12 @@ COLUMNS: tuple[Column[Topic], ...] = (
         lambda t: t.publishers,
         figures=True,
         tip=_publishers_tip,
+        yields=4,
     ),
     Column("rate", "Rate /s", 56, rate_cell, lambda t: t.rate_hz, figures=True),
-    Column("bandwidth", "Bandwidth", 77, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True),
-    Column("age", "Age", 56, age_cell, lambda t: t.age_s, figures=True),
-    Column("loss", "Loss", 60, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip),
+    Column("bandwidth", "Bandwidth", 77, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
+    Column("age", "Age", 56, age_cell, lambda t: t.age_s, figures=True, yields=2),
+    Column("loss", "Loss", 60, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
 )
 
 
@@ -137,7 +138,7 @@ class TopicsPanel(PanelWidget):
         self.table.opened.connect(self._open)
         self.table.filter_wanted.connect(self.focus_filter)
         self.table.order_changed.connect(self._rebuild)
-        self.foot = label(FOOT, "small", role="textTertiary")
+        self.foot = label(FOOT, "small", role="textTertiary", wrap=True)
         self.foot.setContentsMargins(12, 5, 12, 6)
         self.foot.setMinimumWidth(0)
         self.empty = EmptyState(theme, "radio-tower", "", "")
@@ -253,7 +254,8 @@ class _Filter(SearchField):
         super().__init__(panel.theme, "Filter", "/")
         self._panel = panel
         self.setAccessibleName("Filter topics")
-        self.setFixedWidth(190)
+        self.setMaximumWidth(190)
+        self.setMinimumWidth(90)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.text():

@@ -36,6 +36,30 @@ def set_role(shown: QLabel, role: str) -> None:
         shown.style().polish(shown)
 
 
+class Elided(QLabel):
+    """A line that is shortened in its middle where there is too little room; the tooltip has the whole."""
+
+    def __init__(self, kind: str, role: str, least: int = 0) -> None:
+        """``least`` pixels are always asked for."""
+        super().__init__()
+        self._least = least
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setProperty("kind", kind)
+        self.setProperty("role", role)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(min(self._least, super().sizeHint().width()), super().minimumSizeHint().height())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        room = self.contentsRect()
+        fits = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideMiddle, room.width() + 1)
+        self.setToolTip(self.text() if fits != self.text() else "")
+        painter = QPainter(self)
+        painter.setPen(self.palette().color(self.foregroundRole()))
+        painter.drawText(room, int(paint.LEFT), fits)
+        painter.end()
+
+
 class Line(QWidget):
     """A line of 1 px: between groups of buttons (upright) or between parts of a panel."""
 
