@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
@@ -15,33 +14,11 @@ from app.core.document import Document
 from app.core.fleet import Fleet
 from app.core.run_view import RunState, RunView, result_words, stop_words, unanswered_words, view_of
 from app.core.runner import Runner, RunnerEvent
+from app.core.stop_events import OneStopped, RobotAnswered, StopDone
 from app.core.stopping import RobotStop, RobotStopper, StopReport
 from app.errors import AppError
 
 STOP_TIMEOUT_S = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class StopDone:
-    """Every robot was told to stop, and answered or not."""
-
-    number: int
-    report: StopReport
-
-
-@dataclass(frozen=True, slots=True)
-class RobotAnswered:
-    """One robot answered while others are waited for."""
-
-    number: int
-    robot: RobotStop
-
-
-@dataclass(frozen=True, slots=True)
-class OneStopped:
-    """One robot was told to stop while nothing ran."""
-
-    report: StopReport
 
 
 class Network(Protocol):
@@ -70,6 +47,7 @@ class Runs:
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._runner: Runner | None = None
         self._used: tuple[str, ...] = ()
+        self._labels: Mapping[str, str] = {}
         self._run = RunState()
         self._stop_number = 0
         self._stop_thread: threading.Thread | None = None
@@ -160,10 +138,12 @@ class Runs:
         run = self._run
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
-                run.says = event.says or run.says
+                if event.says and event.says != run.says:
+                    run.says = event.says
+                    self._console.add("info", run.name, event.says)
                 self._mark(running=event.blocks, stopped=self.stopped_blocks)
             case "paused" if run.state in {"running", "paused"}:
-                run.state, run.paused_at = "paused", event.says
+                run.state, run.paused_at = "paused", self._place(event)
                 run.pause_began_s = run.pause_began_s or self._clock()
                 self._mark(stopped=event.blocks)
             case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
@@ -212,11 +192,17 @@ class Runs:
         except AppError as error:
             self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
             return
-        self._runner, self._used = runner, program.robots
+        self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._run = RunState(
             "running", self._document.name, started_s=self._clock(), last_words=self._run.last_words
         )
         self._console.add("info", self._run.name, "started")
+
+    def _place(self, event: RunnerEvent) -> str:
+        """The block at which the program is held: in words, or its name when they hold a quotation."""
+        if "“" not in event.says or not event.blocks:
+            return event.says
+        return self._labels.get(event.blocks[0], event.says)
 
     def _on_error(self, event: RunnerEvent) -> None:
         self._console.add("error", self._run.name, event.text)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.core.alerts import Alerts
+from app.core.arrivals import arrivals
 from app.core.companions import CompanionFailed, Companions
 from app.core.console import Console
 from app.core.document import Document
@@ -22,7 +23,7 @@ from app.core.images import Images
 from app.core.journal import Journal
 from app.core.mailbox import Drained, Mailbox
 from app.core.runner import RunnerEvent
-from app.core.runs import OneStopped, RobotAnswered, Runs, StopDone
+from app.core.runs import Runs
 from app.core.settings import Settings
 from app.core.source import (
     GraphSeen,
@@ -33,6 +34,7 @@ from app.core.source import (
     Source,
     WatchFailed,
 )
+from app.core.stop_events import OneStopped, RobotAnswered, StopDone
 from app.core.stopping import RobotStopper
 from app.core.topics import Topics, total_rate_hz
 from app.core.watches import Watch, Watches
@@ -216,16 +218,11 @@ class Session:
                 pass
 
     def _on_graph(self, view: GraphView, now: float) -> None:
-        before = {topic.name for topic in self.topics.live()}
-        first = self.graph is None
+        if self.graph is not None:
+            for line in arrivals(self.graph, view):
+                self.console.add("info", "master", line)
         self.graph = view
         self.topics.update(view, now)
-        for topic in self.topics.live():
-            if topic.name not in before and not first:
-                count = topic.publishers
-                self.console.add(
-                    "info", "master", f"{topic.name} is new, {count} publisher{'' if count == 1 else 's'}"
-                )
         self.fleet.update(view)
         self._count_losses(view, now)
         self.messages_per_s = total_rate_hz(list(view.topics.values()))

@@ -1,0 +1,39 @@
+"""The console's lines about who came and who left."""
+
+from __future__ import annotations
+
+from app.core.arrivals import arrivals
+from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+
+
+def graph(**nodes: list[str]) -> GraphView:
+    infos = {name: NodeInfo(name, name, "here", 1, "python", "native", 0) for name in nodes}
+    topics: dict[str, TopicInfo] = {}
+    for number, (name, published) in enumerate(nodes.items()):
+        for topic in published:
+            old = topics.get(topic, TopicInfo(topic, "json", "json"))
+            publisher = PublisherInfo(number, name, (), False, 0, 0, 0, None, None, None)
+            topics[topic] = TopicInfo(topic, "json", "json", (*old.publishers, publisher))
+    return GraphView(1, 1, infos, topics)
+
+
+def test_a_robot_is_one_line_not_one_for_each_topic() -> None:
+    assert arrivals(graph(), graph(Pepper=["/a", "/b", "/c"])) == ["Pepper is here with 3 topics"]
+
+
+def test_a_single_topic_is_named_with_its_publishers() -> None:
+    assert arrivals(graph(one=[]), graph(one=["/a"])) == ["/a is new, 1 publisher"]
+    assert arrivals(graph(one=[], two=[]), graph(one=["/a"], two=["/a"])) == ["/a is new, 2 publishers"]
+
+
+def test_a_node_without_new_topics_and_one_that_left() -> None:
+    assert arrivals(graph(one=["/a"]), graph(two=["/a"])) == ["two is here", "one has left"]
+
+
+def test_nothing_new_is_no_line() -> None:
+    assert arrivals(graph(one=["/a"]), graph(one=["/a"])) == []
+
+
+def test_a_topic_that_nobody_publishes_is_not_new() -> None:
+    after = GraphView(1, 1, {}, {"/a": TopicInfo("/a", "json", "json")})
+    assert arrivals(graph(), after) == []
