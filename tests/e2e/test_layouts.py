@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.e2e.studio import Studio, middle
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(110)

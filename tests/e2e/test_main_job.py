@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import nep
-from tests.e2e.studio import Studio, amber, middle
+from tests.e2e.person import amber, middle
+from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 from tests.e2e.x11 import Picture
 

@@ -9,7 +9,8 @@ import pytest
 
 import nep
 from tests.e2e.behaviours import forever, say, started, turn, write
-from tests.e2e.studio import Studio, middle
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(110)

@@ -1,0 +1,168 @@
+"""A person in front of one window: what they see of it, and their hands on mouse and keyboard."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+
+from tests.e2e.waiting import until
+from tests.e2e.x11 import Picture, Screen
+
+STEP_S = 20.0
+RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
+Seen = Mapping[str, object]
+
+
+def middle(rect: Sequence[float]) -> tuple[float, float]:
+    return rect[0] + rect[2] / 2, rect[1] + rect[3] / 2
+
+
+class Person:
+    """Looks at one window of Studio and uses mouse and keyboard, as X events, on it."""
+
+    def __init__(self, screen: Screen, ask: Callable[..., object]) -> None:
+        self.screen, self._ask = screen, ask
+
+    # -- looking ----------------------------------------------------------------------------------
+
+    def look(self) -> list[Seen]:
+        """Every widget that can be seen now; nothing while the window is not up."""
+        seen = self._ask("look")
+        assert not isinstance(seen, dict), seen
+        return seen or []
+
+    def all(self, name: str = "", **wanted: object) -> list[Seen]:
+        """Those with this accessible name or text, and these other properties."""
+        return [
+            each
+            for each in self.look()
+            if (not name or name in (each["name"], each["text"]))
+            and each["rect"][2] > 0
+            and all(each[key] == value for key, value in wanted.items())
+        ]
+
+    def find(self, name: str = "", within_s: float = STEP_S, **wanted: object) -> Seen:
+        """The first such widget, once it is there."""
+        return until(lambda: self.all(name, **wanted), f"no {name} {wanted}", within_s)[0]
+
+    def says(self, words: str, within_s: float = STEP_S) -> str:
+        """Wait until something in the window says these words; all that it says."""
+
+        def found() -> str:
+            seen = self.look()
+            texts = (str(each[key]) for each in seen for key in ("name", "text", "description"))
+            return next((text for text in texts if words in text), "")
+
+        return until(found, f"nothing says {words!r}", within_s)
+
+    def rows(self, table: str) -> list[Seen]:
+        """The rows of a table or tree by its accessible name."""
+        return [row for each in self.all(table) for row in each.get("rows", [])]
+
+    def row(self, table: str, first: str, within_s: float = STEP_S) -> Seen:
+        """The row whose first cell says this, once it is there."""
+        return until(
+            lambda: next((row for row in self.rows(table) if row["texts"][0] == first), None),
+            f"no row {first!r} in {table}",
+            within_s,
+        )
+
+    def values(self, tree: str) -> dict[str, str]:
+        """The rows of a tree as words: what is told to a screen reader."""
+        return {row["texts"][0]: row["spoken"].partition(", ")[2] for row in self.rows(tree)}
+
+    def picture(self, seen: Seen) -> Picture:
+        """The pixels of a widget, from the screen."""
+        return self.screen.picture(seen["rect"])
+
+    # -- doing ------------------------------------------------------------------------------------
+
+    def click(self, name: str = "", **wanted: object) -> Seen:
+        """Click on a widget when it can be clicked."""
+        seen = self.find(name, enabled=True, **wanted)
+        self.screen.click(*middle(seen["rect"]))
+        return seen
+
+    def choose(self, menu: str, entry: str) -> None:
+        """Choose an entry of a menu of the menu bar."""
+        self._entry("bar", menu)
+        self._entry("popup", entry)
+
+    def pick(self, entry: str) -> None:
+        """Choose an entry of the menu that is open."""
+        self._entry("popup", entry)
+
+    def _entry(self, kind: str, text: str) -> None:
+        def found() -> Seen | None:
+            bars = [each for each in self.look() if each.get("menu") == kind]
+            entries = [entry for each in bars for entry in each.get("entries", [])]
+            return next((e for e in entries if e["text"].replace("&", "").split("\t")[0] == text), None)
+
+        self.screen.click(*middle(until(found, f"no entry {text!r}")["rect"]))
+
+    # -- in the web view --------------------------------------------------------------------------
+
+    def page(self, script: str) -> object:
+        """What a script that only reads finds in the page of the block editor."""
+        found = self._ask("script", script=script)
+        return json.loads(found) if isinstance(found, str) and found else None
+
+    def spot(self, selector: str) -> list[float]:
+        """Where an element of the page is on the screen, once it stands still."""
+        script = (
+            "(e => e && (r => r.width > 0 && [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
+            f"(document.querySelector({json.dumps(selector)}))"
+        )
+        before: list[object] = []
+
+        def still() -> list[float] | None:
+            before.append(self.page(script))
+            return before[-1] if before[-1] and before[-1] == before[-2:][0] and len(before) > 1 else None
+
+        left, top, width, height = until(still, f"no {selector} in the page")
+        view = self.find(kind="QWebEngineView")["rect"]
+        return [view[0] + left, view[1] + top, width, height]
+
+    def point(self, selector: str, dx: float = 14, dy: float = 14) -> None:
+        """Click into an element of the page, near its corner."""
+        rect = self.spot(selector)
+        self.screen.click(rect[0] + dx, rect[1] + dy)
+
+    def open_category(self, name: str) -> None:
+        """Open a category of the toolbox and wait for its blocks."""
+        self.find(kind="QWebEngineView")
+        labels = "[...document.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+        until(lambda: name in (self.page(f"{labels}.map(e => e.textContent)") or []), f"no category {name}")
+        rect = self.page(
+            f"(r => [r.left, r.top, r.width, r.height])"
+            f"({labels}.find(e => e.textContent == {json.dumps(name)}).getBoundingClientRect())"
+        )
+        view = self.find(kind="QWebEngineView")["rect"]
+        self.screen.click(view[0] + rect[0] + rect[2] / 2, view[1] + rect[1] + rect[3] / 2)
+        self.spot(".blocklyFlyout .blocklyDraggable")
+
+    def drag(self, selector: str, x: float, y: float) -> None:
+        """Drag a block by its left edge; the place under the mouse ends at (x, y)."""
+        left, top, _, _ = self.spot(selector)
+        self.screen.move(left + 12, top + 18)
+        self.screen.press()
+        self.screen.glide(left + 60, top + 40, 6)
+        self.screen.glide(x, y)
+        self.screen.release()
+
+    def blocks(self, selector: str = "") -> list[str]:
+        """The ids of the blocks in the workspace, or of those of them that match."""
+        where = ".blocklyBlockCanvas [data-id]" + selector
+        inside = "e => !e.closest('.blocklyFlyout') && !e.classList.contains('blocklyInsertionMarker')"
+        ids = f"[...document.querySelectorAll({json.dumps(where)})].filter({inside}).map(e => e.dataset.id)"
+        return self.page(ids) or []
+
+    def outlined(self, state: str) -> list[str]:
+        """The ids of the blocks outlined as "running", "stopped" or "error"."""
+        marks = f"[...document.querySelectorAll('.nepState-{state}')]"
+        return self.page(f"{marks}.map(e => e.parentElement.dataset.id)") or []
+
+
+def amber(picture: Picture) -> int:
+    """How many pixels have the colour of what runs now."""
+    return int((abs(picture.astype(int) - RUNNING).max(axis=2) < 12).sum())
