@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QFontMetricsF, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from app.ui.theme import Theme
 from app.ui.widgets import (
@@ -292,3 +292,16 @@ def test_controls_grow_with_their_text(theme: Theme, percent: int) -> None:
     assert button.sizeHint().width() >= font.horizontalAdvance("Use the virtual robot") + 20
     chip = Chip(theme, "virtual, ready")
     assert chip.sizeHint().height() >= QFontMetricsF(theme.font("small")).height()
+
+
+def test_an_empty_place_that_is_low_says_its_words_without_the_picture(qtbot, theme: Theme) -> None:
+    theme.apply()
+    empty = EmptyState(theme, "eye", "No robot, no sensors", "Connect a robot to see what it feels.")
+    qtbot.addWidget(empty)
+    empty.resize(384, 98)
+    empty.show()
+    title, text = (shown for shown in empty.findChildren(QLabel))
+    assert not empty._tile.isVisible()
+    qtbot.waitUntil(lambda: title.geometry().bottom() <= text.mapTo(empty, QPoint(0, 0)).y())
+    empty.resize(384, 300)
+    assert empty._tile.isVisible()

@@ -170,9 +170,7 @@ class RobotPanel(PanelWidget):
             self.empty.say(
                 "No robot is connected", "With the virtual robot you can try everything at once.", "bot"
             )
-            start = EmptyAction(
-                "Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot", primary=True
-            )
+            start = EmptyAction("Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot")
             self.empty.set_actions([start])
         elif link.virtual:
             self.empty.say(f"{link.name} is coming", "It is drawn as soon as it tells where it is.")

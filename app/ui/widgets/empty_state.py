@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.icons import paint_icon
@@ -15,8 +15,9 @@ from app.ui.widgets import paint
 from app.ui.widgets.button import Button
 from app.ui.widgets.small import label
 
-TILE = 56
+TILE, BELOW_TILE = 56, 16
 TEXT_WIDTH = 400
+MARGIN = 12
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,12 @@ class _Tile(QWidget):
     def __init__(self, theme: Theme, icon: str) -> None:
         super().__init__()
         self._theme, self.icon = theme, icon
-        self.setFixedSize(TILE, TILE)
+        self.setFixedSize(TILE, TILE + BELOW_TILE)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
         painter = QPainter(self)
-        paint.box(painter, QRectF(self.rect()), theme.radius("palette"), theme.colour("sunken"))
+        paint.box(painter, QRectF(0, 0, TILE, TILE), theme.radius("palette"), theme.colour("sunken"))
         side = theme.size("icon", "empty")
         square = QRectF((TILE - side) / 2, (TILE - side) / 2, side, side)
         paint_icon(painter, square, self.icon, theme.colour("textSecondary"))
@@ -60,11 +61,10 @@ class EmptyState(QWidget):
         for words in (self._title, self._text):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         column = QVBoxLayout(self)
-        column.setContentsMargins(16, 12, 16, 12)
+        column.setContentsMargins(16, MARGIN, 16, MARGIN)
         column.setSpacing(0)
         column.addStretch(1)
         column.addWidget(self._tile, 0, Qt.AlignmentFlag.AlignHCenter)
-        column.addSpacing(16)
         column.addWidget(self._title)
         column.addSpacing(4)
         inner = QHBoxLayout()
@@ -88,6 +88,18 @@ class EmptyState(QWidget):
         if icon is not None:
             self._tile.icon = icon
             self._tile.update()
+        self._fit()
+
+    def _fit(self) -> None:
+        """In a low place the words go before the picture."""
+        width = self.width() - 32
+        high = self._title.heightForWidth(width) + self._text.heightForWidth(min(width, TEXT_WIDTH)) + 4
+        high += self._row.sizeHint().height() if self._buttons else 0
+        self._tile.setVisible(self.height() - 2 * MARGIN >= high + TILE + BELOW_TILE)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
 
     def set_actions(self, actions: Sequence[EmptyAction]) -> None:
         """Other next steps."""
@@ -103,6 +115,7 @@ class EmptyState(QWidget):
             self._row.addWidget(button)
             self._buttons.append(button)
         self._row.addStretch(1)
+        self._fit()
 
     def minimumSizeHint(self) -> QSize:
         return QSize(120, 120)
