@@ -97,18 +97,17 @@ class Life:
         for count, _ in enumerate(self._beat(CAMERA_HZ)):
             is_watched = self._link.watchers("camera") > 0
             is_turn = count % _LOOK_EVERY == 0
+            # who watches sees boxes that belong to this very picture
             if is_watched or is_turn:
-                self.look(publish=is_watched, recognise=is_turn)
+                self.look(publish=is_watched)
 
-    def look(self, *, publish: bool, recognise: bool) -> None:
-        """Take one picture; publish it, and what is recognised in it."""
+    def look(self, *, publish: bool) -> None:
+        """Take one picture, publish it when somebody watches, and what is recognised in it."""
         with self.changed:
             room, lens = self.body.room, lens_of(self.body)
         picture = self._camera.picture(room, lens)
         if publish:
             self._link.sense("camera", picture)
-        if not recognise:
-            return
         seen = {
             "faces": self._eyes.faces(room, lens),
             "balls": self._eyes.balls(picture),
