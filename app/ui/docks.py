@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QAction, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtGui import QAction, QCloseEvent, QCursor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
@@ -19,7 +19,7 @@ from app.ui.dock_title import DockTitle
 from app.ui.panels.base import Density, Panel, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
-from app.ui.widgets.menus import Menu
+from app.ui.widgets.menus import Menu, drop_below
 
 LEAST_BODY = QSize(160, 60)
 
@@ -167,13 +167,43 @@ class Dock(QDockWidget):
             menu.addSeparator()
         icon = self._theme.icon("picture-in-picture-2")
         floating = menu.addAction(icon, "Dock it" if self.isFloating() else "Float")
-        floating.triggered.connect(lambda: self.setFloating(not self.isFloating()))
+        floating.triggered.connect(self._float)
         menu.addAction(self._theme.icon("x"), "Close").triggered.connect(self.close)
         return menu
+
+    def first_stop(self) -> QWidget:
+        """Where the keyboard goes in the panel: what it is about, else the first thing that takes keys."""
+        about = self.panel.focusProxy()
+        if about is not None and about.isVisible():
+            return about
+        step = self.panel.nextInFocusChain()
+        while step is not None and step is not self.panel:
+            takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
+            if takes and step.isVisible() and step.isEnabled() and self.panel.isAncestorOf(step):
+                return step
+            step = step.nextInFocusChain()
+        return self.panel
+
+    def _float(self) -> None:
+        self._let_go()
+        self.setFloating(not self.isFloating())
+        self.activateWindow()
+        self.first_stop().setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self._let_go()
+        super().closeEvent(event)
+
+    def _let_go(self) -> None:
+        """Give up the keyboard: Qt would hand it on as by Tab, and the editor then opens a category."""
+        focus = QApplication.focusWidget()
+        if focus is not None and self.isAncestorOf(focus):
+            focus.clearFocus()
 
     def _show_menu(self, anchor: QWidget | None) -> None:
         menu = self.menu()
         menu.aboutToHide.connect(lambda: QTimer.singleShot(0, menu.deleteLater))
-        place = anchor if anchor is not None else self.title
-        corner = place.rect().bottomLeft() if anchor is not None else place.rect().center()
-        menu.popup(place.mapToGlobal(corner))
+        if anchor is not None:
+            drop_below(menu, anchor)
+        else:
+            menu.popup(QCursor.pos())

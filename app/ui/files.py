@@ -44,17 +44,24 @@ class SystemDialogs:
     def __init__(self, window: QWidget) -> None:
         self._window = window
 
+    def _show(self, dialog: QFileDialog) -> None:
+        """Show a dialog that leaves Stop free: the window can be used, and F12 works in the dialog too."""
+        everywhere = Qt.ShortcutContext.ApplicationShortcut
+        dialog.addActions([act for act in self._window.actions() if act.shortcutContext() == everywhere])
+        dialog.setWindowModality(Qt.WindowModality.NonModal)
+        dialog.show()
+
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog("Open a behaviour", folder, take)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        dialog.open()
+        self._show(dialog)
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog("Save the behaviour", str(Path(suggestion).parent), take)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
-        dialog.open()
+        self._show(dialog)
 
     def _dialog(self, title: str, folder: str, take: Callable[[Path], None]) -> QFileDialog:
         dialog = QFileDialog(self._window, title, folder, FILTER)

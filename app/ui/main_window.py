@@ -272,6 +272,8 @@ class MainWindow(QMainWindow):
             self.state.keep_layouts({name: bench.save() for name, bench in self.benches.items()})
             self.state.keep_theme(self.theme)
             self.hide()
+            if self._moves():
+                self.session.runs.stop()  # told now, answered while the session closes
             for bench in self.benches.values():
                 bench.shut()
             self.session.close()

@@ -234,8 +234,8 @@ class Workbench(QMainWindow):
     def focus_home(self) -> None:
         """Give the keyboard to the panel that the layout is about: the first that shows."""
         dock = next((dock for dock in self.docks.values() if not dock.isHidden()), None)
-        target = dock.panel if dock is not None else self
-        target.setFocus(Qt.FocusReason.OtherFocusReason)
+        if dock is not None:
+            dock.first_stop().setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_panel(self, dock: Dock) -> None:
         """Bring a panel to the front and give it the keyboard."""
@@ -243,9 +243,7 @@ class Workbench(QMainWindow):
         dock.raise_()
         if dock.isFloating():
             dock.activateWindow()
-        target = dock.panel.nextInFocusChain()
-        inside = target if target is not None and dock.panel.isAncestorOf(target) else None
-        (inside or dock.panel).setFocus(Qt.FocusReason.ShortcutFocusReason)
+        dock.first_stop().setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     # -- kept between starts ----------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
 
 from app.core.journal import Journal, left_behind
 from app.core.run_view import RunView
@@ -16,6 +16,7 @@ from app.core.session import Session
 from app.core.settings import Settings
 from app.ui.actions import TABLE, shortcuts
 from app.ui.commands import Commands
+from app.ui.files import SystemDialogs
 from app.ui.main_window import MainWindow
 from app.ui.theme import Theme
 from app.ui.widgets import Button
@@ -476,3 +477,58 @@ def test_a_fault_of_the_session_is_said_once_and_the_window_lives_on(
     assert panel(window, "developer", "topics").refreshed == before + 2
     assert window.banner.banner.accessibleName().endswith("RuntimeError: broken")
     assert len(caplog.records) == 1
+
+
+def test_closing_while_a_program_runs_stops_the_robots_at_once(
+    qtbot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    show(qtbot, window)
+    monkeypatch.setattr(window.session.runs._run, "state", "running")
+    monkeypatch.setattr(window.session.runs, "stop", lambda: done.append("stop"))
+    monkeypatch.setattr(window.session, "close", lambda: done.append("close"))
+    window.close()
+    assert done == ["stop", "close"]
+
+
+def test_an_idle_window_closes_without_a_stop(
+    qtbot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    show(qtbot, window)
+    monkeypatch.setattr(window.session.runs, "stop", lambda: done.append("stop"))
+    window.close()
+    assert done == []
+
+
+def test_a_panel_that_floats_or_closes_does_not_hand_the_keyboard_on(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    commands.run("layout.developer")
+    bench = window.benches["developer"]
+    dock = bench.docks["topics"]
+    dock.title.more.setFocus()
+    qtbot.waitUntil(dock.title.more.hasFocus)
+    floating = next(action for action in dock.menu().actions() if action.text() == "Float")
+    floating.trigger()
+    qtbot.waitUntil(dock.panel.filter.hasFocus)
+    QTest.keyClick(dock, Qt.Key.Key_Escape)
+    dock.close()
+    QTest.qWait(20)
+    focus = QApplication.focusWidget()
+    assert focus is None or not any(d.isAncestorOf(focus) for d in bench.docks.values())
+
+
+def test_files_are_asked_for_without_covering_stop(qtbot, window: MainWindow, commands: Commands) -> None:
+    stops: list[str] = []
+    commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
+    show(qtbot, window)
+    SystemDialogs(window).open("", lambda _path: None)
+    dialog = window.findChild(QFileDialog)
+    assert dialog is not None
+    qtbot.waitUntil(dialog.isVisible)
+    assert not dialog.isModal()
+    QTest.keyClick(dialog, Qt.Key.Key_F12)
+    assert stops == ["stop"]
+    dialog.close()

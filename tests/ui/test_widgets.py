@@ -297,9 +297,11 @@ def test_controls_grow_with_their_text(theme: Theme, percent: int) -> None:
 def test_an_empty_place_that_is_low_says_its_words_without_the_picture(qtbot, theme: Theme) -> None:
     theme.apply()
     empty = EmptyState(theme, "eye", "No robot, no sensors", "Connect a robot to see what it feels.")
-    qtbot.addWidget(empty)
+    place = QWidget()
+    qtbot.addWidget(place)
+    empty.setParent(place)
     empty.resize(384, 98)
-    empty.show()
+    place.show()
     title, text = (shown for shown in empty.findChildren(QLabel))
     assert not empty._tile.isVisible()
     qtbot.waitUntil(lambda: title.geometry().bottom() <= text.mapTo(empty, QPoint(0, 0)).y())

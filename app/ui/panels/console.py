@@ -32,7 +32,7 @@ from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyState, IconButton, paint
-from app.ui.widgets.menus import Menu
+from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
     from app.core.console import LogRecord
@@ -198,7 +198,7 @@ class ConsolePanel(PanelWidget):
             action.setChecked(level == self.level)
             action.triggered.connect(lambda _on=False, level=level: self.set_level(level))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(self.filter.mapToGlobal(self.filter.rect().bottomLeft()))
+        drop_below(menu, self.filter)
 
     def _show_actions(self, at: QPoint) -> None:
         menu = Menu(self.theme, self)

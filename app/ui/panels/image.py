@@ -13,7 +13,7 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_view import PictureView
 from app.ui.robot_boxes import boxes_on, owner_of
 from app.ui.widgets import EmptyState, IconButton
-from app.ui.widgets.menus import Menu
+from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream
@@ -105,7 +105,7 @@ class ImagePanel(PanelWidget):
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(self.choose.mapToGlobal(self.choose.rect().bottomLeft()))
+        drop_below(menu, self.choose)
 
     def more_actions(self) -> list[QAction]:
         inspect = QAction(self.theme.icon("list-tree"), "Show in the inspector", self)

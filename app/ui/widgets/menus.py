@@ -105,6 +105,15 @@ class Menu(QMenu):
             words(painter, inside, key, self.font(), quiet, RIGHT)
 
 
+def drop_below(menu: Menu, anchor: QWidget) -> None:
+    """Open a menu below a button, at its right edge where it would leave the window."""
+    place = anchor.rect().bottomLeft() + QPoint(0, 3)
+    over = anchor.mapTo(anchor.window(), place).x() + menu.sizeHint().width() - anchor.window().width()
+    if over > 0:
+        place.setX(anchor.width() - menu.sizeHint().width())
+    menu.popup(anchor.mapToGlobal(place))
+
+
 class EditMenu(QObject):
     """Gives a field its editing menu in our look."""
 
