@@ -14,6 +14,7 @@ from app.ui.widgets import Button, label
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
+UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
 
 
 class ActionForm(QWidget):
@@ -135,6 +136,7 @@ class ActionForm(QWidget):
                 parts.append(title)
             elif parameter.kind in NUMBERS and value is not None:
                 number = f"{value:g}" if isinstance(value, float) else str(value)
-                words = f"{parameter.title} {number}"
+                title = "for" if UNITS.get(parameter.unit or "") == parameter.title else parameter.title
+                words = f"{title} {number}"
                 parts.append(f"{words}{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}")
         return ", ".join(parts)

@@ -44,7 +44,7 @@ class Look(Protocol):
 
 SHEET = """
 QToolTip {{
-    background: {tooltip}; color: {tooltipText}; border: 1px solid {tooltip}; padding: 4px 8px;
+    background: {tooltip}; color: {tooltipText}; border: 1px solid {tooltip}; padding: 1px 2px;
     font-size: {small_text}px;
 }}
 QMainWindow, QDialog {{ background: {window}; }}
@@ -78,8 +78,13 @@ QLineEdit:disabled {{ color: {textDisabled}; border-color: {border}; }}
 QPlainTextEdit[bare="true"], QTextEdit[bare="true"] {{ border: none; border-radius: 0; background: {panel}; }}
 QComboBox QAbstractItemView {{
     background: {raised}; color: {text}; border: 1px solid {borderStrong}; padding: 4px; outline: none;
+    border-radius: {panel_radius}px;
     selection-background-color: {selected}; selection-color: {selectedText};
 }}
+QComboBox {{ combobox-popup: 0; }}
+QComboBox QAbstractItemView::item {{ padding: 5px 8px; border-radius: {small}px; border: none; }}
+QComboBox QAbstractItemView::item:hover {{ background: {hover}; }}
+QComboBox QAbstractItemView::item:selected {{ background: {selected}; color: {selectedText}; }}
 
 QAbstractItemView {{
     background: {panel}; color: {text}; border: none; outline: none; alternate-background-color: {sunken};

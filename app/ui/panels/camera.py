@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_view import PictureView, rate_sentence
 from app.ui.robot_boxes import boxes_on, camera_of
-from app.ui.widgets import EmptyAction, EmptyState, label
+from app.ui.widgets import Elided, EmptyAction, EmptyState
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream
@@ -27,7 +27,7 @@ class CameraPanel(PanelWidget):
         self._stream: ImageStream | None = None
         self._watch: Watch | None = None
         self._revision = -1
-        self.rate = label("", "body", role="textSecondary")
+        self.rate = Elided("body", "textSecondary", least=60)
         self.header = [self.rate]
         self.view = PictureView(self.theme, fill=True, labelled=False)
         self.view.setAccessibleName("What the robot sees")

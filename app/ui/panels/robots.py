@@ -21,7 +21,7 @@ from app.errors import AppError, RobotInputError
 from app.ui.action_card import ActionCard
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.robot_item import LIST_WIDTH, STATUS, RobotItem
-from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Line, SearchField, label
+from app.ui.widgets import Button, Chip, Elided, EmptyAction, EmptyState, Line, SearchField, label
 from app.ui.words import plural
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 UNFOLDED = 4
 LIST_FROM_WIDTH = 760
-FINDER_FROM_WIDTH, ABOUT_FROM_WIDTH = 560, 440
+FINDER_FROM_WIDTH, ABOUT_FROM_WIDTH = 620, 440
 
 
 class RobotsPanel(PanelWidget):
@@ -94,8 +94,8 @@ class RobotsPanel(PanelWidget):
         theme = self.theme
         self.name = label("", "heading")
         self.chip = Chip(theme)
-        self.about = label("", "body", role="textSecondary")
-        self.health = label("", "small", role="textTertiary")
+        self.about = Elided("body", "textSecondary")
+        self.health = Elided("small", "textTertiary")
         self.health.hide()
         about = QVBoxLayout()
         about.setSpacing(0)

@@ -6,7 +6,15 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QWheelEvent
-from PySide6.QtWidgets import QAbstractButton, QComboBox, QHBoxLayout, QLineEdit, QSizePolicy, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QComboBox,
+    QHBoxLayout,
+    QLineEdit,
+    QSizePolicy,
+    QStyledItemDelegate,
+    QWidget,
+)
 
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
@@ -25,6 +33,7 @@ LAMP_COLOURS: tuple[tuple[str, str], ...] = (
     ("#b06bff", "violet"),
 )
 SWATCH = 32
+SHOWN_AT_ONCE = 12
 
 
 class Choice(QComboBox):
@@ -40,6 +49,8 @@ class Choice(QComboBox):
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         for value, words in options:
             self.addItem(words, value)
+        self.setItemDelegate(QStyledItemDelegate(self))  # which the style sheet can give room
+        self.setMaxVisibleItems(SHOWN_AT_ONCE)
         make_round(self.view().window())
 
     @property
