@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from nep.views import GraphView
+from nep.views import GraphView, NodeInfo
 
 NATIVE = "native"
 GATEWAY = "gateway"
+PROGRAM = "program "
 FEW = 2
 
 
 def arrivals(before: GraphView, after: GraphView) -> list[str]:
     """Sentences: nodes that came with their topics, single new topics, nodes that left."""
     lines = []
-    came = [id for id, node in after.nodes.items() if id not in before.nodes and node.generation != GATEWAY]
+    came = [id for id, node in after.nodes.items() if id not in before.nodes and _told(node)]
     told: set[str] = set()
     for node in came:
         topics = [name for name, info in after.topics.items() if _publishes(after, name, node)]
@@ -27,9 +28,14 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
         count = len(info.publishers)
         if count and name not in told and not _published(before, name):
             lines.append(f"{name} is new, {count} publisher{'' if count == 1 else 's'}")
-    left = [node for id, node in before.nodes.items() if id not in after.nodes and node.generation != GATEWAY]
+    left = [node for id, node in before.nodes.items() if id not in after.nodes and _told(node)]
     lines += [f"{node.name} has left" for node in left]
     return lines
+
+
+def _told(node: NodeInfo) -> bool:
+    # a behaviour's program is told by its run, the gateway is part of the master
+    return node.generation != GATEWAY and not node.name.startswith(PROGRAM)
 
 
 def _published(view: GraphView, topic: str) -> bool:

@@ -37,3 +37,9 @@ def test_nothing_new_is_no_line() -> None:
 def test_a_topic_that_nobody_publishes_is_not_new() -> None:
     after = GraphView(1, 1, {}, {"/a": TopicInfo("/a", "json", "json")})
     assert arrivals(graph(), after) == []
+
+
+def test_the_gateway_and_a_behaviours_program_are_told_elsewhere() -> None:
+    assert arrivals(graph(), graph(**{"program Greeting": []})) == []
+    gateway = NodeInfo("g", "gateway", "here", 1, "python", "gateway", 0)
+    assert arrivals(graph(), GraphView(1, 1, {"g": gateway}, {})) == []
