@@ -54,6 +54,7 @@ class FocusRing(QWidget):
             application.focusChanged.connect(self._focus_changed)
             application.focusWindowChanged.connect(self._window_changed)
         self._window_changed(window.windowHandle())
+        window.installEventFilter(self)  # its handle is made when it is first shown
 
     @property
     def target(self) -> QWidget | None:
@@ -110,6 +111,8 @@ class FocusRing(QWidget):
                 self._by_mouse = kind != QEvent.Type.KeyPress
                 if self._by_mouse:
                     self._follow(None)
+        elif kind == QEvent.Type.Show and watched is self._home:
+            self._window_changed(self._home.windowHandle())
         elif kind in _MOVES:
             self._place()
         return super().eventFilter(watched, event)

@@ -176,6 +176,23 @@ def test_after_the_mouse_a_hidden_widget_hands_on_no_ring(qtbot, place: QWidget,
     assert ring.target is first
 
 
+def test_the_first_press_in_a_window_counts_as_well(qtbot, theme: Theme) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    column = QVBoxLayout(window)
+    ring = FocusRing(theme, window)
+    run, pause = Button(theme, "Run"), Button(theme, "Pause")
+    run.clicked.connect(lambda: run.setEnabled(False))
+    column.addWidget(run)
+    column.addWidget(pause)
+    window.show()
+    QTest.qWait(1)
+    at = run.mapTo(window, run.rect().center())
+    QTest.mouseClick(window.windowHandle(), Qt.MouseButton.LeftButton, pos=at)
+    assert not run.isEnabled()
+    assert ring.target is None
+
+
 def test_the_ring_ends_where_a_scrolled_place_ends(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     inside = QWidget()

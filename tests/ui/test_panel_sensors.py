@@ -104,6 +104,15 @@ def test_values_follow_and_the_last_yes_is_remembered(qtbot, window, monkeypatch
     assert touch.accessibleDescription() == "no 14 s ago"
 
 
+def test_a_robot_that_went_away_feels_nothing(qtbot, window) -> None:
+    panel = window.make(PANEL, (384, 300))
+    qtbot.addWidget(panel)
+    assert isinstance(panel, SensorsPanel)
+    window.session.fleet.links[0].state = "away"
+    panel.refresh()
+    assert {row.reading for row in panel.rows} == {Reading()}
+
+
 def test_the_rows_are_painted_otherwise_when_values_differ(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 300))
     qtbot.addWidget(panel)
