@@ -44,10 +44,18 @@ def ready(message: object) -> str | None:
 def to_command(robot: Robot, action: str, given: Mapping[str, object], command_id: str) -> dict[str, object]:
     """The message for ``robot_action``; RobotInputError when the robot would refuse the input.
 
-    The stop is the cancel that RIZE's older drivers know; newer ones ignore it.
+    The stop is the cancel that RIZE's older drivers know. It has every key of an action, because drivers that
+    do not know it read them: to those it is a primitive that they have not, which fails and does no harm.
     """
     if action == robot.safe_stop.action:
-        return {"node": "cancel", "robots": robot.name, "state": "idle", "times": 0, "id": command_id}
+        return {
+            "node": "cancel",
+            "primitives": {"primitive": "stop", "input": "all", "options": "none"},
+            "robots": robot.name,
+            "state": "idle",
+            "times": 0,
+            "id": command_id,
+        }
     known = robot.action(action)
     if known is None:
         raise RobotInputError((f"{robot.name} can't “{action}”",))

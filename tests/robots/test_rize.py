@@ -57,7 +57,10 @@ def test_bad_input_never_leaves(robot):
 
 
 def test_the_stop_is_what_older_drivers_know(robot):
-    assert rize.to_command(robot, "stop", {}, "7")["node"] == "cancel"
+    stop = rize.to_command(robot, "stop", {}, "7")
+    assert stop["node"] == "cancel"
+    action = rize.to_command(robot, "say", {"text": "hi"}, "8")
+    assert stop.keys() == action.keys()  # drivers that do not know a cancel read what every action has
 
 
 def test_answers_are_read(robot):
