@@ -25,6 +25,7 @@ class CompanionFailed:
     what: str
     sentence: str
     detail: str
+    is_robot: bool = True
 
 
 def module_command(module: str) -> list[str]:
@@ -126,7 +127,7 @@ class Companions:
         try:
             self._master = start_process(self._address, owner_pid=os.getpid())
         except (NepError, OSError) as error:
-            self._post_event(CompanionFailed("master", "The master can't be started.", str(error)))
+            self._post_event(CompanionFailed("master", "The master can't be started.", str(error), False))
 
 
 def _no_console() -> int:

@@ -25,15 +25,15 @@ def loads(text: str | bytes) -> object:
     return _deeply(lambda: json.loads(text))
 
 
-def dumps(value: object, indent: int | None = None) -> str:
-    """The JSON text of a value, not escaped beyond what JSON asks for. RecursionError beyond 9000 levels.
+def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> str:
+    """The JSON text of a value; with ``ascii`` all else is escaped. RecursionError beyond 9000 levels.
 
     A deep value is not indented: its text would be mostly spaces.
     """
     try:
-        return json.dumps(value, indent=indent, ensure_ascii=False)
+        return json.dumps(value, indent=indent, ensure_ascii=ascii)
     except RecursionError:
-        return _deeply(lambda: json.dumps(value, ensure_ascii=False))
+        return _deeply(lambda: json.dumps(value, ensure_ascii=ascii))
 
 
 def same(one: object, other: object) -> bool:

@@ -193,6 +193,7 @@ class Session:
             case MasterFound():
                 self.master = MasterState("connected", event.address)
                 self.alerts.cure("master")
+                self.alerts.cure("companion:master")
                 self.console.add("info", "master", f"connected to {event.address}")
             case MasterLost():
                 self._on_master_lost(event)
@@ -207,6 +208,8 @@ class Session:
                     "error",
                     event.sentence,
                     event.detail.splitlines()[-1] if event.detail else "",
+                    button="Start it again" if event.is_robot else None,
+                    action=f"connect:{event.what}" if event.is_robot else None,
                 )
             case WatchFailed():
                 self.alerts.put(
@@ -255,6 +258,8 @@ class Session:
             self._robots_seen = self.fleet.revision
             robots = [link.robot for link in self.fleet.connected]
             self.document.set_connected(robots)
+            for robot in robots:
+                self.alerts.cure(f"companion:{robot.name}")
             if self.stopper is not None:
                 self.source.submit("watch over the robots", lambda _node: self._give_robots())
         if self.topics.revision != self._topics_seen:

@@ -5,10 +5,11 @@ One pipe in each direction, so that what was said first arrives first.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal, Slot
+
+from app.core import deep_json
 
 Json = dict[str, object]
 
@@ -30,12 +31,12 @@ class BlocklyBridge(QObject):
 
     def tell(self, command: str, payload: object) -> None:
         """Send one command; the page answers nothing by itself."""
-        self.told.emit(command, json.dumps(payload))
+        self.told.emit(command, deep_json.dumps(payload, ascii=True))
 
     @Slot(result=str)
     def beginning(self) -> str:
         """What the page needs before its first picture: theme, language, motion."""
-        return json.dumps(self._begin())
+        return deep_json.dumps(self._begin(), ascii=True)
 
     @Slot()
     def ready(self) -> None:

@@ -18,6 +18,7 @@ from PySide6.QtWebEngineCore import QWebEnginePage
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app import resources
+from app.core import deep_json
 from app.ui.blockly_bridge import BlocklyBridge, Json
 from app.ui.blockly_page import BlocklyWeb
 from app.ui.blockly_scheme import register_scheme as register_scheme
@@ -270,10 +271,16 @@ class BlocklyView(QWidget):
     def _edited(self, generation: int, workspace: str) -> None:
         if generation != self._generation:
             return
-        self._workspace = json.loads(workspace)
+        self._workspace = _program(workspace)
         self.changed.emit(self._workspace)
 
     def _answered(self, token: int, workspace: str) -> None:
         done = self._waiting.pop(token, None)
         if done is not None:
-            done(json.loads(workspace))
+            done(_program(workspace))
+
+
+def _program(text: str) -> dict[str, object]:
+    """The page's JSON, however long its stacks are."""
+    made = deep_json.loads(text)
+    return made if isinstance(made, dict) else {}

@@ -144,6 +144,18 @@ def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) 
         session.fleet.invoke("Pepper", "fly", {})
 
 
+def test_a_virtual_robot_that_died_is_told_with_its_next_step(session: Session) -> None:
+    session.companions.start_virtual_robot("Pepper")
+    tick_until(session, lambda: session.fleet.connected, 20)
+    session.companions._robots["Pepper"][0].kill()
+    tick_until(session, lambda: session.alerts.has("companion:Pepper"))
+    (alert,) = [alert for alert in session.alerts.active if alert.id == "companion:Pepper"]
+    assert (alert.button, alert.action) == ("Start it again", "connect:Pepper")
+    tick_until(session, lambda: not session.fleet.connected)
+    session.companions.start_virtual_robot("Pepper")
+    tick_until(session, lambda: not session.alerts.has("companion:Pepper"), 20)
+
+
 def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
     with nep.node("lamp") as node:
         driver = Driver(LAMP, "Lamp", node)

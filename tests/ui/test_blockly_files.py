@@ -8,6 +8,7 @@ import random
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
+from app.core import deep_json
 from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, UNKNOWN, WAIT_MS, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
@@ -27,6 +28,15 @@ def test_loading_says_nothing_is_changed(qtbot, view, person):
         view.set_live_values({"Pepper/battery": "84 %"})
         view.highlight(["start"])
     assert them.newest() == workspace(START)
+
+
+def test_a_stack_of_700_blocks_comes_back(person):
+    block: dict = {"type": "control_wait", "id": "b0"}
+    for number in range(1, 700):
+        block = {"type": "control_wait", "id": f"b{number}", "next": {"block": block}}
+    state = workspace({**block, "x": 28, "y": 28})
+    them = person(state=state)
+    assert deep_json.dumps(them.newest()).count("control_wait") == 700
 
 
 def test_parts_of_the_file_that_are_not_blocks_are_kept(person):

@@ -34,6 +34,8 @@ class Editor(QWidget):
         return lambda *given: self.told.append((name, *given))
 
     def flush(self, done: Callable[[dict[str, object]], None]) -> None:
+        if self.late:
+            self.changed.emit(self.late)  # the page tells an edit before it answers
         done(self.late)
 
     def last(self, name: str) -> object:

@@ -133,7 +133,7 @@ class TopicsPanel(PanelWidget):
         self.count = label("", "small", role="textSecondary")
         self.header = [self.count, self.filter]
         self.model: TableModel[Topic] = TableModel(columns(self._own), lambda topic: topic.name)
-        self.table: TableView[Topic] = TableView(theme, self.model)
+        self.table: TableView[Topic] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName("Topics")
         self.table.opened.connect(self._open)
         self.table.filter_wanted.connect(self.focus_filter)
@@ -242,7 +242,9 @@ class TopicsPanel(PanelWidget):
         return {"sort": order.column.name if order.column else "", "falling": order.falling}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        self.table.order.column = next((c for c in self.table.columns if c.name == state.get("sort")), None)
+        first = self.table.columns[0]
+        chosen = (column for column in self.table.columns if column.name == state.get("sort"))
+        self.table.order.column = next(chosen, first)
         self.table.order.falling = state.get("falling") is True
         self._rebuild()
 
