@@ -142,17 +142,17 @@ class Subscriber:
         Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
         decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
         """
-        limit = None if block_mode and timeout_s is None else (timeout_s or 0.0)
-        deadline = None if limit is None else time.monotonic() + limit
+        limit = None if block_mode and timeout_s is None else max(0.0, timeout_s or 0.0)
+        deadline = time.monotonic() + limit if limit else None
         while True:
-            left = None if deadline is None else max(0.0, deadline - time.monotonic())
-            message = self.receive(left)
+            message = self.receive(limit)
             if message is None:
                 return False, self._empty()
             try:
                 return True, self.decoded(message)
             except DecodeError:
-                continue
+                if deadline is not None:
+                    limit = max(0.0, deadline - time.monotonic())
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
@@ -162,15 +162,16 @@ class Subscriber:
         if timeout_s == 0.0 or self._inlet.is_closed:
             return self._poll()
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        while True:
-            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
-            if left <= 0.0:
-                return None
+        left = SLICE_S if timeout_s is None else min(SLICE_S, timeout_s)
+        while left > 0.0:
             message = self._inlet.receive(left)
             if message is not None:
                 return message
             if self._inlet.is_closed:
                 raise ClosedError(f"subscriber '{self.topic}'")
+            if deadline is not None:
+                left = min(SLICE_S, deadline - time.monotonic())
+        return None
 
     def _poll(self) -> Message | None:
         if self._inlet.is_closed:

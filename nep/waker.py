@@ -18,11 +18,8 @@ class Waker:
         self._reader, self._writer = socket.socketpair()
         self._reader.setblocking(False)
         self._writer.setblocking(False)
-
-    @property
-    def fd(self) -> int:
+        self.fd = self._reader.fileno()
         """What to poll for reading."""
-        return self._reader.fileno()
 
     def wake(self) -> None:
         """Make `fd` readable. Never blocks; many wakes before a `clear` are one."""

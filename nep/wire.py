@@ -18,6 +18,7 @@ from nep.packing import pack, unpack
 __all__ = [
     "BYE",
     "EXTENSION",
+    "HEADER_BYTES",
     "LATCHED",
     "VERSION",
     "Header",
@@ -25,10 +26,12 @@ __all__ = [
     "extension_part",
     "hello_part",
     "join",
+    "pack_header",
     "parse_hello",
     "read_extension",
     "read_header",
     "topic_part",
+    "unpack_header",
 ]
 
 VERSION = 1
@@ -60,7 +63,17 @@ class Header(NamedTuple):
 
     def pack(self) -> bytes:
         """The 32 bytes, little-endian."""
-        return _HEADER.pack(VERSION, self.codec, self.flags, 0, self.seq, self.stamp_ns, self.publisher)
+        return pack_header(*self)
+
+
+def pack_header(codec: int, flags: int, seq: int, stamp_ns: int, publisher: int) -> bytes:
+    """The 32 bytes of a `Header` of these, little-endian; for whoever sends many."""
+    return _HEADER.pack(VERSION, codec, flags, 0, seq, stamp_ns, publisher)
+
+
+def unpack_header(part: bytes) -> tuple[int, int, int, int, int, int, int]:
+    """(version, codec, flags, reserved, seq, stamp_ns, publisher), unchecked. Raises `struct.error`."""
+    return _HEADER.unpack(part)
 
 
 def check_topic(topic: str) -> str:

@@ -60,9 +60,8 @@ class ZeromqCarrier:
         link = self._link(spec.configuration.master)
         socket = self._xpub()
         # Made before the socket is bound: what it sets applies to connections of later binds only.
-        outlet = NativeOutlet(
-            socket, spec, self._outlet_closer(lambda: link.remove_publisher(spec.id, outlet.count))
-        )
+        closer = self._outlet_closer(lambda: link.remove_publisher(spec.id, outlet.count))
+        outlet = NativeOutlet(socket, spec, closer, self._io.serve_soon)
         with _closed_on_error(socket):
             endpoint = bind_free_port(socket, host_towards(link.address))
         self._hold(outlet)
@@ -85,7 +84,7 @@ class ZeromqCarrier:
         outlet: _Outlet
         if direct.wire == "native":
             socket = self._xpub()
-            outlet = NativeOutlet(socket, spec, closer)
+            outlet = NativeOutlet(socket, spec, closer, self._io.serve_soon)
         else:
             socket = self._socket(zmq.XPUB)
             outlet = OriginalOutlet(socket, spec, direct, closer)

@@ -12,7 +12,15 @@ from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.native.framing import from_frame, to_frame
 from nep.backends.native.io import Rest
 from nep.backends.native.reading import SocketInlet
-from nep.backends.native.sockets import SendMark, Socket, bind, connect, receive_mark, wait_until
+from nep.backends.native.sockets import (
+    SendMark,
+    Socket,
+    bind,
+    connect,
+    receive_mark,
+    wait_shortly,
+    wait_until,
+)
 from nep.codecs import codec_for
 from nep.configuration import Direct
 from nep.encoded import Encoded
@@ -128,6 +136,7 @@ class OriginalSub:
         self._socket = socket
         self._spec = spec
         self._codec = codec_for(spec.msg_type)
+        wait_shortly(socket)
         socket.setsockopt(zmq.RCVHWM, receive_mark(self._codec.name))
         socket.setsockopt(zmq.SUBSCRIBE, b"")
 
@@ -136,11 +145,11 @@ class OriginalSub:
         """Whether something can be read."""
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def read(self) -> Message | None:
+    def read(self, *, may_wait: bool = False) -> Message | None:
         """The next message of this topic."""
         while True:
             try:
-                parts = self._socket.recv_multipart(zmq.DONTWAIT)
+                parts = self._socket.recv_multipart(0 if may_wait else zmq.DONTWAIT)
             except zmq.Again:
                 return None
             if len(parts) != 1:

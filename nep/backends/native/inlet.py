@@ -35,7 +35,7 @@ class NativeInlet(SocketInlet[SubSocket]):
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to these publishers; twice is once."""
-        with self._lock:
+        with self._turn():
             if not self.is_closed:
                 for remote in remotes:
                     self._readable.connect(remote)
@@ -46,14 +46,14 @@ class NativeInlet(SocketInlet[SubSocket]):
         known = tuple(remotes)
         self.connect(known)
         listed = {remote.publisher.id for remote in known}
-        with self._lock:
+        with self._turn():
             for each, source in self._readable.sources.items():
                 if each not in listed and source.remote is not None:
                     source.is_lapsed = True
 
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
         """A publisher is unlisted. Its connection stays until its bye comes, or it is replaced."""
-        with self._lock:
+        with self._turn():
             source = self._readable.sources.find(publisher)
             if source is not None and is_closed:
                 self._readable.sources.closing(publisher, final, time.monotonic())
@@ -65,7 +65,7 @@ class NativeInlet(SocketInlet[SubSocket]):
 
         `last_seqs` is the master's word on what publishers have sent.
         """
-        with self._lock:
+        with self._turn():
             if self.is_closed:
                 return
             sources = self._readable.sources

@@ -12,10 +12,22 @@ import zmq
 from nep.addresses import endpoint_of, host_of, is_loopback
 from nep.errors import AddressInUseError
 
-__all__ = ["SendMark", "bind", "bind_free_port", "connect", "host_towards", "receive_mark", "wait_until"]
+__all__ = [
+    "SHORT_WAIT_S",
+    "SendMark",
+    "bind",
+    "bind_free_port",
+    "connect",
+    "host_towards",
+    "receive_mark",
+    "wait_shortly",
+    "wait_until",
+]
 
 Socket = zmq.Socket[bytes]
 
+SHORT_WAIT_S = 0.001
+"""How long a reader may wait in a subscriber's socket, holding its lock."""
 _SLICE_S = 0.1
 _QUEUE_BYTES = 256 * 2**20
 _MOST = 50_000
@@ -36,6 +48,8 @@ class SendMark:
     def __init__(self, owner: Socket) -> None:
         self._owner = owner
         self._mark = 0
+        self.is_set = False
+        """Whether the mark was chosen."""
         owner.setsockopt(zmq.SNDHWM, _MOST)
 
     def sending(self, size_bytes: int) -> None:
@@ -43,6 +57,7 @@ class SendMark:
         if not self._mark:
             self._mark = min(_MOST, max(_LEAST, _QUEUE_BYTES // (4 * size_bytes + 1)))
             self._owner.setsockopt(zmq.SNDHWM, self._mark)
+            self.is_set = True
 
     def greeted(self) -> None:
         """A subscriber has connected."""
@@ -53,6 +68,11 @@ class SendMark:
 def receive_mark(codec: str) -> int:
     """The high-water mark of a subscriber. The node's thread empties its socket, so a small one will do."""
     return _LEAST if codec == "image" else 1000
+
+
+def wait_shortly(owner: Socket) -> None:
+    """Let receiving without DONTWAIT wait for `SHORT_WAIT_S` seconds."""
+    owner.setsockopt(zmq.RCVTIMEO, round(SHORT_WAIT_S * 1000))
 
 
 def bind_free_port(owner: Socket, host: str) -> str:

@@ -54,6 +54,15 @@ class Sources:
         """All of them, by id."""
         return list(self._all.items())
 
+    def next_of(self, publisher: int, seq: int) -> Source | None:
+        """The source of a message that is just the next one, which is counted; else None, and nothing is."""
+        source = self._all.get(publisher)
+        if source is None or source.last is None or seq != source.last + 1:
+            return None
+        source.last = seq
+        self.received += 1
+        return source
+
     def arrived(self, publisher: int, seq: int, *, is_resent: bool) -> bool:
         """A message arrived; False when it is one that was heard already and only sent again (latched)."""
         source = self.get(publisher)

@@ -10,17 +10,32 @@ import errno
 import zmq
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.native.sockets import Socket, receive_mark
-from nep.backends.native.sources import Sources
+from nep.backends.native.sockets import Socket, receive_mark, wait_shortly
+from nep.backends.native.sources import Source, Sources
 from nep.codecs import codec_for, codec_numbered
 from nep.errors import WireError
 from nep.message import Message
 from nep.records import RemotePublisher
-from nep.wire import BYE, EXTENSION, LATCHED, Header, hello_part, read_extension, read_header, topic_part
+from nep.wire import (
+    BYE,
+    EXTENSION,
+    HEADER_BYTES,
+    LATCHED,
+    VERSION,
+    Header,
+    hello_part,
+    read_extension,
+    read_header,
+    topic_part,
+    unpack_header,
+)
 
 __all__ = ["SubSocket"]
 
 _NO_COPY_BYTES = 65_536
+_DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
+_EVENTS = int(zmq.EVENTS)
+_POLLIN = int(zmq.POLLIN)
 
 
 class SubSocket:
@@ -31,10 +46,14 @@ class SubSocket:
         self.problem = ""
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
-        self._spec = spec
+        self._recv = socket.recv
+        self._topic_name = spec.topic
+        self._msg_type = spec.msg_type
+        self._codec = codec_for(spec.msg_type)
         self._topic = topic_part(spec.topic)
         self._hello = hello_part(spec.id, spec.topic)
-        socket.setsockopt(zmq.RCVHWM, receive_mark(codec_for(spec.msg_type).name))
+        wait_shortly(socket)
+        socket.setsockopt(zmq.RCVHWM, receive_mark(self._codec.name))
         socket.setsockopt(zmq.SNDHWM, 0)  # libzmq silently drops filters beyond 1000 otherwise
         socket.setsockopt(zmq.SUBSCRIBE, self._topic)
         socket.setsockopt(zmq.SUBSCRIBE, self._hello)
@@ -52,7 +71,7 @@ class SubSocket:
     @property
     def has_input(self) -> bool:
         """Whether something can be read. Also takes note of connections that came and went."""
-        return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+        return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
 
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
@@ -76,19 +95,27 @@ class SubSocket:
                 if error.errno != errno.ENOENT:  # it was not connected any more
                     raise
 
-    def read(self) -> Message | None:
+    def read(self, *, may_wait: bool = False) -> Message | None:
         """The next message; None when there is nothing more. Notices are dealt with on the way."""
+        recv = self._recv
+        flags = 0 if may_wait else _DONTWAIT
         while True:
             try:
-                frame = self._socket.recv(zmq.DONTWAIT, copy=False)
+                frame = recv(flags, False)
             except zmq.Again:
                 return None
             first = frame.bytes
-            rest = self._socket.recv_multipart(zmq.DONTWAIT, copy=False) if frame.more else []
-            if first not in {self._topic, self._hello}:
+            rest: list[zmq.Frame] = []
+            while frame.more:  # all parts of a message are there when its first is
+                frame = recv(_DONTWAIT, False)
+                rest.append(frame)
+            is_resent = first != self._topic
+            if is_resent and first != self._hello:
                 continue  # whoever had this port before, or a topic that begins with this one's bytes
             try:
-                message = self._understand(rest, is_resent=first == self._hello)
+                message = None if is_resent else self._usual(rest)
+                if message is None:
+                    message = self._understand(rest, is_resent=is_resent)
             except WireError as error:
                 self.problem = error.reason
                 continue
@@ -102,6 +129,20 @@ class SubSocket:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close(0)
+
+    def _usual(self, rest: list[zmq.Frame]) -> Message | None:
+        """The message in most parts that come, which is just the next one, quickly; None for all others."""
+        if len(rest) != 2 or len(rest[0]) != HEADER_BYTES:
+            return None
+        version, codec, flags, _reserved, seq, stamp_ns, publisher = unpack_header(rest[0].bytes)
+        if version != VERSION or flags or codec != self._codec.number:
+            return None
+        source = self.sources.next_of(publisher, seq)
+        if source is None:
+            return None
+        message = self._make(source, rest[1], self._codec.name)
+        message.stamp_ns, message.seq, message.publisher = stamp_ns, seq, publisher
+        return message
 
     def _understand(self, rest: list[zmq.Frame], *, is_resent: bool) -> Message | None:
         if not rest:
@@ -131,20 +172,22 @@ class SubSocket:
         extension = read_extension(rest[2].buffer) if header.flags & EXTENSION else None
         if not self.sources.arrived(header.publisher, header.seq, is_resent=is_resent):
             return None
-        payload = rest[1]
-        size = len(payload)
         source = self.sources.get(header.publisher)
-        message = Message(
-            self._spec.topic,
-            # A small view must not keep a large receive buffer alive.
-            payload.buffer if size >= _NO_COPY_BYTES else payload.bytes,
-            codec.name,
-            self._spec.msg_type if source.remote is None else source.remote.publisher.msg_type,
-            stamp_ns=header.stamp_ns,
-            seq=header.seq,
-            publisher=header.publisher,
-            extension=extension or {},
-        )
+        self._codec = codec  # the next one probably has it too
+        message = self._make(source, rest[1], codec.name)
+        message.stamp_ns, message.seq, message.publisher = header.stamp_ns, header.seq, header.publisher
         message.is_latched = bool(header.flags & LATCHED)
-        self.problem = ""
+        if extension:
+            message.extension = extension
         return message
+
+    def _make(self, source: Source, payload: zmq.Frame, codec: str) -> Message:
+        self.problem = ""
+        remote = source.remote
+        return Message(
+            self._topic_name,
+            # A small view must not keep a large receive buffer alive.
+            payload.buffer if len(payload) >= _NO_COPY_BYTES else payload.bytes,
+            codec,
+            self._msg_type if remote is None else remote.publisher.msg_type,
+        )

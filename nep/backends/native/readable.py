@@ -1,0 +1,37 @@
+"""Readable: what an inlet reads from: a socket that turns parts into messages."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from nep.message import Message
+
+__all__ = ["Readable"]
+
+
+class Readable(Protocol):
+    """A socket that turns what comes into messages. It is used under the inlet's lock only."""
+
+    fd: int
+    problem: str
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+
+    @property
+    def lost(self) -> int | None:
+        """Messages that did not; None when nobody can know."""
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read. Also takes note of connections that came and went."""
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`."""
+
+    def dropped(self, count: int) -> None:
+        """So many messages that had been received were dropped for lack of room."""
+
+    def close(self) -> None:
+        """Close the socket."""
