@@ -1,52 +1,63 @@
-"""Round trips and throughput of nep's native wire, as ratios to plain pyzmq measured in the same run.
+"""Round trips of nep's native wire: their time, as a ratio to plain pyzmq measured in the same run.
 
-    python bench/nep_roundtrip.py [--samples 200]
+    python bench/nep_roundtrip.py [--trips 30] [--blocks 16]
 
-One side runs in this process, the other in its child, over loopback. All variants are interleaved in random
-order within each block; "plain again" is plain pyzmq against itself and shows how far to trust the rest.
+One side runs in this process, the other in its child, over loopback, each in its main thread or a thread that
+does nothing else. All variants are interleaved in random order within each block; "plain again" is plain
+pyzmq against itself: a run counts only when that is within 5 % (the middle of all sizes).
+
+Every message lies at another place in memory: where exactly its bytes begin within a page can double the time
+that the kernel takes to copy it, see `bench/README.md`.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import random
 import statistics
-import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 
 import zmq
+from blocks import Child, Sample, cpu_s, interleaved, other_process, verdict
 
 import nep
 
-SIZES = (100, 16_384, 262_144, 1_048_576, 4_194_304)
+SIZES = (100, 1_024, 16_384, 65_536, 262_144, 1_048_576, 4_194_304, 8_388_608)
+JUDGED = 16_384
+PAGE = 4096
 
 ECHO = """
-import sys, threading, zmq, nep
+import sys, threading, time, zmq, nep
 node = nep.node("echo")
 sub, pub = node.new_sub("ping", "bytes"), node.new_pub("pong", "bytes")
 def native():
     for message in sub:
         pub.publish_bytes(message.data)
-context = zmq.Context()
-def plain(kind, ports):
-    back = context.socket(zmq.PUB); back.setsockopt(zmq.LINGER, 0)
-    there = context.socket(zmq.SUB); there.subscribe(b"")
+def plain(port, ports):
+    context = zmq.Context()
+    back = context.socket(zmq.PUB)
+    there = context.socket(zmq.SUB)
+    there.subscribe(b"")
     ports.append(back.bind_to_random_port("tcp://127.0.0.1"))
-    there.connect("tcp://127.0.0.1:" + sys.argv[kind])
+    there.connect("tcp://127.0.0.1:" + port)
     while True:
         back.send(there.recv(copy=False), copy=False)
 ports = []
 threading.Thread(target=native, daemon=True).start()
-threading.Thread(target=plain, args=(1, ports), daemon=True).start()
+threading.Thread(target=plain, args=(sys.argv[1], ports), daemon=True).start()
 while not ports:
-    pass
+    time.sleep(0.01)
 print(ports[0], flush=True)
-sys.stdin.read()
+for line in sys.stdin:
+    print(time.process_time(), flush=True)
 """
+
+Trip = Callable[[memoryview], None]
 
 
 class Plain:
@@ -58,78 +69,93 @@ class Plain:
         self.back.subscribe(b"")
         self.port = self.there.bind_to_random_port("tcp://127.0.0.1")
 
-    def trip(self, data: bytes) -> None:
+    def connect(self, port: str) -> None:
+        """Connect to the echo, and wait until both ways are there."""
+        self.back.connect(f"tcp://127.0.0.1:{port}")
+        while not self.back.poll(50):
+            self.there.send(b"x")
+        while self.back.poll(200):
+            self.back.recv()
+
+    def trip(self, data: memoryview) -> None:
         """There and back."""
         self.there.send(data, copy=False)
         self.back.recv(copy=False)
 
 
-def measure(trip: Callable[[bytes], None], data: bytes, samples: int) -> list[float]:
-    """Seconds of each round trip."""
+def measure(trip: Trip, ask: Child, size: int, trips: int) -> Sample:
+    """The median of some round trips; processor time of both processes for each."""
+    room = os.urandom(size + PAGE)
+    places = [memoryview(room)[place : place + size] for place in range(0, PAGE, 16)]
     taken = []
-    for _ in range(samples):
+    used = cpu_s() + child_s(ask)
+    for data in random.choices(places, k=trips):
         started = time.perf_counter()
         trip(data)
         taken.append(time.perf_counter() - started)
-    return taken
+    used = cpu_s() + child_s(ask) - used
+    return Sample(statistics.median(taken), used / trips)
 
 
-def main() -> None:
-    """Measure and print one table."""
+def child_s(ask: Child) -> float:
+    """Processor time of the child so far."""
+    ask.write("time")
+    return float(ask.read())
+
+
+def compare(variants: dict[str, Trip], ask: Child, blocks: int, trips: int) -> int:
+    """Print the median round trip of "plain" and the others' ratio to it, for each size."""
+    print(f"{'bytes':>9} {'plain ms':>9} {'plain again':>12} {'native':>7} {'CPU ms':>8} {'native CPU':>11}")
+    again, native = [], []
+    for size in SIZES:
+        ready = {name: partial(measure, trip, ask, size, trips) for name, trip in variants.items()}
+        found = interleaved(ready, blocks)
+        plain = found["plain"]
+        again.append(found["plain again"].seconds / plain.seconds)
+        ratio = found["native"].seconds / plain.seconds
+        if size >= JUDGED:
+            native.append(ratio)
+        cpu = found["native"].cpu_s / plain.cpu_s
+        times = f"{size:>9} {plain.seconds * 1e3:>9.3f} {again[-1]:>12.2f} {ratio:>7.2f}"
+        print(f"{times} {plain.cpu_s * 1e3:>8.3f} {cpu:>11.2f}", flush=True)
+    print(f"native ÷ plain, geometric mean from {JUDGED} bytes up: {mean(native):.3f}")
+    return verdict(again)
+
+
+def mean(ratios: list[float]) -> float:
+    """The geometric mean."""
+    return math.exp(statistics.fmean(math.log(each) for each in ratios))
+
+
+def main() -> int:
+    """Measure and print one table; 1 when the run does not count."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--samples", type=int, default=200)
-    samples = parser.parse_args().samples
+    parser.add_argument("--trips", type=int, default=30)
+    parser.add_argument("--blocks", type=int, default=16)
+    arguments = parser.parse_args()
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     plain = Plain(context)
-    with nep.master("127.0.0.1:0", learn_s=0.0) as master:
-        environment = {
-            **os.environ,
-            "NEP_MASTER": master.address,
-            "PYTHONPATH": str(Path(__file__).parents[1]),
-        }
-        child = subprocess.Popen(
-            [sys.executable, "-c", ECHO, str(plain.port)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=environment,
-        )
-        assert child.stdout is not None
-        plain.back.connect(f"tcp://127.0.0.1:{child.stdout.readline().strip()}")
-        with nep.node("bench", master=master.address) as node:
-            sub, pub = node.new_sub("pong", "bytes"), node.new_pub("ping", "bytes")
+    with (
+        nep.master("127.0.0.1:0", learn_s=0.0) as master,
+        nep.node("bench", master=master.address) as node,
+        node.new_sub("pong", "bytes") as sub,
+        node.new_pub("ping", "bytes") as pub,
+        other_process(ECHO, (str(plain.port),), master.address) as ask,
+    ):
+        plain.connect(ask.read())
 
-            def native(data: bytes) -> None:
-                pub.publish(data)
-                if sub.receive(5.0) is None:
-                    raise SystemExit("a message did not come back")
+        def native(data: memoryview) -> None:
+            pub.publish_bytes(data)
+            if sub.receive(5.0) is None:
+                raise SystemExit("a message did not come back")
 
-            while True:  # until the plain pair is connected both ways
-                plain.there.send(b"x")
-                if plain.back.poll(50):
-                    break
-            while plain.back.poll(100):
-                plain.back.recv()
-            compare({"plain": plain.trip, "plain again": plain.trip, "native": native}, samples)
-        child.kill()
-        child.communicate()
+        variants: dict[str, Trip] = {"plain": plain.trip, "plain again": plain.trip, "native": native}
+        code = compare(variants, ask, arguments.blocks, arguments.trips)
+        if sub.lost:
+            raise SystemExit(f"{sub.lost} messages were lost")
     context.destroy(0)
-
-
-def compare(variants: dict[str, Callable[[bytes], None]], samples: int) -> None:
-    """Print the median round trip of "plain" and the others' ratio to it, for each size."""
-    print(f"{'bytes':>9} {'plain ms':>9} {'plain again':>12} {'native':>7}")
-    for size in SIZES:
-        data = os.urandom(size)
-        taken: dict[str, list[float]] = {name: [] for name in variants}
-        for _ in range(10):
-            for name in random.sample(list(variants), len(variants)):
-                taken[name] += measure(variants[name], data, samples // 10)
-        medians = {name: statistics.median(each) for name, each in taken.items()}
-        ratios = {name: median / medians["plain"] for name, median in medians.items()}
-        row = f"{medians['plain'] * 1e3:>9.3f} {ratios['plain again']:>12.2f} {ratios['native']:>7.2f}"
-        print(f"{size:>9} {row}")
+    return code
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

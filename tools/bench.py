@@ -1,0 +1,37 @@
+"""The benchmarks of the wire, one after the other.
+
+    python tools/bench.py                       all of them
+    python tools/bench.py nep_rate -- ARGS      one; what comes after -- goes to it
+
+Exit code 1 when a run does not count because the computer was busy. See `bench/README.md`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+BENCH = Path(__file__).resolve().parent.parent / "bench"
+NAMES = ("nep_roundtrip", "nep_rate")
+
+
+def main() -> int:
+    """Run what was asked for."""
+    own, dashes, rest = " ".join(sys.argv[1:]).partition("--")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("names", nargs="*", choices=[*NAMES, []], help="which; all when none is given")
+    names = parser.parse_args(own.split() if dashes else None).names or NAMES
+    codes = []
+    for name in names:
+        print(f"\n=== {name}", flush=True)
+        command = (sys.executable, str(BENCH / f"{name}.py"), *rest.split())
+        codes.append(subprocess.run(command, check=False).returncode)
+    return max(codes)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
