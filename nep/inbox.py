@@ -23,36 +23,37 @@ class Inbox:
         self._keeps_all = keep == "all"
         self._max_messages = max_messages if self._keeps_all else 1
         self._max_bytes = max_bytes
-        self._messages: deque[Message] = deque()
+        self.messages: deque[Message] = deque()
+        """What waits, oldest first. Only to be looked at."""
         self._bytes = 0
 
     def put(self, message: Message) -> int:
         """Add a message; how many others were dropped for it. Replacing the latest is no drop."""
-        self._messages.append(message)
+        self.messages.append(message)
         self._bytes += message.size_bytes
         dropped = 0
         # The newest stays even when it alone is larger than the bound.
-        while len(self._messages) > self._max_messages or (
-            self._bytes > self._max_bytes and len(self._messages) > 1
+        while len(self.messages) > self._max_messages or (
+            self._bytes > self._max_bytes and len(self.messages) > 1
         ):
-            self._bytes -= self._messages.popleft().size_bytes
+            self._bytes -= self.messages.popleft().size_bytes
             dropped += self._keeps_all
         return dropped
 
     def take(self) -> Message | None:
         """The oldest message, None when there is none."""
-        if not self._messages:
+        if not self.messages:
             return None
-        message = self._messages.popleft()
+        message = self.messages.popleft()
         self._bytes -= message.size_bytes
         return message
 
     def take_all(self) -> list[Message]:
         """All messages, oldest first."""
-        messages = list(self._messages)
-        self._messages.clear()
+        messages = list(self.messages)
+        self.messages.clear()
         self._bytes = 0
         return messages
 
     def __len__(self) -> int:
-        return len(self._messages)
+        return len(self.messages)

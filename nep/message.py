@@ -54,7 +54,8 @@ class Message:
         extension: Mapping[str, object] = _NOTHING,
     ) -> None:
         self.topic = topic
-        self.data = memoryview(data).toreadonly()
+        view = memoryview(data)
+        self.data = view if view.readonly else view.toreadonly()
         self.codec = codec
         self.msg_type = msg_type
         self.stamp_ns = stamp_ns

@@ -26,13 +26,14 @@ __all__ = ["NativeOutlet"]
 
 _logger = logging.getLogger("nep")
 
+_Frame = zmq.Frame
 _Part = bytes | memoryview | zmq.Frame
 _SNDMORE = int(zmq.SNDMORE)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
 
 _NO_COPY_BYTES = 65_536
-_LOOK_NS = 500_000
+_LOOK_NS = 2_000_000
 """Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
 after it, because sending may have swallowed the descriptor's signal."""
 _SERVE_S = 0.02
@@ -243,6 +244,9 @@ class NativeOutlet:
 
 def _sendable(data: memoryview) -> _Part:
     """What can be sent as it lies: a received message itself; of what can still change a copy."""
-    if isinstance(data.obj, zmq.Frame) and data.nbytes == len(data.obj) and data.readonly:
-        return data.obj
-    return data.cast("B") if data.readonly and data.c_contiguous else bytes(data)
+    origin = data.obj
+    if isinstance(origin, _Frame) and data.nbytes == len(origin) and data.readonly:
+        return origin
+    if not (data.readonly and data.c_contiguous):
+        return bytes(data)
+    return data if data.itemsize == data.ndim == 1 else data.cast("B")

@@ -5,7 +5,7 @@ of `listen` gets its messages straight from the socket, in its own thread. When 
 thread moves messages into the inbox, which is bounded in bytes.
 
 A reader that gets one message after the other waits for the next one in the socket itself, which is twice as
-fast as polling the descriptor for a small message. It holds the lock meanwhile: for a millisecond at most,
+fast as polling the descriptor for a small message. It holds the lock meanwhile: for 5 ms at most,
 and not at all while somebody else wants the socket. After that it polls the descriptor, without the lock.
 """
 
@@ -64,6 +64,8 @@ class SocketInlet(Generic[R]):
         self._readable = readable
         self._io = io
         self._on_close = on_close
+        self._read = readable.read
+        self._keeps_all = spec.keep == "all"
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._problem = ""
         self._leased_until = 0.0
@@ -108,11 +110,11 @@ class SocketInlet(Generic[R]):
         with self._lock:
             if self.is_closed:
                 return None
-            is_brisk = self._is_brisk and not self._wanted and timeout_s >= SHORT_WAIT_S
-            message = self._next(may_wait=is_brisk)
-            self._is_brisk = message is not None
+            message = self._next(self._is_brisk and not self._wanted and timeout_s >= SHORT_WAIT_S)
             if message is not None:
+                self._is_brisk = True
                 return message
+            self._is_brisk = False
             # Under the same lock: the socket was empty, so its descriptor tells of what comes next.
             waker, self._waker = self._waker or Waker(), None
             self._waiters.append(waker)
@@ -238,7 +240,7 @@ class SocketInlet(Generic[R]):
 
     # ---- with the lock held
 
-    def _next(self, *, may_wait: bool = False) -> Message | None:
+    def _next(self, may_wait: bool = False) -> Message | None:
         now = time.monotonic()
         self._leased_until = now + LEASE_S
         if self._io_comes_at > now + _LATE_S:
@@ -246,9 +248,11 @@ class SocketInlet(Generic[R]):
             # the node's thread has to look when the lease is over. It is asked once for many reads.
             self._io_comes_at = self._leased_until
             self._io.serve_soon(self)
-        if self.spec.keep == "latest":
+        if self._keeps_all and not self._inbox.messages:
+            return self._read(may_wait=may_wait)
+        if not self._keeps_all:
             self._fill()
-        return self._inbox.take() or self._readable.read(may_wait=may_wait)
+        return self._inbox.take()
 
     def _fill(self) -> int:
         """Read into the inbox until the socket has nothing more, or a batch is full; how many."""

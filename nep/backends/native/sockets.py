@@ -26,8 +26,9 @@ __all__ = [
 
 Socket = zmq.Socket[bytes]
 
-SHORT_WAIT_S = 0.001
-"""How long a reader may wait in a subscriber's socket, holding its lock."""
+SHORT_WAIT_S = 0.005
+"""How long a reader may wait in a subscriber's socket, holding its lock. A shorter time is not quicker: a
+timer that ends before the kernel's next tick costs more than the wait."""
 _SLICE_S = 0.1
 _QUEUE_BYTES = 256 * 2**20
 _MOST = 50_000

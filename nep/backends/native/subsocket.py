@@ -106,21 +106,30 @@ class SubSocket:
                 return None
             first = frame.bytes
             rest: list[zmq.Frame] = []
-            while frame.more:  # all parts of a message are there when its first is
-                frame = recv(_DONTWAIT, False)
-                rest.append(frame)
-            is_resent = first != self._topic
-            if is_resent and first != self._hello:
+            if frame.more:  # all parts of a message are there when its first is
+                head = recv(_DONTWAIT, False)
+                rest.append(head)
+                if head.more:
+                    body = recv(_DONTWAIT, False)
+                    rest.append(body)
+                    if body.more:
+                        self._read_rest(rest)
+                    elif first == self._topic and (message := self._usual(head.bytes, body)) is not None:
+                        return message
+            is_resent = first == self._hello
+            if not is_resent and first != self._topic:
                 continue  # whoever had this port before, or a topic that begins with this one's bytes
             try:
-                message = None if is_resent else self._usual(rest)
-                if message is None:
-                    message = self._understand(rest, is_resent=is_resent)
+                message = self._understand(rest, is_resent=is_resent)
             except WireError as error:
                 self.problem = error.reason
                 continue
             if message is not None:
                 return message
+
+    def _read_rest(self, rest: list[zmq.Frame]) -> None:
+        while rest[-1].more:
+            rest.append(self._recv(_DONTWAIT, False))
 
     def dropped(self, count: int) -> None:
         """So many messages that had been received were dropped for lack of room."""
@@ -130,17 +139,17 @@ class SubSocket:
         """Close the socket."""
         self._socket.close(0)
 
-    def _usual(self, rest: list[zmq.Frame]) -> Message | None:
+    def _usual(self, head: bytes, body: zmq.Frame) -> Message | None:
         """The message in most parts that come, which is just the next one, quickly; None for all others."""
-        if len(rest) != 2 or len(rest[0]) != HEADER_BYTES:
+        if len(head) != HEADER_BYTES:
             return None
-        version, codec, flags, _reserved, seq, stamp_ns, publisher = unpack_header(rest[0].bytes)
+        version, codec, flags, _reserved, seq, stamp_ns, publisher = unpack_header(head)
         if version != VERSION or flags or codec != self._codec.number:
             return None
         source = self.sources.next_of(publisher, seq)
         if source is None:
             return None
-        message = self._make(source, rest[1], self._codec.name)
+        message = self._make(source, body, self._codec.name)
         message.stamp_ns, message.seq, message.publisher = stamp_ns, seq, publisher
         return message
 
