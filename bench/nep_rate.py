@@ -85,7 +85,7 @@ def show(samples: dict[str, Sample]) -> int:
         print(
             f"{name:>16} {1.0 / sample.seconds:>11,.0f} {ratio:>8.2f} {sample.cpu_s * 1e6:>7.2f} {cpu:>8.2f}"
         )
-    return verdict([plain.seconds / samples["plain again"].seconds])
+    return verdict(plain.seconds / samples["plain again"].seconds)
 
 
 def main() -> int:

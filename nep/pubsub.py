@@ -68,18 +68,22 @@ class Publisher:
 
         With no subscriber nothing is encoded, unless it is latched. Raises `EncodeError`, `ClosedError`.
         """
-        if self._is_closed:
-            raise ClosedError(f"publisher '{self.topic}'")
-        if not self._outlet.subscribers and not self._spec.is_latched:
-            self._outlet.skip()
-        elif isinstance(payload, Encoded):
-            self._outlet.send(payload)
-        else:
-            self._outlet.send(self._encode(payload))
+        if self._is_wanted():
+            self._outlet.send(payload if isinstance(payload, Encoded) else self._encode(payload))
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send bytes that are encoded already. Raises `ClosedError`."""
-        self.publish(Encoded(data, extension))
+        if self._is_wanted():
+            self._outlet.send(Encoded(data, extension))
+
+    def _is_wanted(self) -> bool:
+        """Whether to send. A message that nobody wants is counted."""
+        if self._is_closed:
+            raise ClosedError(f"publisher '{self.topic}'")
+        if self._outlet.subscribers or self._spec.is_latched:
+            return True
+        self._outlet.skip()
+        return False
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
@@ -208,6 +212,7 @@ class Subscriber:
                 return
             if message is not None:
                 yield message
+                message = None  # what was read can be given back before the next one comes
 
     def __enter__(self) -> Self:
         return self

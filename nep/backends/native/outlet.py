@@ -33,7 +33,7 @@ _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
 
 _NO_COPY_BYTES = 65_536
-_LOOK_NS = 2_000_000
+_LOOK_NS = 500_000
 """Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
 after it, because sending may have swallowed the descriptor's signal."""
 _SERVE_S = 0.02

@@ -108,14 +108,15 @@ class SubSocket:
             rest: list[zmq.Frame] = []
             if frame.more:  # all parts of a message are there when its first is
                 head = recv(_DONTWAIT, False)
-                rest.append(head)
-                if head.more:
+                if not head.more:
+                    rest = [head]
+                else:
                     body = recv(_DONTWAIT, False)
-                    rest.append(body)
-                    if body.more:
-                        self._read_rest(rest)
-                    elif first == self._topic and (message := self._usual(head.bytes, body)) is not None:
-                        return message
+                    if not body.more and first == self._topic:
+                        message = self._usual(head.bytes, body)
+                        if message is not None:
+                            return message
+                    rest = self._read_rest(head, body)
             is_resent = first == self._hello
             if not is_resent and first != self._topic:
                 continue  # whoever had this port before, or a topic that begins with this one's bytes
@@ -127,9 +128,11 @@ class SubSocket:
             if message is not None:
                 return message
 
-    def _read_rest(self, rest: list[zmq.Frame]) -> None:
+    def _read_rest(self, head: zmq.Frame, body: zmq.Frame) -> list[zmq.Frame]:
+        rest = [head, body]
         while rest[-1].more:
             rest.append(self._recv(_DONTWAIT, False))
+        return rest
 
     def dropped(self, count: int) -> None:
         """So many messages that had been received were dropped for lack of room."""

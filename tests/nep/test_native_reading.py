@@ -1,0 +1,152 @@
+"""The short ways of the native wire: what they skip is still seen, and nobody is kept waiting for them."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from time import monotonic
+
+import pytest
+
+import nep
+from nep.masters import Master
+from tests.nep.programs import eventually
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("reading", master=master.address) as made:
+        yield made
+
+
+def test_a_received_picture_is_passed_on_and_still_readable(node: nep.Node, master: Master) -> None:
+    data = os.urandom(300_000)
+    with nep.node("relay", master=master.address) as relay:
+        there, back = relay.new_sub("there", "bytes"), relay.new_pub("back", "bytes")
+        sub, pub = node.new_sub("back", "bytes"), node.new_pub("there", "bytes")
+        pub.publish(data)
+        message = there.receive(2.0)
+        assert message is not None
+        back.publish_bytes(message.data)
+        back.publish_bytes(message.data[1000:])  # a part of it is not the message
+        whole, part = sub.receive(2.0), sub.receive(2.0)
+        assert whole is not None
+        assert part is not None
+        assert whole.data == data
+        assert part.data == data[1000:]
+        assert message.data == data
+
+
+def test_a_view_of_wider_items_is_sent_as_its_bytes(node: nep.Node) -> None:
+    sub, pub = node.new_sub("wide", "bytes"), node.new_pub("wide", "bytes")
+    for size in (8, 80_000):
+        data = os.urandom(size)
+        pub.publish_bytes(memoryview(data).cast("q"))
+        message = sub.receive(2.0)
+        assert message is not None
+        assert message.data == data
+
+
+def test_whoever_subscribes_while_messages_stream_is_greeted(node: nep.Node, master: Master) -> None:
+    pub = node.new_pub("stream", "bytes")
+    is_over = threading.Event()
+
+    def stream() -> None:
+        while not is_over.wait(0.0001):  # more often than a publisher looks for subscriptions
+            for _ in range(3):
+                pub.publish(b"x" * 100)
+
+    thread = threading.Thread(target=stream)
+    thread.start()
+    try:
+        with nep.node("late", master=master.address) as late:
+            for number in range(1, 6):
+                started = monotonic()
+                sub = late.new_sub("stream", "bytes")
+                assert monotonic() - started < 0.45  # it did not have to give up waiting
+                assert sub.receive(2.0) is not None
+                assert pub.subscribers == number
+    finally:
+        is_over.set()
+        thread.join()
+
+
+def test_whoever_subscribes_just_after_a_burst_is_greeted(node: nep.Node, master: Master) -> None:
+    pub = node.new_pub("burst", "bytes")
+    with nep.node("late", master=master.address) as late:
+        for number in range(1, 11):
+            for _ in range(20):
+                pub.publish(b"x")
+            started = monotonic()
+            late.new_sub("burst", "bytes")
+            assert monotonic() - started < 0.45
+            assert pub.subscribers == number
+
+
+def test_a_reader_that_waits_in_its_socket_keeps_no_publisher_waiting(node: nep.Node, master: Master) -> None:
+    sub, first = node.new_sub("many", "bytes"), node.new_pub("many", "bytes")
+    heard: list[bytes] = []
+    is_over = threading.Event()
+
+    def read() -> None:
+        while not is_over.is_set():
+            message = sub.receive(0.05)
+            if message is not None:
+                heard.append(bytes(message.data))
+
+    def stream() -> None:
+        while not is_over.wait(0.001):
+            first.publish(b"first")
+
+    threads = [threading.Thread(target=read), threading.Thread(target=stream)]
+    for thread in threads:
+        thread.start()
+    try:
+        eventually(lambda: len(heard) > 20)
+        with nep.node("other", master=master.address) as other:
+            for number in range(5):
+                started = monotonic()
+                pub = other.new_pub("many", "bytes")
+                assert monotonic() - started < 0.3
+                pub.publish(b"%d" % number)
+                assert not pub.missing
+            eventually(lambda: [each for each in heard if each != b"first"] == [b"0", b"1", b"2", b"3", b"4"])
+    finally:
+        is_over.set()
+        for thread in threads:
+            thread.join()
+    assert sub.lost == 0
+
+
+def test_what_a_reader_leaves_is_taken_by_the_node(node: nep.Node) -> None:
+    sub, pub = node.new_sub("left", "bytes"), node.new_pub("left", "bytes")
+    for _ in range(3):  # a reader that gets one message after the other
+        pub.publish(b"x")
+        assert sub.receive(2.0) is not None
+    for _ in range(3000):
+        pub.publish(b"x")
+    assert sub.receive(2.0) is not None
+    eventually(lambda: sub.received == 3003)
+    assert sub.lost == 0
+    assert sum(sub.receive(2.0) is not None for _ in range(2999)) == 2999
+
+
+def test_closing_does_not_wait_for_a_reader(node: nep.Node) -> None:
+    sub, pub = node.new_sub("ends", "bytes"), node.new_pub("ends", "bytes")
+    ended = threading.Event()
+
+    def read() -> None:
+        for _message in sub:
+            pass
+        ended.set()
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    pub.publish(b"x")
+    eventually(lambda: sub.received == 1)
+    started = monotonic()
+    sub.close()
+    assert monotonic() - started < 0.3
+    assert ended.wait(2.0)
+    thread.join()
