@@ -123,11 +123,15 @@ class Runner:
                 "paused": paused,
             }
         )
-        works = ((self._write, "input"), (self._read, "output"), (self._read_errors, "errors"))
-        for work, label in works:
-            thread = threading.Thread(target=work, name=f"runner {label}", daemon=True)
-            self._threads.append(thread)
-            thread.start()
+        self._thread(self._write, "input")
+        errors = self._thread(self._read_errors, "errors")
+        self._thread(lambda: self._read(errors), "output")  # last: it waits for the errors' end
+
+    def _thread(self, work: Callable[[], None], label: str) -> threading.Thread:
+        thread = threading.Thread(target=work, name=f"runner {label}", daemon=True)
+        self._threads.append(thread)
+        thread.start()
+        return thread
 
     def pause(self) -> None:
         """Hold the program at its next block; the event "paused" says when it stands still."""
@@ -187,7 +191,7 @@ class Runner:
         except (OSError, ValueError):
             return  # it has ended; the reader tells
 
-    def _read(self) -> None:
+    def _read(self, errors: threading.Thread) -> None:
         process = self._process
         if process is None or process.stdout is None:
             return
@@ -201,9 +205,9 @@ class Runner:
             if event.kind in ("running", "paused") and self.state in ("running", "paused"):
                 self.state = "paused" if event.kind == "paused" else "running"
             self._on_event(event)
-        self._finish(process)
+        self._finish(process, errors)
 
-    def _finish(self, process: subprocess.Popen[bytes]) -> None:
+    def _finish(self, process: subprocess.Popen[bytes], errors: threading.Thread) -> None:
         self._orders.put(None)  # its input ends, and with it a child that still waits for orders
         try:
             code = process.wait(END_S)
@@ -212,7 +216,7 @@ class Runner:
             code = process.wait()
         if process.stdout is not None:
             process.stdout.close()
-        self._threads[-1].join(timeout=END_S)  # its last words
+        errors.join(timeout=END_S)  # its last words
         was_stopped = self.state == "stopping"
         self.state = "ended"
         last = self._last

@@ -9,9 +9,7 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -19,6 +17,7 @@ import psutil
 import pytest
 
 from nep.masters import is_running
+from tests.interop.port_lock import one_run_at_a_time
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 CACHE = REPOSITORY / ".cache" / "peers"
@@ -31,6 +30,15 @@ PYTHON_PEERS = {
 JAVASCRIPT_PEER = "nep-js@0.1.1"
 MARK = "\x1e"
 LONG_S = 20.0
+FIRST_S = 600.0
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The first test of a peer installs it, and may wait for another run's ports."""
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents and item.get_closest_marker("timeout") is None:
+            item.add_marker(pytest.mark.timeout(FIRST_S))
 
 
 class Program:
@@ -224,37 +232,10 @@ def _run_all(commands: Sequence[Sequence[str]], what: str, folder: Path) -> str:
     return ""
 
 
-@contextlib.contextmanager
-def _one_run_at_a_time() -> Iterator[None]:
-    """Hold a lock file, so that two runs on one computer do not meet on the fixed ports."""
-    with (Path(tempfile.gettempdir()) / "nep-interop.lock").open("a+b") as stream:
-        deadline = time.monotonic() + 900
-        while not _try_lock(stream.fileno()):
-            if time.monotonic() > deadline:
-                pytest.fail("another run of the interop tests holds the fixed ports for 15 minutes")
-            threading.Event().wait(0.2)
-        yield
-
-
-def _try_lock(handle: int) -> bool:
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
-
 @pytest.fixture(scope="session")
 def fixed_ports() -> Iterator[None]:
     """The originals' ports, free and ours while the tests run."""
-    with _one_run_at_a_time():
+    with one_run_at_a_time():
         for port in FIXED_PORTS:
             with socket.socket() as probe:
                 probe.settimeout(0.5)
