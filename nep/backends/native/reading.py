@@ -5,7 +5,7 @@ of `listen` gets its messages straight from the socket, in its own thread. When 
 thread moves messages into the inbox, which is bounded in bytes.
 
 A reader that gets one message after the other waits for the next one in the socket itself: a round trip of
-small messages is a fifth to a third shorter than with polling the descriptor. It holds the lock meanwhile, for
+small messages is a fifth to a third shorter than with polling the descriptor. It holds the lock then, for
 `SHORT_WAIT_S` at most, and does not begin while somebody else wants the socket. After that it polls the
 descriptor, without the lock.
 """
