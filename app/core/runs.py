@@ -47,6 +47,11 @@ class Runs:
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._runner: Runner | None = None
         self._used: tuple[str, ...] = ()
+        self.kept: frozenset[str] = frozenset()
+        """Robots that must stay within reach of a stop, also when they are away.
+
+        Those that the program uses, until they have proven that they stand still.
+        """
         self._labels: Mapping[str, str] = {}
         self._run = RunState()
         self._stop_number = 0
@@ -120,6 +125,7 @@ class Runs:
         """A person says that the robot that did not answer stands still."""
         if self._run.state == "unanswered":
             self._run.state, self._run.report = "ready", None
+            self.kept = frozenset()
             self._alerts.cure("stop")
 
     def close(self) -> None:
@@ -169,6 +175,7 @@ class Runs:
             return
         words, good = result_words(event.report)
         run.report, run.last_words = event.report, words
+        self.kept = frozenset(event.report.silent)
         run.state = "proven" if good else "unanswered"
         run.dashed = bool(self.stopped_blocks)
         self._tell_fleet(event.report)
@@ -193,6 +200,7 @@ class Runs:
             self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
+        self.kept = frozenset(program.robots)
         self._run = RunState(
             "running", self._document.name, started_s=self._clock(), last_words=self._run.last_words
         )
@@ -233,7 +241,8 @@ class Runs:
         elif run.state not in {"stopping", "unanswered"}:
             run.elapsed_s = None
         run.state, run.report, run.answered, run.finished = "stopping", None, [], False
-        run.asked = names if names is not None else tuple(link.name for link in self._fleet.connected)
+        everybody = tuple(link.name for link in self._fleet.links if link.connected or link.name in self.kept)
+        run.asked = names if names is not None else everybody
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(self._stop_all, self._stop_number, self._runner, self._network.stopper, names)

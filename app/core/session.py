@@ -38,12 +38,15 @@ from app.core.stop_events import OneStopped, RobotAnswered, StopDone
 from app.core.stopping import RobotStopper
 from app.core.topics import Topics, total_rate_hz
 from app.core.watches import Watch, Watches
+from app.robots.description import Robot
 from nep.masters import master_address
 from nep.nodes import Node
 from nep.views import GraphView
 
 LOSS_WINDOW_S = 30.0
 CHECK_S = 1.0
+LEARNING_S = 1.5
+"""How long a master that has just started may not know everybody yet (it learns for one second)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +111,10 @@ class Session:
         self._losses: deque[tuple[float, int]] = deque()
         self._lost_before: int | None = None
         self._robots_seen = -1
+        self._reachable: tuple[Robot, ...] = ()
         self._topics_seen = -1
         self._next_check = 0.0
+        self._new_epoch = (0, 0.0)
 
     # -- what the window and its panels call -----------------------------------------------------------------
 
@@ -221,6 +226,8 @@ class Session:
                 pass
 
     def _on_graph(self, view: GraphView, now: float) -> None:
+        if self._still_learns(view, now):
+            return
         if self.graph is not None:
             for line in arrivals(self.graph, view):
                 self.console.add("info", "master", line)
@@ -244,6 +251,14 @@ class Session:
             )
             self.topics.values_revision += 1
 
+    def _still_learns(self, view: GraphView, now: float) -> bool:
+        """Whether another master has just come: whom it does not know yet has not gone."""
+        if self.graph is None or view.epoch == self.graph.epoch:
+            return False
+        if self._new_epoch[0] != view.epoch:
+            self._new_epoch = (view.epoch, now)
+        return now - self._new_epoch[1] < LEARNING_S
+
     def _count_losses(self, view: GraphView, now: float) -> None:
         total = sum(info.lost or 0 for info in view.topics.values())
         if self._lost_before is not None and total > self._lost_before:
@@ -260,12 +275,16 @@ class Session:
             self.document.set_connected(robots)
             for robot in robots:
                 self.alerts.cure(f"companion:{robot.name}")
-            if self.stopper is not None:
-                self.source.submit("watch over the robots", lambda _node: self._give_robots())
+        self._keep_within_reach()
         if self.topics.revision != self._topics_seen:
             self._topics_seen = self.topics.revision
             self.document.set_topics(sorted(topic.name for topic in self.topics.live()))
 
-    def _give_robots(self) -> None:
-        if self.stopper is not None:
-            self.stopper.set_robots([link.robot for link in self.fleet.connected])
+    def _keep_within_reach(self) -> None:
+        """Whom a stop reaches: who is there, and who went away while a program used it."""
+        kept = self.runs.kept
+        robots = tuple(link.robot for link in self.fleet.links if link.connected or link.name in kept)
+        stopper = self.stopper
+        if stopper is not None and robots != self._reachable:
+            self._reachable = robots
+            self.source.submit("watch over the robots", lambda _node: stopper.set_robots(robots))

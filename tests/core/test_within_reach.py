@@ -1,0 +1,125 @@
+"""Whom a stop reaches: also a robot that went away while a program used it, and while a master begins."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.session import LEARNING_S, Session
+from app.core.settings import Settings
+from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
+from nep.masters import Master
+from tests.core.waiting import tick_until
+
+
+@pytest.fixture
+def session(master: Master, tmp_path: Path) -> Iterator[Session]:
+    session = Session(
+        Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
+    )
+    session.start()
+    yield session
+    session.close()
+
+
+class Lamp:
+    """A robot with one action."""
+
+    def __init__(self, link: Link) -> None:
+        """Nothing to connect to."""
+
+    @action("blink", category="Looks", icon="lightbulb")
+    def blink(self, call: Call) -> None:
+        """Blinks at once."""
+
+    @safe_stop(watchdog_s=5)
+    def stop(self) -> None:
+        """Stands still at once."""
+
+
+LAMP = Kind("lamp", "Lamp", Lamp)
+
+
+def within_reach(session: Session) -> tuple[str, ...]:
+    return session.stopper.robots if session.stopper is not None else ()
+
+
+def blink_and_wait() -> dict[str, object]:
+    long = {"type": "values_number", "id": "n", "fields": {"NUMBER": 600}}
+    wait = {"type": "control_wait", "id": "w", "inputs": {"SECONDS": {"shadow": long}}}
+    blink = {"type": "robot_lamp_do_blink", "id": "b", "fields": {"ROBOT": "Lamp"}, "next": {"block": wait}}
+    started = {"type": "events_started", "id": "s", "next": {"block": blink}}
+    return {"blocks": {"languageVersion": 0, "blocks": [started]}}
+
+
+def test_a_robot_that_went_away_during_the_program_is_named_until_it_answers(session: Session) -> None:
+    with nep.node("lamps") as node:
+        driver = Driver(LAMP, "Lamp", node)
+        driver.start()
+        try:
+            tick_until(session, lambda: within_reach(session))
+            session.document.edited(blink_and_wait())
+            session.runs.run()
+            tick_until(session, lambda: "w" in session.runs.running_blocks)
+        finally:
+            driver.close()
+        tick_until(session, lambda: not session.fleet.connected)
+        for _ in range(2):  # "Stop again" is no proof either
+            session.runs.stop()
+            tick_until(session, lambda: session.runs.view().state == "stopping")
+            tick_until(session, lambda: session.runs.view().state != "stopping")
+            assert session.runs.view().title == "Lamp did not answer"
+            assert not session.runs.view().can_run
+        driver = Driver(LAMP, "Lamp", node)
+        driver.start()
+        try:
+            tick_until(session, lambda: session.fleet.connected)
+            session.runs.stop()
+            tick_until(session, lambda: session.runs.view().state == "proven")
+            assert str(session.runs.view().result).startswith("Lamp stopped (")
+        finally:
+            driver.close()
+    tick_until(session, lambda: not within_reach(session))
+
+
+def test_a_person_who_says_that_it_is_still_is_believed(session: Session) -> None:
+    with nep.node("lamps") as node:
+        driver = Driver(LAMP, "Lamp", node)
+        driver.start()
+        try:
+            tick_until(session, lambda: within_reach(session))
+            session.document.edited(blink_and_wait())
+            session.runs.run()
+            tick_until(session, lambda: "w" in session.runs.running_blocks)
+        finally:
+            driver.close()
+    tick_until(session, lambda: not session.fleet.connected)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    session.runs.confirm_still()
+    tick_until(session, lambda: not within_reach(session))
+
+
+def test_whom_a_new_master_does_not_know_yet_has_not_gone(session: Session) -> None:
+    with nep.node("lamps") as node:
+        driver = Driver(LAMP, "Lamp", node)
+        driver.start()
+        tick_until(session, lambda: within_reach(session))
+        driver.close()
+        graph = session.graph
+        session.source.close()  # from here on the test tells what the masters say
+        assert graph is not None
+        empty = replace(graph, epoch=graph.epoch + 1, nodes={}, topics={})
+        now = time.monotonic()
+        for later_s in (0.0, 1.0):
+            session._on_graph(empty, now + later_s)
+            assert session.graph is graph
+            assert session.fleet.connected
+        session._on_graph(empty, now + LEARNING_S)
+        assert session.graph is empty
+        assert not session.fleet.connected
