@@ -47,6 +47,7 @@ class Runs:
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._runner: Runner | None = None
         self._used: tuple[str, ...] = ()
+        self._program_id: str | None = None  # the last one's: robots refuse what still comes from it
         self.kept: frozenset[str] = frozenset()
         """Robots that must stay within reach of a stop, also when they are away.
 
@@ -200,7 +201,7 @@ class Runs:
             self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
-        self.kept = frozenset(program.robots)
+        self.kept, self._program_id = frozenset(program.robots), runner.program_id
         self._run = RunState(
             "running", self._document.name, started_s=self._clock(), last_words=self._run.last_words
         )
@@ -245,17 +246,23 @@ class Runs:
         run.asked = names if names is not None else everybody
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
-        work = partial(self._stop_all, self._stop_number, self._runner, self._network.stopper, names)
+        work = partial(
+            self._stop_all, self._stop_number, self._runner, self._network.stopper, names, self._program_id
+        )
         self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
         self._stop_thread.start()
 
     def _stop_all(
-        self, number: int, runner: Runner | None, stopper: RobotStopper | None, names: tuple[str, ...] | None
+        self,
+        number: int,
+        runner: Runner | None,
+        stopper: RobotStopper | None,
+        names: tuple[str, ...] | None,
+        ends: str | None,
     ) -> None:
         def answered(robot: RobotStop) -> None:
             self._post_event(RobotAnswered(number, robot))
 
-        ends = runner.program_id if runner is not None else None
         if runner is not None:
             if stopper is not None:
                 stopper.send_stop(ends=ends)  # at once; told again below for robots that don't know `ends`

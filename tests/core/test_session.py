@@ -208,6 +208,7 @@ def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
     with nep.node("lamp") as node:
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
+        commands = node.new_sub("/Lamp/command", "robot/command")
         try:
             tick_until(session, lambda: session.stopper and session.stopper.robots)
             session.document.edited(json.loads(json.dumps(_forever())))
@@ -219,6 +220,11 @@ def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
             os.kill(runner.pid, signal.SIGKILL if os.name == "posix" else signal.SIGTERM)
             tick_until(session, lambda: session.runs.view().state == "proven")
             assert Lamp.made[-1].stops >= 1
+            heard = []
+            while (message := commands.receive(0.0)) is not None:
+                heard.append(message.payload)
+            stops = [command for command in heard if command["op"] == "stop"]
+            assert {stop["ends"] for stop in stops} == {runner.program_id}
             assert [alert.id for alert in session.alerts.active] == ["program"]
         finally:
             driver.close()

@@ -109,6 +109,14 @@ def test_a_closed_node_is_told_in_words(master, robots):
     assert report.robots[0].sentence.startswith("Pepper can't be told: ")
 
 
+def test_a_stop_names_the_program_that_it_ends(stopper, robots):
+    stopper.send_stop(ends="program-1")
+    stopper.stop_all(ends="program-2")
+    stopper.stop_all()
+    for robot in robots:
+        assert [stop.get("ends") for stop in robot.heard("stop")] == ["program-1", "program-2", None]
+
+
 def test_two_stops_at_the_same_time_both_get_their_answers(stopper):
     reports: list[StopReport] = []
     threads = [threading.Thread(target=lambda: reports.append(stopper.stop_all())) for _ in range(2)]
