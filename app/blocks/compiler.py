@@ -98,6 +98,7 @@ class _Compiler:
             labels=self._labels,
             problems=self._notes.problems(),
             starts=len(functions),
+            absent=self._notes.absent_blocks(),
         )
 
     # ---- scripts and statements

@@ -104,6 +104,16 @@ class Notes:
             return True
         return False
 
+    def absent_blocks(self) -> tuple[str, ...]:
+        """Every block of a robot that is not connected, also in scripts and bodies that can't run."""
+        return tuple(
+            placed.id
+            for placed in self._workspace.all_blocks()
+            if placed.type.startswith("robot_")
+            and isinstance(placed.fields.get("ROBOT"), str)
+            and placed.fields["ROBOT"] not in self._catalogue.connected
+        )
+
     def _can(self, name: str, block: Block) -> bool:
         use = block.robot
         robot = self._catalogue.connected[name]

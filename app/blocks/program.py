@@ -51,6 +51,7 @@ class Program:
     labels: Mapping[str, str] = field(default_factory=dict)
     problems: tuple[Problem, ...] = ()
     starts: int = 0  # how many scripts something can start
+    absent: tuple[str, ...] = ()  # the blocks of robots that are not connected, whether they would run or not
 
     @property
     def errors(self) -> tuple[Problem, ...]:
@@ -60,7 +61,7 @@ class Program:
     def to_json(self) -> dict[str, object]:
         """What a child process needs to run it, as JSON can hold it."""
         kept = asdict(self)
-        for name in ("source", "lines", "problems"):
+        for name in ("source", "lines", "problems", "absent"):
             del kept[name]
         return kept
 

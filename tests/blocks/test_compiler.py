@@ -8,6 +8,7 @@ from app.blocks.catalogue import Catalogue, categories
 from app.blocks.compiler import COMMANDS, compile_behaviour
 from app.blocks.fields import StatementInput, ValueInput
 from app.blocks.program import Program
+from app.blocks.workspace import parse_workspace
 from tests.blocks.fakes import FakeLink, Play, play, until
 from tests.blocks.samples import (
     block,
@@ -240,6 +241,17 @@ def test_a_block_with_an_absent_sensor_is_skipped_whole():
     saved = workspace(started(block("control_if", CONDITION=condition, BODY=[say("no")]), say("Hi")))
     assert sentences(saved) == [("warning", "NAO is not connected, so if with battery will be skipped.")]
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
+
+
+def test_every_block_of_an_absent_robot_is_told_also_where_nothing_runs():
+    inside = block("control_if", CONDITION=block("robot_nao_get_battery", ROBOT="NAO"),
+                   BODY=[say("hidden", "NAO"), say("here")])  # fmt: skip
+    loose = say("loose", "NAO")
+    program = compile_behaviour(workspace(started(inside), loose), [robot()])
+    types = {placed.id: placed for placed in parse_workspace(workspace(started(inside), loose)).all_blocks()}
+    assert len(program.absent) == 3
+    assert {types[id].fields["ROBOT"] for id in program.absent} == {"NAO"}
+    assert not compile_behaviour(workspace(started(say("here"))), [robot()]).absent
 
 
 def test_a_script_of_an_absent_robot_does_not_start():

@@ -281,6 +281,7 @@ class Document:
         self.known: Callable[[], list[Robot]] = list
         self.source = ""
         self.compiled = 0
+        self.absent_blocks: tuple[str, ...] = ("b8", "b9")
 
     def edited(self, workspace: Mapping[str, object]) -> None:
         self.calls.append(("edited", workspace))
@@ -288,7 +289,9 @@ class Document:
 
     def program(self) -> SimpleNamespace:
         self.compiled += 1
-        return SimpleNamespace(source=self.source, problems=self.found, sensors=self.sensors)
+        return SimpleNamespace(
+            source=self.source, problems=self.found, sensors=self.sensors, absent=self.absent_blocks
+        )
 
     def problems(self) -> tuple[Problem, ...]:
         return self.found

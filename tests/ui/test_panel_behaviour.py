@@ -7,7 +7,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
-from app.blocks import Problem
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour import BehaviourPanel
 from app.ui.program_view import ProgramView
@@ -102,11 +101,11 @@ def test_what_runs_glows_and_what_failed_says_so_on_its_block(panel, window) -> 
 
 
 def test_blocks_of_absent_robots_are_grey(panel, window) -> None:
-    assert editor(panel).last("set_absent") == ["b8"]
-    window.session.document.found = (Problem("info", "b3", "control", "x", "x."),)
+    assert editor(panel).last("set_absent") == ("b8", "b9")
+    window.session.document.absent_blocks = ()
     window.session.document.edits += 1
     panel.refresh()
-    assert editor(panel).last("set_absent") == []
+    assert editor(panel).last("set_absent") == ()
 
 
 def test_sensor_blocks_say_their_newest_value(panel, window) -> None:

@@ -150,8 +150,7 @@ class BehaviourPanel(PanelWidget):
         """The program is another one: its problems, the sensors it reads, its text."""
         program = self.session.document.program()
         if self.editor is not None:
-            absent = [p.block_id for p in program.problems if (p.mend_action or "").startswith("connect:")]
-            self.editor.set_absent([block for block in absent if block is not None])
+            self.editor.set_absent(program.absent)
         self._sensors = tuple(program.sensors)
         self._look_at({robot for robot, _ in self._sensors})
         if self.mode == "python":
