@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 
 from app.core.alerts import Alerts
 from app.core.fleet import Fleet
@@ -45,10 +45,22 @@ class Health:
                 self._alerts.cure(f"message:{topic}")
                 self._bad.pop(topic, None)
 
-    def check(self) -> None:
-        """Once a second: which robots' pictures have stopped coming."""
+    def check(self, used: Container[str] = ()) -> None:
+        """Once a second: which robots' pictures have stopped, and who of those in use (names) has gone."""
         for link in self._fleet.links:
             self._check_camera(link)
+            if link.connected or link.name not in used:
+                self._alerts.cure(f"robot:{link.name}")
+                continue
+            self._alerts.put(
+                f"robot:{link.name}",
+                "error",
+                f"{link.name} does not answer.",
+                "The behaviour uses it. Check that it is on and in the same Wi-Fi.",
+                button="Stop",
+                action="run.stop",
+                count=0,
+            )
 
     def graph_alerts(self, view: GraphView) -> None:
         """Take over what the master noticed (a name used twice, types that differ, a port that is taken)."""

@@ -69,12 +69,14 @@ def test_a_robot_that_went_away_during_the_program_is_named_until_it_answers(ses
         finally:
             driver.close()
         tick_until(session, lambda: not session.fleet.connected)
+        tick_until(session, lambda: session.alerts.has("robot:Lamp"))
         for _ in range(2):  # "Stop again" is no proof either
             session.runs.stop()
             tick_until(session, lambda: session.runs.view().state == "stopping")
             tick_until(session, lambda: session.runs.view().state != "stopping")
             assert session.runs.view().title == "Lamp did not answer"
             assert not session.runs.view().can_run
+            tick_until(session, lambda: not session.alerts.has("robot:Lamp"))
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
         try:
