@@ -125,3 +125,20 @@ def test_whom_a_new_master_does_not_know_yet_has_not_gone(session: Session) -> N
         session._on_graph(empty, now + LEARNING_S)
         assert session.graph is empty
         assert not session.fleet.connected
+
+
+def test_closing_the_session_ends_the_program_at_once(session: Session) -> None:
+    with nep.node("lamps") as node:
+        driver = Driver(LAMP, "Lamp", node)
+        driver.start()
+        try:
+            tick_until(session, lambda: within_reach(session))
+            session.document.edited(blink_and_wait())
+            session.runs.run()
+            tick_until(session, lambda: "w" in session.runs.running_blocks)
+            runner = session.runs._runner
+            assert runner is not None
+            session.close()
+            assert runner.wait(2.0)
+        finally:
+            driver.close()
