@@ -13,10 +13,11 @@ import pytest
 from nep.masters import Master
 
 _GRACE_S = 1.0
+_OURS = ("nep-", "studio-", "runner ", "deep json")
 
 
 def _our_threads() -> set[threading.Thread]:
-    return {thread for thread in threading.enumerate() if thread.name.startswith("nep-")}
+    return {thread for thread in threading.enumerate() if thread.name.startswith(_OURS)}
 
 
 def _listening() -> set[tuple[str, int]]:
@@ -27,7 +28,7 @@ def _listening() -> set[tuple[str, int]]:
 
 @pytest.fixture(autouse=True)
 def _nothing_is_left() -> Iterator[None]:
-    """Fails a test that leaves a thread of nep, or a listening socket, behind."""
+    """Fails a test that leaves a thread of ours, or a listening socket, behind."""
     threads, sockets = _our_threads(), _listening()
     yield
     deadline = time.monotonic() + _GRACE_S

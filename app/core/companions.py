@@ -97,6 +97,16 @@ class Companions:
                 return
             self._robots[name] = (process, log)
 
+    def restart_virtual_robot(self, name: str) -> None:
+        """Start it anew; a process of it that still lives but hangs is killed."""
+        with self._lock:
+            held = self._robots.pop(name, None)
+        if held is not None:
+            held[0].kill()
+            held[0].wait()
+            held[1].close()
+        self.start_virtual_robot(name)
+
     def stop_virtual_robot(self, name: str) -> None:
         """End a virtual robot that was started here."""
         with self._lock:

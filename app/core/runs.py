@@ -274,11 +274,12 @@ class Runs:
 
     def _tell_person(self, report: StopReport, origin: str) -> None:
         words, good = result_words(report)
-        self._console.add("info" if good else "error", origin, words)
         if good:
+            self._console.add("info", origin, words)
             self._alerts.cure("stop")
         else:
             title, detail, _, _ = unanswered_words(report)
+            self._console.add("error", origin, f"{words}: {title}")
             self._alerts.put("stop", "error", f"{title}.", detail, button="Stop again", action="run.stop")
 
     def _tell_fleet(self, report: StopReport) -> None:

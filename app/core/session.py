@@ -7,7 +7,6 @@ over what they posted.
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from app.core.fleet import Fleet
 from app.core.health import Health
 from app.core.images import Images
 from app.core.journal import Journal
+from app.core.losses import RecentLosses
 from app.core.mailbox import Drained, Mailbox
 from app.core.runner import RunnerEvent
 from app.core.runs import Runs
@@ -43,7 +43,6 @@ from nep.masters import master_address
 from nep.nodes import Node
 from nep.views import GraphView
 
-LOSS_WINDOW_S = 30.0
 CHECK_S = 1.0
 LEARNING_S = 1.5
 """How long a master that has just started may not know everybody yet (it learns for one second)."""
@@ -84,11 +83,7 @@ class Session:
         self._mailbox = Mailbox()
         self._watches = Watches(self._begin_watch, self._end_watch)
         self.images = Images(lambda topic: self._watches.open([topic]).close, clock)
-        self.source: Source = (
-            source
-            if source is not None
-            else LiveSource(self.address, [self._mailbox.post, self.images.offer], self._mailbox.post_event)
-        )
+        self.source: Source = source if source is not None else self._live_network()
         self.fleet = Fleet(self._watches, self.source.submit, clock)
         self.document = Document(lambda: Journal(journal_folder))
         self.stopper: RobotStopper | None = None
@@ -108,13 +103,16 @@ class Session:
         self.messages_per_s: float | None = None
         self.lost_30s = 0
         self.tick_ms = 0.0
-        self._losses: deque[tuple[float, int]] = deque()
-        self._lost_before: int | None = None
+        self._losses = RecentLosses()
         self._robots_seen = -1
         self._reachable: tuple[Robot, ...] = ()
         self._topics_seen = -1
         self._next_check = 0.0
         self._new_epoch = (0, 0.0)
+
+    def _live_network(self) -> LiveSource:
+        sinks = [self._mailbox.post, self.images.offer]
+        return LiveSource(self.address, sinks, self._mailbox.post_event)
 
     # -- what the window and its panels call -----------------------------------------------------------------
 
@@ -234,7 +232,7 @@ class Session:
         self.graph = view
         self.topics.update(view, now)
         self.fleet.update(view)
-        self._count_losses(view, now)
+        self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
         self.messages_per_s = total_rate_hz(list(view.topics.values()))
         self._health.graph_alerts(view)
 
@@ -258,15 +256,6 @@ class Session:
         if self._new_epoch[0] != view.epoch:
             self._new_epoch = (view.epoch, now)
         return now - self._new_epoch[1] < LEARNING_S
-
-    def _count_losses(self, view: GraphView, now: float) -> None:
-        total = sum(info.lost or 0 for info in view.topics.values())
-        if self._lost_before is not None and total > self._lost_before:
-            self._losses.append((now, total - self._lost_before))
-        self._lost_before = total
-        while self._losses and now - self._losses[0][0] > LOSS_WINDOW_S:
-            self._losses.popleft()
-        self.lost_30s = sum(count for _, count in self._losses)
 
     def _follow_robots(self) -> None:
         if self.fleet.revision != self._robots_seen:

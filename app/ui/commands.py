@@ -168,7 +168,7 @@ class Commands:
         description = self._session.document.robots.get(name, {})
         virtual = description.get("rb:robot")
         if isinstance(virtual, Mapping) and virtual.get("virtual") is True:
-            self._session.companions.start_virtual_robot(name)
+            self._session.companions.restart_virtual_robot(name)
         else:
             self._window.open_panel("robots")
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
 
+import psutil
 import pytest
 
 import nep
@@ -154,6 +155,17 @@ def test_a_virtual_robot_that_died_is_told_with_its_next_step(session: Session) 
     tick_until(session, lambda: not session.fleet.connected)
     session.companions.start_virtual_robot("Pepper")
     tick_until(session, lambda: not session.alerts.has("companion:Pepper"), 20)
+
+
+def test_a_virtual_robot_that_hangs_can_be_connected_again(session: Session) -> None:
+    session.companions.start_virtual_robot("Pepper")
+    tick_until(session, lambda: session.fleet.connected, 20)
+    hung = session.companions._robots["Pepper"][0]
+    psutil.Process(hung.pid).suspend()
+    tick_until(session, lambda: not session.fleet.connected)
+    session.companions.restart_virtual_robot("Pepper")
+    assert hung.poll() is not None
+    tick_until(session, lambda: session.fleet.connected, 20)
 
 
 def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
