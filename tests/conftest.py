@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -11,6 +12,10 @@ import psutil
 import pytest
 
 from nep.masters import Master
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 _GRACE_S = 1.0
 _OURS = ("nep-", "studio-", "runner ", "deep json")
