@@ -58,7 +58,7 @@ cp -L /etc/resolv.conf "$system/etc/resolv.conf"
 cp -L /etc/hosts "$system/etc/hosts"
 
 say "cloning $(git -C "$repository" rev-parse --short HEAD)"
-rm -rf --one-file-system "$system/root/nep-studio" "$system/home/clone"
+rm -rf --one-file-system "$system/home/clone"
 clone=/home/clone
 git clone --quiet --no-hardlinks "file://$repository" "$system$clone"
 [ $user = root ] || chown -R nobody "$system$clone"
