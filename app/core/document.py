@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -19,6 +20,7 @@ FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
 UNNAMED = "New behaviour"
+TOO_DEEP = "more than 4000 blocks hang in one stack; divide it into several scripts"
 LARGEST_BYTES = 32 * 1024 * 1024
 
 Workspace = Mapping[str, object]
@@ -57,8 +59,9 @@ class Document:
 
     def edited(self, workspace: Workspace) -> None:
         """The editor changed the blocks. They are in the journal when this returns."""
-        if deep_json.same(workspace, self.workspace):
-            return
+        with contextlib.suppress(RecursionError):  # too deep to compare: take it as changed
+            if deep_json.same(workspace, self.workspace):
+                return
         self.workspace = workspace
         self.dirty = True
         self.edits += 1
@@ -103,9 +106,11 @@ class Document:
             "workspace": self.workspace,
             "robots": self.robots,
         }
-        data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
         try:
+            data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
             write_atomically(target, data)
+        except RecursionError as error:
+            raise DocumentError(target, f"can't be written: {TOO_DEEP}") from error
         except OSError as error:
             raise DocumentError(
                 target, f"can't be written ({error.strerror or error}); save it in another place"
@@ -186,12 +191,17 @@ class Document:
             self._journal.write(self.name, self.path, self.workspace, self.robots)
         except OSError as error:
             self.journal_error = f"unsaved work can't be kept ({error.strerror or error}); save the file now"
+        except RecursionError:
+            self.journal_error = f"unsaved work can't be kept: {TOO_DEEP}"
         else:
             self.journal_error = None
 
     def _keep_used_robots(self) -> None:
         """Keep the descriptions of the robots that the blocks name: they are known without them later."""
-        text = deep_json.dumps(self.workspace)
+        try:
+            text = deep_json.dumps(self.workspace)
+        except RecursionError:
+            return  # the journal, which comes next, says so
         for robot in self._connected:
             if json.dumps(robot.name, ensure_ascii=False) in text:
                 self.robots[robot.name] = dict(robot.source)

@@ -62,6 +62,21 @@ class Health:
                 count=0,
             )
 
+    def journal(self, sentence: str | None) -> None:
+        """Whether unsaved work is kept: the sentence that says why not, or None."""
+        if sentence is None:
+            self._alerts.cure("journal")
+            return
+        self._alerts.put(
+            "journal",
+            "error",
+            "Your unsaved work is not kept.",
+            f"{sentence[0].upper()}{sentence[1:]}.",
+            button="Save",
+            action="file.save",
+            count=0,
+        )
+
     def graph_alerts(self, view: GraphView) -> None:
         """Take over what the master noticed (a name used twice, types that differ, a port that is taken)."""
         ids = set()

@@ -141,6 +141,7 @@ class Session:
             self._next_check = now + CHECK_S
             self.companions.check()
             self._health.check(self.runs.kept if self.runs.active else ())
+            self._health.journal(self.document.journal_error)
             if self.master.kind == "none" and self._start_companions:
                 self.companions.ensure_master()
         self.tick_ms = (self._clock() - began) * 1000

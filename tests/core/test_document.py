@@ -114,6 +114,21 @@ def test_a_huge_file_is_refused_unread(document: Document, tmp_path: Path) -> No
         document.open(path)
 
 
+def test_a_stack_too_long_for_json_is_a_sentence_and_stays_open(document: Document, tmp_path: Path) -> None:
+    block: dict[str, object] = {"type": "control_wait", "id": "x"}
+    for number in range(6000):
+        block = {"type": "control_wait", "id": str(number), "next": {"block": block}}
+    stack = {"blocks": {"languageVersion": 0, "blocks": [block]}}
+    document.edited(stack)
+    assert document.workspace is stack
+    assert document.journal_error is not None
+    assert "divide it into several scripts" in document.journal_error
+    with pytest.raises(DocumentError, match="divide it into several scripts"):
+        document.save(tmp_path / "long.nepb")
+    document.edited(STARTED)
+    assert document.journal_error is None
+
+
 def test_a_missing_file_is_a_sentence(document: Document, tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match="can't be read"):
         document.open(tmp_path / "none.nepb")

@@ -168,6 +168,16 @@ def test_a_virtual_robot_that_hangs_can_be_connected_again(session: Session) -> 
     tick_until(session, lambda: session.fleet.connected, 20)
 
 
+def test_a_journal_that_cant_be_written_is_an_alert_until_it_can(session: Session, tmp_path: Path) -> None:
+    folder = tmp_path / "journal"
+    folder.write_text("a file is in its place")
+    session.document.edited({"blocks": {"blocks": []}, "edit": 1})
+    tick_until(session, lambda: session.alerts.has("journal"))
+    folder.unlink()
+    session.document.edited({"blocks": {"blocks": []}, "edit": 2})
+    tick_until(session, lambda: not session.alerts.has("journal"))
+
+
 def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
     with nep.node("lamp") as node:
         driver = Driver(LAMP, "Lamp", node)
