@@ -51,6 +51,7 @@ class Member:
     publishers: dict[int, Publisher] = field(default_factory=dict)
     subscribers: dict[int, Subscriber] = field(default_factory=dict)
     hung: set[str] = field(default_factory=set)
+    cpu_ratio: float | None = None
 
 
 class Census:
@@ -173,9 +174,11 @@ class Census:
         publishers: Iterable[PublisherCount],
         subscribers: Iterable[SubscriberCount],
         now: float,
+        cpu_ratio: float | None = None,
     ) -> None:
         """Take over a node's statistics; it is alive."""
         member.renewed_at = now
+        member.cpu_ratio = cpu_ratio
         member.hung.clear()
         for count in publishers:
             publisher = member.publishers[count.id]

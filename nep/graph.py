@@ -224,7 +224,7 @@ class Graph:
             if member is not None:
                 member.renewed_at = now
             return Renewed(self.epoch, self.revision, again=True)
-        self._census.renew(member, request.publishers, request.subscribers, now)
+        self._census.renew(member, request.publishers, request.subscribers, now, request.cpu_ratio)
         topics = sorted({subscriber.record.topic for subscriber in member.subscribers.values()})
         changed = tuple(
             TopicPublishers(topic, self._census.publishers_of(topic))

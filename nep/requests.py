@@ -80,13 +80,17 @@ class Leave:
 
 @dataclass(frozen=True)
 class Renew:
-    """A node lives; its statistics. `revision` is the one of the last `Renewed` or `Joined` that it got."""
+    """A node lives; its statistics. `revision` is the one of the last `Renewed` or `Joined` that it got.
+
+    `cpu_ratio`: the share of one core that its program used since the last renewal; None if it is not known.
+    """
 
     node_id: str
     epoch: int
     revision: int
     publishers: tuple[PublisherCount, ...] = ()
     subscribers: tuple[SubscriberCount, ...] = ()
+    cpu_ratio: float | None = None
 
 
 @dataclass(frozen=True)

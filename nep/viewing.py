@@ -19,7 +19,16 @@ def view_of(census: Census, epoch: int) -> GraphView:
 
 def _node_info(member: Member) -> NodeInfo:
     node = member.node
-    return NodeInfo(node.id, node.name, node.host, node.pid, node.language, node.generation, node.since_ns)
+    return NodeInfo(
+        node.id,
+        node.name,
+        node.host,
+        node.pid,
+        node.language,
+        node.generation,
+        node.since_ns,
+        member.cpu_ratio,
+    )
 
 
 def _topic_info(census: Census, name: str) -> TopicInfo:

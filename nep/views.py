@@ -19,7 +19,11 @@ class Alert:
 
 @dataclass(frozen=True)
 class NodeInfo:
-    """A program, or a part of one. `generation` is "native", "gateway", or the original NEP's "A", "B"."""
+    """A program, or a part of one. `generation` is "native", "gateway", or the original NEP's "A", "B".
+
+    `cpu_ratio` is the share of one core that its process used in the last second (0.5 is half a core), None
+    until known; nodes of one process have the same.
+    """
 
     id: str
     name: str
@@ -28,6 +32,7 @@ class NodeInfo:
     language: str
     generation: str
     since_ns: int
+    cpu_ratio: float | None = None
 
 
 @dataclass(frozen=True)

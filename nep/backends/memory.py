@@ -17,6 +17,7 @@ from nep.encoded import Encoded
 from nep.errors import NepError, RequestRefusedError
 from nep.graph import Graph, GraphView
 from nep.inbox import Inbox
+from nep.load import CpuLoad
 from nep.message import Message
 from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
 
@@ -184,6 +185,7 @@ class MemoryCarrier:
         self.node = node
         self.changed = threading.Condition()
         self._wakes = 0
+        self._load = CpuLoad()
         self._hubs: set[_Hub] = set()
         self._outlets: list[MemoryOutlet] = []
         self._inlets: list[MemoryInlet] = []
@@ -240,20 +242,15 @@ class MemoryCarrier:
 
     def renewal(self, hub: _Hub) -> requests.Renew:
         """This node's statistics on one hub."""
+        outs = [each for each in self._outlets if each.hub is hub and not each.is_closed]
+        ins = [each for each in self._inlets if each.hub is hub and not each.is_closed]
         return requests.Renew(
             self.node.id,
             hub.graph.epoch,
             hub.graph.revision,
-            tuple(
-                PublisherCount(each.spec.id, each.count, each.bytes, each.count, each.last_stamp_ns)
-                for each in self._outlets
-                if each.hub is hub and not each.is_closed
-            ),
-            tuple(
-                SubscriberCount(each.spec.id, each.received, each.lost, each.problem)
-                for each in self._inlets
-                if each.hub is hub and not each.is_closed
-            ),
+            tuple(PublisherCount(o.spec.id, o.count, o.bytes, o.count, o.last_stamp_ns) for o in outs),
+            tuple(SubscriberCount(i.spec.id, i.received, i.lost, i.problem) for i in ins),
+            self._load.ratio(),
         )
 
     def close(self, timeout_s: float) -> None:

@@ -10,7 +10,9 @@ from hashlib import blake2b
 
 from nep.errors import BadTopicError
 from nep.gateway.census import Link, Program
+from nep.gateway.processes import load_of
 from nep.gateway.relay import Key
+from nep.load import CpuLoad
 from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
 from nep.requests import Join, Leave, Renew, Reply, Request
 from nep.wire import check_topic
@@ -40,9 +42,16 @@ class Listing:
     topic's statistics.
     """
 
-    def __init__(self, submit: Callable[[Request], Reply | None], epoch: int) -> None:
+    def __init__(
+        self,
+        submit: Callable[[Request], Reply | None],
+        epoch: int,
+        load_of: Callable[[int], CpuLoad] = load_of,
+    ) -> None:
         self._submit = submit
         self._epoch = epoch
+        self._load_of = load_of
+        self._loads: dict[str, CpuLoad] = {}
         self._shown: dict[str, Join] = {}
         self._since: dict[str, int] = {}
         self._counts: dict[Key, _Count] = {}
@@ -61,6 +70,7 @@ class Listing:
         for node_id in [known for known in self._shown if known not in wanted]:
             del self._shown[node_id]
             self._since.pop(node_id, None)
+            self._loads.pop(node_id, None)
             self._submit(Leave(node_id))
         for node_id, join in wanted.items():
             if self._shown.get(node_id) != join:
@@ -73,11 +83,20 @@ class Listing:
         for node_id, join in self._shown.items():
             publishers = tuple(self._counted(record) for record in join.publishers)
             subscribers = tuple(SubscriberCount(record.id, None, None) for record in join.subscribers)
-            self._submit(Renew(node_id, self._epoch, 0, publishers, subscribers))
+            load = self._load(node_id, join.node.pid)
+            self._submit(Renew(node_id, self._epoch, 0, publishers, subscribers, load))
 
     def close(self) -> None:
         """Take them all out."""
         self.show(())
+
+    def _load(self, node_id: str, pid: int | None) -> float | None:
+        """The share of a core that an original uses: the system knows what it does not say itself."""
+        if pid is None:
+            return None
+        if node_id not in self._loads:
+            self._loads[node_id] = self._load_of(pid)
+        return self._loads[node_id].ratio()
 
     def _record(self, program: Program) -> Join:
         since_ns = self._since.setdefault(program.node_id, time.time_ns())

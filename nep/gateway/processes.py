@@ -7,6 +7,8 @@ from typing import Protocol
 
 import psutil
 
+from nep.load import CpuLoad
+
 
 class Processes(Protocol):
     """What the gateway asks about processes of this computer; tests bring their own."""
@@ -22,6 +24,19 @@ class Processes(Protocol):
 
         `None`: the system does not let us know.
         """
+
+
+def load_of(pid: int) -> CpuLoad:
+    """How much of a core a process of this computer uses, as far as the system tells."""
+
+    def used_s() -> float | None:
+        try:
+            times = psutil.Process(pid).cpu_times()
+        except psutil.Error:
+            return None
+        return float(times.user + times.system)
+
+    return CpuLoad(used_s)
 
 
 _INTERPRETERS = {

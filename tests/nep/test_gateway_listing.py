@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 import itertools
+import os
 
 import pytest
 
 from nep.gateway.census import Link, Program
 from nep.gateway.listing import Listing
+from nep.gateway.processes import load_of
 from nep.graph import Graph
+from nep.load import CpuLoad
 from nep.requests import Look
 
 EPOCH = 77
@@ -92,6 +95,24 @@ def test_rates_are_those_of_the_topic_and_counted_once(desk, listing):
     assert topic.rate_hz == pytest.approx(30, rel=0.2)
     assert topic.bandwidth_Bps == pytest.approx(3000, rel=0.2)
     assert not any(getattr(reply, "again", False) for reply in desk.replies)
+
+
+def test_the_system_tells_the_load_of_an_original(desk):
+    used = {1: 0.0}
+    now = iter([0.0, 1.0])
+    loads = {1: CpuLoad(lambda: used[1], lambda: next(now))}
+    listing = Listing(desk.submit, EPOCH, loads.__getitem__)
+    listing.show((program("a", publishes("t")), program("b", pid=None)))
+    listing.renew()
+    assert {node.cpu_ratio for node in desk.view().nodes.values()} == {None}
+    used[1] = 0.5
+    listing.renew()
+    assert {node.name: node.cpu_ratio for node in desk.view().nodes.values()} == {"a": 0.5, "b": None}
+
+
+def test_a_process_that_is_none_has_no_load():
+    assert load_of(2**22 + 1).ratio() is None
+    assert load_of(os.getpid()).ratio() is None  # one reading tells nothing
 
 
 def test_the_names_of_one_datum_are_no_conflict_of_types(desk, listing):

@@ -167,6 +167,15 @@ def test_renewals_bring_statistics_and_what_changed(graph: Graph) -> None:
     assert (topic.lost, topic.loss_ratio) == (10, 0.25)
 
 
+def test_a_node_shows_the_load_of_its_last_renewal(graph: Graph) -> None:
+    ask(graph, Join(node("p")))
+    assert graph.view().nodes["p"].cpu_ratio is None
+    ask(graph, Renew("p", 7, 0, cpu_ratio=0.25))
+    assert graph.view().nodes["p"].cpu_ratio == 0.25
+    ask(graph, Renew("p", 7, 0))
+    assert graph.view().nodes["p"].cpu_ratio is None
+
+
 @pytest.mark.parametrize("epoch", [6, 7])
 def test_a_renewal_that_does_not_match_asks_for_everything(graph: Graph, epoch: int) -> None:
     ask(graph, AddPublisher(node("p"), publisher(2)))
@@ -241,6 +250,7 @@ REQUESTS: list[Request] = [
     RemoveSubscriber("a", 1),
     Leave("a"),
     Renew("a", 1, 2, (PublisherCount(1, 2, 3, 4, 5),), (SubscriberCount(1, None, None, "p"),)),
+    Renew("a", 1, 2, cpu_ratio=0.25),
     ReportMissing("a", 1, (2, 3)),
     Look(),
     Ping(),

@@ -15,6 +15,7 @@ from nep.backends.native.io import IoThread, Rest
 from nep.backends.native.outlet import NativeOutlet
 from nep.backends.native.sockets import Socket
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError
+from nep.load import CpuLoad
 from nep.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
 from nep.requests import (
     Added,
@@ -63,6 +64,7 @@ class MasterLink:
         self._renew_at = 0.0
         self._was_connected = False
         self._is_closed = False
+        self._load = CpuLoad()
         self.fd = self._calls.fd
 
     # ---- for the carrier, in any thread
@@ -185,6 +187,7 @@ class MasterLink:
                 self._revision,
                 tuple(outlet.counts() for outlet in outlets),
                 tuple(inlet.counts() for inlet in inlets),
+                self._load.ratio(),
             )
             self._calls.tell(request)
 

@@ -1,0 +1,74 @@
+"""The share of a core that a program uses."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from nep.load import CpuLoad
+
+
+class Hand:
+    """A clock and a counter of work, moved by hand."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.used: float | None = 3.0
+
+    def load(self) -> CpuLoad:
+        return CpuLoad(lambda: self.used, lambda: self.now)
+
+
+def test_the_first_reading_tells_nothing_the_next_ones_the_share_since() -> None:
+    hand = Hand()
+    load = hand.load()
+    assert load.ratio() is None
+    hand.now, hand.used = 101.0, 3.25
+    assert load.ratio() == pytest.approx(0.25)
+    hand.now, hand.used = 103.0, 6.25
+    assert load.ratio() == pytest.approx(1.5)
+
+
+def test_readings_close_together_repeat_the_last_share() -> None:
+    hand = Hand()
+    load = hand.load()
+    load.ratio()
+    hand.now, hand.used = 101.0, 3.5
+    assert load.ratio() == pytest.approx(0.5)
+    hand.now, hand.used = 101.1, 3.6
+    assert load.ratio() == pytest.approx(0.5)
+    hand.now, hand.used = 102.0, 3.8
+    assert load.ratio() == pytest.approx(0.3)
+
+
+def test_a_program_that_cannot_be_asked_has_no_share_until_two_new_readings() -> None:
+    hand = Hand()
+    load = hand.load()
+    load.ratio()
+    hand.now, hand.used = 101.0, None
+    assert load.ratio() is None
+    hand.now, hand.used = 102.0, 9.0
+    assert load.ratio() is None
+    hand.now, hand.used = 103.0, 9.5
+    assert load.ratio() == pytest.approx(0.5)
+
+
+def test_a_counter_that_fell_is_no_negative_share() -> None:
+    hand = Hand()
+    load = hand.load()
+    load.ratio()
+    hand.now, hand.used = 101.0, 1.0
+    assert load.ratio() == 0.0
+
+
+def test_this_process_has_a_share() -> None:
+    ticks = iter([0.0, 1.0])
+    load = CpuLoad(clock=lambda: next(ticks))
+    load.ratio()
+    end = time.process_time() + 0.02
+    while time.process_time() < end:  # 20 ms of work, whatever else the computer does
+        pass
+    found = load.ratio()
+    assert found is not None
+    assert found >= 0.02
