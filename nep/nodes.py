@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import logging
 import os
 import platform
 import secrets
@@ -20,6 +21,7 @@ from nep.configuration import Configuration, Direct, Hybrid, checked_mode, check
 from nep.errors import ClosedError, DecodeError, NepError, UnknownBackendError
 from nep.graph import GraphView
 from nep.inbox import MAX_MESSAGES, Keep
+from nep.logs import LogHandler, handler_of
 from nep.plugins import discover
 from nep.pubsub import SLICE_S, Publisher, Subscriber
 from nep.records import NodeRecord
@@ -77,6 +79,7 @@ class Node:
         self._callbacks: tuple[tuple[Subscriber, Inlet, Callable[[Any], object]], ...] = ()
         self._publishers: list[Publisher] = []
         self._is_closed = False
+        self._log_handler: LogHandler | None = None
         record = NodeRecord(
             self.id, name, platform.node(), os.getpid(), generation=generation, since_ns=time.time_ns()
         )
@@ -231,7 +234,19 @@ class Node:
                 break
         return worked
 
-    # ---- the graph, and the end
+    # ---- what it tells, the graph, and the end
+
+    @property
+    def log(self) -> logging.Logger:
+        """A logger whose records, from INFO on, Studio's Console and `nep log` show; see `nep.logs`."""
+        return self.log_handler.logger
+
+    @property
+    def log_handler(self) -> LogHandler:
+        """Publishes records as this node's; add it to a logger to publish all that a program logs."""
+        with self._lock:
+            self._log_handler = self._log_handler or handler_of(self)
+            return self._log_handler
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
         """Who is there now. Raises `MasterUnreachable` when the master does not answer in time."""
@@ -242,6 +257,9 @@ class Node:
 
         What could not be delivered is logged as a warning. Happens by itself when the interpreter ends.
         """
+        if self._log_handler is not None:
+            self._log_handler.close(timeout_s / 4)
+            timeout_s *= 3 / 4
         with self._lock:
             if self._is_closed:
                 return

@@ -1,0 +1,172 @@
+"""Log records on the bus: nothing for who never logs, bounded for who logs too much."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+import pytest
+
+import nep
+from nep.errors import ClosedError, MasterUnreachable
+from nep.logs import BURST, LEVELS, LOG_TOPIC, LOG_TYPE, TEXT_LIMIT, LogHandler, LogRecord, level_of
+from tests.nep.programs import eventually
+
+
+class Kept:
+    """A publisher that keeps; `opened` counts how often it was asked for."""
+
+    def __init__(self, failures=()):
+        self.records, self.opened, self._failures = [], 0, list(failures)
+
+    def open(self):
+        self.opened += 1
+        if self._failures:
+            raise self._failures.pop(0)
+        return self
+
+    def publish(self, payload):
+        self.records.append(payload)
+
+    @property
+    def texts(self):
+        return [record["text"] for record in self.records]
+
+
+@pytest.fixture
+def kept():
+    return Kept()
+
+
+@pytest.fixture
+def handler(kept):
+    made = LogHandler("robot", kept.open)
+    yield made
+    made.close()
+
+
+def test_a_record_says_level_text_logger_node_time_place_and_process(handler, kept):
+    handler.logger.warning("at %d %%", 9)
+    handler.close()
+    (record,) = kept.records
+    given = LogRecord.from_plain(record)
+    assert (given.level, given.text, given.name, given.node) == ("warning", "at 9 %", "robot", "robot")
+    assert given.file == "test_logs.py"
+    assert given.line
+    assert given.pid
+    assert given.stamp_ns > 1_700_000_000_000_000_000
+    assert given.to_plain() == record
+
+
+def test_who_never_logs_has_no_thread_and_no_publisher(handler, kept):
+    threads = set(threading.enumerate())
+    handler.logger.debug("too quiet")
+    handler.close()
+    assert kept.opened == 0
+    assert set(threading.enumerate()) == threads
+
+
+def test_a_record_that_reaches_the_node_and_the_root_is_published_once(handler, kept):
+    root = logging.getLogger()
+    root.addHandler(handler)
+    try:
+        handler.logger.error("once")
+        logging.getLogger("driver").error("also")
+    finally:
+        root.removeHandler(handler)
+    handler.close()
+    assert kept.texts == ["once", "also"]
+
+
+def test_an_error_brings_its_traceback(handler, kept):
+    try:
+        raise ValueError("no such luck")
+    except ValueError:
+        handler.logger.exception("it broke")
+    handler.close()
+    assert kept.texts[0].startswith("it broke\nTraceback")
+    assert kept.texts[0].endswith("ValueError: no such luck")
+
+
+def test_a_storm_is_cut_and_what_is_left_out_is_counted_exactly(kept):
+    now = [0.0]
+    handler = LogHandler("robot", kept.open, clock=lambda: now[0])
+    for number in range(10_000):
+        handler.logger.info("%d", number)
+    handler.close()
+    told = sum(int(text.split()[0]) for text in kept.texts if "left out" in text)
+    shown = [text for text in kept.texts if "left out" not in text]
+    assert shown == [str(number) for number in range(BURST)]
+    assert told == 10_000 - BURST
+
+
+def test_after_a_pause_records_come_again(kept):
+    now = [0.0]
+    handler = LogHandler("robot", kept.open, rate_hz=10, burst=2, clock=lambda: now[0])
+    for text in ("a", "b", "c"):
+        handler.logger.info(text)
+    now[0] = 0.11
+    handler.logger.info("d")
+    handler.close()
+    assert [text for text in kept.texts if "left out" not in text] == ["a", "b", "d"]
+    assert "1 log record was left out: more than 10 a second" in kept.texts
+
+
+def test_records_wait_for_a_master_and_are_given_up_when_it_never_comes():
+    kept = Kept([MasterUnreachable("127.0.0.1:1", 0.1)])
+    handler = LogHandler("robot", kept.open)
+    handler.logger.info("early")
+    eventually(lambda: kept.texts == ["early"])
+    handler.close()
+    gone = Kept([ClosedError("node")])
+    handler = LogHandler("robot", gone.open)
+    handler.logger.info("late")
+    handler.close()
+    handler.logger.info("later")
+    assert not gone.records
+
+
+def test_what_cannot_be_written_does_not_end_the_program(handler, kept, capsys):
+    handler.logger.propagate = False  # pytest's own handler raises
+    handler.logger.info("%d", "no number")
+    handler.logger.info("x" * (TEXT_LIMIT + 5))
+    handler.close()
+    assert kept.texts == [f"{'x' * TEXT_LIMIT}… ({TEXT_LIMIT + 5} characters)"]
+    capsys.readouterr()  # logging itself tells of the first on the error stream
+
+
+@pytest.mark.parametrize(
+    ("payload", "level", "text"),
+    [
+        ({"level": "WARN", "text": "x"}, "warning", "x"),
+        ({"level": 7, "text": None, "line": "no", "stamp_ns": -1, "node": 5}, "info", ""),
+        ({"level": "fatal", "text": {"a": 1}}, "critical", "{'a': 1}"),
+        ("only words", "info", "only words"),
+        ([1, 2], "info", "[1, 2]"),
+        (None, "info", ""),
+    ],
+)
+def test_whatever_somebody_publishes_becomes_a_record(payload, level, text):
+    record = LogRecord.from_plain(payload, 5)
+    assert (record.level, record.text, record.stamp_ns, record.node) == (level, text, 5, "")
+
+
+def test_levels_have_names():
+    assert [level_of(name.upper()) for name in LEVELS] == list(LEVELS)
+    assert level_of(None) == "info"
+
+
+def test_a_nodes_log_arrives_at_who_subscribes_and_closing_flushes_it(master):
+    with nep.node("page") as page, page.new_sub(LOG_TOPIC, LOG_TYPE) as sub:
+        with nep.node("robot") as robot:
+            assert LOG_TOPIC not in robot.graph().topics or not robot.graph().topics[LOG_TOPIC].publishers
+            robot.log.warning("hello")
+            robot.log.debug("unheard")
+        assert sub.listen(timeout_s=5)[1]["text"] == "hello"
+        assert sub.listen(timeout_s=0) == (False, {})
+
+
+def test_logging_needs_no_master_and_does_not_hold_up_the_end(monkeypatch):
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
+    with nep.node("alone", wait_s=0.05) as node:
+        node.log.error("nobody hears this")
