@@ -23,7 +23,8 @@ _ROOT = QModelIndex()
 class Cell:
     """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text.
 
-    Text that does not fit is shortened at its end, or in its ``middle``.
+    Text that does not fit is shortened at its end, or in its ``middle``. ``curve`` are values to draw as a
+    sparkline in place of the text, ``indent`` pixels to stand further in.
     """
 
     text: str = ""
@@ -34,6 +35,8 @@ class Cell:
     struck: bool = False
     chip: str | None = None
     middle: bool = False
+    curve: Sequence[float] = ()
+    indent: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,8 @@ class Column(Generic[Row]):
 
     ``key`` gives what it is sorted by (None at the end, whatever the direction); without it the column
     can't be sorted. ``stretch`` takes the width that is left. ``tip`` is the tooltip's sentence. Where there
-    is too little room (large text) columns that ``yield`` are not shown, the largest number first.
+    is too little room (large text) columns that ``yield`` are not shown, the largest number first. ``off``
+    ones are shown only when a person chooses them; ``words`` names one whose head is blank.
     """
 
     name: str
@@ -54,6 +58,8 @@ class Column(Generic[Row]):
     stretch: bool = False
     tip: Callable[[Row], str] | None = None
     yields: int = 0
+    off: bool = False
+    words: str = ""
 
 
 @dataclass(slots=True)
@@ -110,7 +116,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
             return column.tip(row) if column.tip is not None else None
         if role == Qt.ItemDataRole.AccessibleTextRole:
             cell = column.cell(row)
-            return ", ".join(part for part in (column.title, cell.text, cell.chip) if part)
+            return ", ".join(part for part in (column.title or column.words, cell.text, cell.chip) if part)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.figures)
         return None

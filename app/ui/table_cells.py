@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOp
 from app.ui.icons import paint_icon
 from app.ui.table import CELL_ROLE, Cell, Column, Order
 from app.ui.theme import Theme
+from app.ui.widgets.small import SPARK, paint_sparkline
 
 Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
@@ -77,6 +78,11 @@ class CellDelegate(QStyledItemDelegate):
 
     def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, figures: bool) -> None:
         theme = self._theme
+        if cell.curve:
+            place = QRectF(box.left(), box.center().y() - SPARK.height() / 2, box.width(), SPARK.height())
+            paint_sparkline(painter, place, cell.curve, theme.colour(role))
+            return
+        box = box.adjusted(cell.indent, 0, 0, 0)
         font = self._view.cell_font(cell)
         metrics = QFontMetricsF(font)
         colour = theme.colour(role)

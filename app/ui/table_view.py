@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Generic, TypeVar
 
 from PySide6.QtCore import (
     QEvent,
     QModelIndex,
     QPersistentModelIndex,
+    QPoint,
     QRectF,
     Qt,
     Signal,
@@ -30,7 +31,9 @@ from PySide6.QtWidgets import (
 
 from app.ui.table import Cell, Column, Order, TableModel
 from app.ui.table_cells import CellDelegate, Head
+from app.ui.table_columns import ColumnChoice
 from app.ui.theme import Theme
+from app.ui.widgets.menus import Menu
 
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
@@ -59,6 +62,7 @@ class TableView(QTableView, Generic[Row]):
         self.theme = theme
         self.columns: tuple[Column[Row], ...] = model.columns
         self.order: Order[Row] = Order(next((c for c in self.columns if c.name == key), None))
+        self.choice = ColumnChoice(self.columns)
         self.row_height = 26
         self.hovered_row = -1
         self.keyboard = False
@@ -68,7 +72,10 @@ class TableView(QTableView, Generic[Row]):
         self._model = model
         self.setItemDelegate(CellDelegate(theme, self, self))
         self.setHorizontalHeader(Head(theme, self, self))
-        self.horizontalHeader().sectionClicked.connect(self._sort)
+        head = self.horizontalHeader()
+        head.sectionClicked.connect(self._sort)
+        head.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        head.customContextMenuRequested.connect(lambda at: self._show_columns(head.mapToGlobal(at)))
         self.verticalHeader().hide()
         self.setShowGrid(False)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -178,15 +185,42 @@ class TableView(QTableView, Generic[Row]):
     def fit_columns(self) -> None:
         """Give the stretching column what the others leave, at least its own width; columns may give way."""
         scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
-        shown = set(range(len(self.columns)))
-        yielding = sorted((c.yields, place) for place, c in enumerate(self.columns) if c.yields)
         room = self.viewport().width()
-        while yielding and sum(scaled[place] for place in shown) > room:
-            shown.discard(yielding.pop()[1])
+        shown = self.choice.fit(scaled, room)
         rest = room - sum(scaled[place] for place in shown if not self.columns[place].stretch)
         for place, column in enumerate(self.columns):
             self.setColumnHidden(place, place not in shown)
             self.setColumnWidth(place, max(scaled[place], rest) if column.stretch else scaled[place])
+        wide = sum(scaled[place] for place in shown) > room
+        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if wide else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setHorizontalScrollBarPolicy(policy)
+
+    def column_menu(self) -> Menu:
+        """The menu in which a person chooses the columns."""
+        return self.choice.menu(self.theme, self, self.fit_columns)
+
+    def _show_columns(self, at: QPoint) -> None:
+        menu = self.column_menu()
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(at)
+
+    def saved_state(self) -> dict[str, object]:
+        """The order and the chosen columns, for a layout."""
+        order = self.order
+        return {
+            "sort": order.column.name if order.column else "",
+            "falling": order.falling,
+            "columns": self.choice.saved(),
+        }
+
+    def restore(self, state: Mapping[str, object]) -> None:
+        """Take over what `saved_state` gave; whatever does not fit is as at first."""
+        chosen = (column for column in self.columns if column.name == state.get("sort"))
+        self.order.column = next(chosen, self.columns[0])
+        self.order.falling = state.get("falling") is True
+        self.choice.restore(state.get("columns"))
+        self.fit_columns()
+        self.order_changed.emit()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

@@ -4,8 +4,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QSignalSpy, QTest
 
-from app.ui.panels.topics import PANEL, TopicsPanel, age_cell, loss_cell, name_cell, type_cell
+from app.ui.panels.topics import PANEL, TopicsPanel
 from app.ui.table import CELL_ROLE
+from app.ui.topic_columns import age_cell, curve_cell, loss_cell, name_cell, nodes_cell, type_cell
 from tests.ui.fakes import Session, Topic
 from tests.ui.panel_case import Window, button, press, ticks
 
@@ -25,9 +26,16 @@ def panel(qtbot, window) -> TopicsPanel:
     return made
 
 
-def row(panel: TopicsPanel, name: str) -> list[str]:
+FIGURES = ("topic", "type", "publishers", "rate", "bandwidth", "age", "loss")
+
+
+def place_of(panel: TopicsPanel, column: str) -> int:
+    return [each.name for each in panel.table.columns].index(column)
+
+
+def row(panel: TopicsPanel, name: str, columns: tuple[str, ...] = FIGURES) -> list[str]:
     place = panel.model.index_of(name).row()
-    return [panel.model.data(panel.model.index(place, column)) for column in range(7)]  # type: ignore[misc]
+    return [panel.model.data(panel.model.index(place, place_of(panel, column))) for column in columns]  # type: ignore[misc]
 
 
 def test_every_topic_with_its_figures(panel) -> None:
@@ -108,7 +116,7 @@ def test_the_filter_is_reached_by_the_slash_and_finds_names_types_and_nodes(qtbo
 
 def test_sorting_keeps_the_chosen_topic_and_figures_that_move_are_sorted_once_a_second(panel, window) -> None:
     panel.show_topic("/odom")
-    panel.table.horizontalHeader().sectionClicked.emit(3)  # rate: the largest first
+    panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "rate"))  #: the largest first
     assert panel.model.data(panel.model.index(0, 0)) == "/robot/depth"
     assert panel.table.chosen_key() == "/odom"
     moved = QSignalSpy(panel.model.layoutChanged)
@@ -168,7 +176,7 @@ def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed,
 
 
 def test_the_order_comes_back_with_the_layout(qtbot, panel, window) -> None:
-    panel.table.horizontalHeader().sectionClicked.emit(5)
+    panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "age"))
     again = window.make(PANEL)
     qtbot.addWidget(again)
     again.restore_state(panel.save_state())
@@ -176,3 +184,45 @@ def test_the_order_comes_back_with_the_layout(qtbot, panel, window) -> None:
     assert again.table.order.column is panel.table.order.column
     again.restore_state({"sort": "nonsense"})
     assert again.table.order.column is again.table.columns[0]
+
+
+def test_the_curve_of_the_last_rates_stands_before_the_rate(panel, window) -> None:
+    topic = window.session.topics["/odom"]
+    topic.rates.extend([49.0, 50.0, 51.0])
+    cell = panel.model.data(
+        panel.model.index(panel.model.index_of("/odom").row(), place_of(panel, "curve")), CELL_ROLE
+    )
+    assert cell.curve == (49.0, 50.0, 51.0)
+    assert panel.table.columns[place_of(panel, "curve")].tip(topic) == "Rate lately: 49.0 to 51.0 /s"
+    assert place_of(panel, "curve") + 1 == place_of(panel, "rate")
+    assert curve_cell(Topic("/silent")).curve == ()
+
+
+def test_columns_are_chosen_in_a_menu_and_come_back_with_the_layout(qtbot, panel, window) -> None:
+    assert panel.table.isColumnHidden(place_of(panel, "subscribers"))
+    (columns,) = panel.more_actions()
+    menu = columns.menu()
+    by_words = {action.text(): action for action in menu.actions()}
+    assert "Topic" not in by_words  # it names the row
+    assert [words for words, action in by_words.items() if action.isChecked()] == [
+        "Type", "Publishers", "Rate over time", "Rate /s", "Bandwidth", "Age", "Loss",
+    ]  # fmt: skip
+    by_words["Subscribers"].trigger()
+    by_words["Bandwidth"].trigger()
+    assert not panel.table.isColumnHidden(place_of(panel, "subscribers"))
+    assert panel.table.isColumnHidden(place_of(panel, "bandwidth"))
+    again = window.make(PANEL)
+    qtbot.addWidget(again)
+    again.restore_state(panel.save_state())
+    assert isinstance(again, TopicsPanel)
+    assert not again.table.isColumnHidden(place_of(panel, "subscribers"))
+    assert again.table.isColumnHidden(place_of(panel, "bandwidth"))
+    (columns,) = again.more_actions()
+    next(action for action in columns.menu().actions() if action.text() == "As at first").trigger()
+    assert again.table.isColumnHidden(place_of(panel, "subscribers"))
+    assert again.save_state()["columns"] == {}
+
+
+def test_who_publishes_can_be_a_column() -> None:
+    topic = Topic("/x", publisher_nodes=("camera", "lidar"), subscribers=2)
+    assert nodes_cell(topic).text == "camera, lidar"

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
-from PySide6.QtCore import QModelIndex, QPoint, Qt
+from PySide6.QtCore import QModelIndex, QPoint, QRectF, Qt
+from PySide6.QtGui import QImage, QPainter
 from PySide6.QtTest import QSignalSpy, QTest
 
 from app.ui.table import CELL_ROLE, Cell, Column, Order, TableModel
+from app.ui.table_columns import ColumnChoice
 from app.ui.table_view import TableView
 from app.ui.theme import Theme
 
@@ -127,3 +129,50 @@ def test_row_height_follows_the_density(view) -> None:
     view.set_row_height(36, large=True)
     assert view.rowHeight(0) == 36
     assert view.cell_font(Cell("x")).pixelSize() == 14
+
+
+def test_a_column_that_a_person_asked_for_does_not_give_way(view) -> None:
+    columns = (
+        COLUMNS[0],
+        replace(COLUMNS[1], yields=1),
+        Column("own", "Own", 60, lambda _row: Cell(), off=True),
+    )
+    choice = ColumnChoice(columns)
+    assert choice.fit([100, 60, 60], 300) == {0, 1}
+    assert choice.fit([100, 60, 60], 120) == {0}
+    choice.set("own", True)
+    assert choice.fit([100, 60, 60], 120) == {0, 2}
+    choice.set("name", False)
+    assert choice.fit([100, 60, 60], 300) == {0, 1, 2}  # the first names the row
+
+
+def test_the_choice_of_columns_is_kept_and_what_is_no_choice_is_left_out() -> None:
+    choice = ColumnChoice(COLUMNS)
+    choice.set("rate", False)
+    again = ColumnChoice(COLUMNS)
+    again.restore({**choice.saved(), "gone": True, "name": "yes"})
+    assert again.saved() == {"rate": False}
+    again.restore("nonsense")
+    assert not again.changed
+
+
+@pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+def test_a_right_click_on_the_head_offers_the_columns(qtbot, qapp, view) -> None:
+    view.horizontalHeader().customContextMenuRequested.emit(QPoint(10, 10))
+    menu = qapp.activePopupWidget()
+    assert menu is not None
+    assert [action.text() for action in menu.actions() if action.text()] == ["Rate", "As at first"]
+    menu.close()
+
+
+def test_a_cell_paints_its_curve(qapp, view, model) -> None:
+    delegate = view.itemDelegate()
+    image = QImage(80, 26, QImage.Format.Format_RGB32)
+    image.fill(view.theme.colour("panel"))
+    painter = QPainter(image)
+    delegate._paint_cell(painter, QRectF(0, 0, 80, 26), Cell(curve=(0.0, 1.0)), "text", figures=False)
+    painter.end()
+    inked = [
+        x for x in range(80) if any(image.pixelColor(x, y) != view.theme.colour("panel") for y in range(26))
+    ]
+    assert len(inked) > 60

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core.source import NODE_NAME
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
-from app.ui.table import Cell, Column, TableModel
+from app.ui.table import TableModel
 from app.ui.table_view import TableView
+from app.ui.topic_columns import columns
 from app.ui.widgets import EmptyAction, EmptyState, Line, SearchField, label
-from app.ui.words import age_words, bandwidth_words, plural, rate_words
+from app.ui.words import plural
 
 if TYPE_CHECKING:
     from app.core.topics import Topic
@@ -23,103 +23,7 @@ if TYPE_CHECKING:
 FOOT = "Rates come from the publishers; nothing is subscribed but what you look at"
 FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second
 SORT_EVERY = 30
-ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
 LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
-
-
-def _ink(topic: Topic, role: str) -> str:
-    return role if topic.gone_s is None else "textDisabled"
-
-
-def name_cell(topic: Topic) -> Cell:
-    """The name: bold with a chip while new, struck through when it has vanished."""
-    gone = topic.gone_s is not None
-    chip = "new" if topic.new and not gone else None
-    return Cell(topic.name, role=_ink(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip)
-
-
-def type_cell(topic: Topic) -> Cell:
-    """The type's icon and word; of "robot/answer" the last one, the tooltip has the whole."""
-    icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
-    return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"), middle=True)
-
-
-def publishers_cell(topic: Topic) -> Cell:
-    """How many programs publish it."""
-    return Cell(str(topic.publishers), role=_ink(topic, "text"))
-
-
-def rate_cell(topic: Topic) -> Cell:
-    """Messages a second."""
-    return Cell(rate_words(topic.rate_hz), role=_ink(topic, "text"))
-
-
-def bandwidth_cell(topic: Topic) -> Cell:
-    """Bytes a second."""
-    return Cell(bandwidth_words(topic.bandwidth_Bps), role=_ink(topic, "text"))
-
-
-def age_cell(topic: Topic) -> Cell:
-    """How old the newest message is, or since when the topic is gone."""
-    if topic.gone_s is not None:
-        return Cell(f"gone {int(topic.gone_s)} s", role="textDisabled")
-    return Cell(age_words(topic.age_s))
-
-
-def loss_cell(topic: Topic) -> Cell:
-    """What was lost, with a warning when it is not nothing; blank when nobody knows."""
-    if topic.lost is None or topic.gone_s is not None:
-        return Cell()
-    if topic.lost == 0:
-        return Cell("0")
-    share = topic.loss_ratio
-    return Cell(
-        f"{share:.1%}".replace("%", " %") if share is not None else str(topic.lost), "triangle-alert", "warn"
-    )
-
-
-def _publishers_tip(topic: Topic) -> str:
-    return (
-        "Published by " + ", ".join(topic.publisher_nodes) if topic.publisher_nodes else "Nobody publishes it"
-    )
-
-
-def _loss_tip(topic: Topic) -> str:
-    return (
-        f"{plural(topic.lost, 'message')} lost"
-        if topic.lost is not None
-        else "No subscriber tells what is lost"
-    )
-
-
-COLUMNS: tuple[Column[Topic], ...] = (
-    Column("topic", "Topic", 150, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
-    Column("type", "Type", 102, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
-    Column(
-        "publishers",
-        "Publishers",
-        76,
-        publishers_cell,
-        lambda t: t.publishers,
-        figures=True,
-        tip=_publishers_tip,
-        yields=4,
-    ),
-    Column("rate", "Rate /s", 56, rate_cell, lambda t: t.rate_hz, figures=True),
-    Column("bandwidth", "Bandwidth", 77, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
-    Column("age", "Age", 56, age_cell, lambda t: t.age_s, figures=True, yields=2),
-    Column("loss", "Loss", 60, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
-)
-
-
-def columns(own: Callable[[Topic], bool]) -> tuple[Column[Topic], ...]:
-    """The columns; what is Studio's ``own`` is no news."""
-
-    def named(topic: Topic) -> Cell:
-        cell = name_cell(topic)
-        return replace(cell, bold=False, chip=None) if cell.chip and own(topic) else cell
-
-    return (replace(COLUMNS[0], cell=named), *COLUMNS[1:])
 
 
 class TopicsPanel(PanelWidget):
@@ -237,16 +141,16 @@ class TopicsPanel(PanelWidget):
     def theme_changed(self) -> None:
         self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
 
+    def more_actions(self) -> list[QAction]:
+        columns = QAction(self.theme.icon("columns-2"), "Columns", self)
+        columns.setMenu(self.table.column_menu())
+        return [columns]
+
     def save_state(self) -> dict[str, object]:
-        order = self.table.order
-        return {"sort": order.column.name if order.column else "", "falling": order.falling}
+        return self.table.saved_state()
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        first = self.table.columns[0]
-        chosen = (column for column in self.table.columns if column.name == state.get("sort"))
-        self.table.order.column = next(chosen, first)
-        self.table.order.falling = state.get("falling") is True
-        self._rebuild()
+        self.table.restore(state)
 
 
 class _Filter(SearchField):
