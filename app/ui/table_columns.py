@@ -24,7 +24,7 @@ class ColumnChoice:
         """Whether the column is to be shown where there is room."""
         return self._chosen.get(column.name, not column.off) or column is self._columns[0]
 
-    def set(self, name: str, shown: bool) -> None:
+    def show(self, name: str, shown: bool) -> None:
         """Show a column, or not."""
         for column in self._columns[1:]:
             if column.name == name:
@@ -61,7 +61,11 @@ class ColumnChoice:
         menu = Menu(theme, parent, "Columns")
 
         def choose(name: str, shown: bool) -> None:
-            self.set(name, shown)
+            self.show(name, shown)
+            changed()
+
+        def begin_anew() -> None:
+            self.reset()
             changed()
 
         for column in self._columns[1:]:
@@ -72,7 +76,7 @@ class ColumnChoice:
         menu.addSeparator()
         again = menu.addAction("As at first")
         again.setEnabled(self.changed)
-        again.triggered.connect(lambda: (self.reset(), changed()))
+        again.triggered.connect(lambda _on=False: begin_anew())
         return menu
 
     def saved(self) -> dict[str, bool]:
@@ -85,4 +89,4 @@ class ColumnChoice:
         if isinstance(saved, Mapping):
             for name, shown in saved.items():
                 if isinstance(name, str) and isinstance(shown, bool):
-                    self.set(name, shown)
+                    self.show(name, shown)

@@ -140,15 +140,15 @@ def test_a_column_that_a_person_asked_for_does_not_give_way(view) -> None:
     choice = ColumnChoice(columns)
     assert choice.fit([100, 60, 60], 300) == {0, 1}
     assert choice.fit([100, 60, 60], 120) == {0}
-    choice.set("own", True)
+    choice.show("own", True)
     assert choice.fit([100, 60, 60], 120) == {0, 2}
-    choice.set("name", False)
+    choice.show("name", False)
     assert choice.fit([100, 60, 60], 300) == {0, 1, 2}  # the first names the row
 
 
 def test_the_choice_of_columns_is_kept_and_what_is_no_choice_is_left_out() -> None:
     choice = ColumnChoice(COLUMNS)
-    choice.set("rate", False)
+    choice.show("rate", False)
     again = ColumnChoice(COLUMNS)
     again.restore({**choice.saved(), "gone": True, "name": "yes"})
     assert again.saved() == {"rate": False}
