@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,26 +12,21 @@ from pathlib import Path
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.mend import mend
 from app.core import deep_json
-from app.core.files import write_atomically
+from app.core.behaviour_file import TOO_DEEP, BehaviourFile, Descriptions, Workspace, read_file, write_file
 from app.core.journal import Journal, Unsaved
 from app.errors import DescriptionError, DocumentError
 from app.robots.description import Robot, parse
 
-FORMAT = "nep-behaviour"
-VERSION = 1
-SUFFIX = ".nepb"
 UNNAMED = "New behaviour"
-TOO_DEEP = "more than 4000 blocks hang in one stack; divide it into several scripts"
-LARGEST_BYTES = 32 * 1024 * 1024
 
-Workspace = Mapping[str, object]
-Descriptions = Mapping[str, Mapping[str, object]]
+_keys = itertools.count(1)
 
 
 class Document:
     """One behaviour.
 
-    ``revision`` grows when it is replaced from outside the editor, ``edits`` with every edit.
+    ``key`` names it among those that are open. ``revision`` grows when it is replaced from outside the
+    editor, ``mends`` when Studio changed its blocks in a way that can be undone, ``edits`` with every edit.
     """
 
     def __init__(
@@ -40,13 +36,16 @@ class Document:
         self._make_journal = journal
         self._clock = clock
         self._journal = journal()
+        self.key = f"behaviour-{next(_keys)}"
         self.path: Path | None = None
         self.name = UNNAMED
+        self.others: Mapping[str, object] = {}
         self.workspace: Workspace = {}
         self.robots: dict[str, Mapping[str, object]] = {}
         self.dirty = False
         self.saved_at: float | None = None
         self.revision = 0
+        self.mends = 0
         self.edits = 0
         self.definitions_revision = 0
         self._connected: tuple[Robot, ...] = ()
@@ -70,25 +69,23 @@ class Document:
 
     def new(self, name: str = UNNAMED) -> None:
         """Begin an empty behaviour."""
-        self._replace(name, None, {}, {})
+        self._replace(BehaviourFile(name, {}, {}), None)
 
     def open(self, path: Path) -> None:
         """Open a file. Raises DocumentError; then what was open stays."""
-        name, workspace, robots = read(path)
-        self._replace(name, path, workspace, robots)
+        self._replace(read_file(path), path)
         self.saved_at = path.stat().st_mtime
 
     def example(self, path: Path) -> None:
         """Open an example as a new, unsaved behaviour. Raises DocumentError."""
-        name, workspace, robots = read(path)
-        self._replace(name, None, workspace, robots)
+        self._replace(read_file(path), None)
 
     def recover(self, unsaved: Unsaved) -> None:
         """Put back what a crash left behind.
 
         It is unsaved, and journalled anew before the old journal goes.
         """
-        self._replace(unsaved.name, unsaved.path, unsaved.workspace, unsaved.robots)
+        self._replace(BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots), unsaved.path)
         self.dirty = True
         self._write_journal()
         unsaved.journal.unlink(missing_ok=True)
@@ -99,22 +96,7 @@ class Document:
         if target is None:
             raise DocumentError(None, "this behaviour has no file yet; choose one")
         name = target.stem if path is not None else self.name
-        content = {
-            "format": FORMAT,
-            "version": VERSION,
-            "name": name,
-            "workspace": self.workspace,
-            "robots": self.robots,
-        }
-        try:
-            data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
-            write_atomically(target, data)
-        except RecursionError as error:
-            raise DocumentError(target, f"can't be written: {TOO_DEEP}") from error
-        except OSError as error:
-            raise DocumentError(
-                target, f"can't be written ({error.strerror or error}); save it in another place"
-            ) from error
+        write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
         self.path, self.name = target, name
         self.dirty = False
         self.saved_at = self._clock()
@@ -126,8 +108,23 @@ class Document:
         if mended is None:
             return False
         self.edited(mended)
-        self.revision += 1
+        self.mends += 1
         return True
+
+    def lose_file(self) -> None:
+        """Another behaviour was saved as its file: its blocks are unsaved work now."""
+        self.path, self.dirty = None, True
+        self._write_journal()
+
+    @property
+    def blank(self) -> bool:
+        """Whether it is a new behaviour that nobody has touched: another may take its place."""
+        return self.path is None and not self.dirty and not self.workspace
+
+    @property
+    def journal(self) -> str:
+        """The name of the file that keeps its unsaved work."""
+        return self._journal.name
 
     def close(self) -> None:
         """The window closes: unsaved work stays in the journal and is offered at the next start."""
@@ -176,11 +173,11 @@ class Document:
 
     # -- inside ----------------------------------------------------------------------------------------------
 
-    def _replace(self, name: str, path: Path | None, workspace: Workspace, robots: Descriptions) -> None:
+    def _replace(self, found: BehaviourFile, path: Path | None) -> None:
         self._journal.discard()
         self._journal = self._make_journal()
-        self.name, self.path, self.workspace = name, path, workspace
-        self.robots = dict(robots)
+        self.name, self.path, self.workspace = found.name, path, found.workspace
+        self.robots, self.others = dict(found.robots), found.others
         self.dirty = False
         self.saved_at = None
         self.revision += 1
@@ -220,24 +217,5 @@ def _parsed(description: Mapping[str, object]) -> Robot | None:
 
 def read(path: Path) -> tuple[str, Workspace, Descriptions]:
     """Name, workspace and robots of a behaviour file. Raises DocumentError with what to do next."""
-    try:
-        size = path.stat().st_size
-        data = path.read_bytes() if size <= LARGEST_BYTES else b""
-    except OSError as error:
-        raise DocumentError(path, f"can't be read ({error.strerror or error})") from error
-    if size > LARGEST_BYTES:
-        raise DocumentError(path, f"is {size // 1_000_000} MB; a behaviour has at most 32 MB")
-    try:
-        content = deep_json.loads(data.decode("utf-8", "surrogatepass"))
-    except (ValueError, RecursionError) as error:
-        raise DocumentError(path, "is damaged or no behaviour; open a copy from before") from error
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DocumentError(path, f"is no behaviour; behaviours are files ending in {SUFFIX}")
-    version = content.get("version")
-    if not isinstance(version, int) or version > VERSION:
-        raise DocumentError(path, f"was made by a newer NEP Studio (version {version}); update this one")
-    workspace, robots = content.get("workspace"), content.get("robots", {})
-    if not isinstance(workspace, dict) or not isinstance(robots, dict):
-        raise DocumentError(path, "has no blocks in it; open a copy from before")
-    described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
-    return str(content.get("name") or path.stem), workspace, described
+    found = read_file(path)
+    return found.name, found.workspace, found.robots

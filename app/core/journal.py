@@ -41,6 +41,11 @@ class Journal:
         self._clock = clock
         self._file = self._folder / f"{uuid.uuid4().hex}.json"
 
+    @property
+    def name(self) -> str:
+        """The name of its file."""
+        return self._file.name
+
     def write(
         self,
         name: str,

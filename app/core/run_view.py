@@ -68,8 +68,30 @@ class RunView:
     stop_filled: bool = True
 
 
-def view_of(run: RunState, connected: Sequence[str], now: float) -> RunView:
-    """The run bar for this state, the names of the connected robots, and the time."""
+def view_of(run: RunState, connected: Sequence[str], now: float, *, elsewhere: bool = False) -> RunView:
+    """The run bar for this state, the names of the connected robots, and the time.
+
+    ``elsewhere``: the run belongs to a behaviour whose tab does not show, so the title names it.
+    """
+    view = _view(run, connected, now)
+    return _named(view, run) if elsewhere and run.name and run.state != "ready" else view
+
+
+def _named(view: RunView, run: RunState) -> RunView:
+    """The same with the behaviour's name, for when another one's blocks are to be seen."""
+    if view.state == "running":
+        return replace(view, title=f"{run.name} runs{view.title.removeprefix('Running')}")
+    if view.state == "paused":
+        return replace(view, title=f"{run.name} is {view.title[:1].lower()}{view.title[1:]}")
+    if view.state == "stopping":
+        return replace(view, title=f"Stopping {run.name}")
+    if view.state == "proven":
+        detail = "" if run.dashed and not run.errors else view.detail
+        return replace(view, title=f"{run.name} {view.title[:1].lower()}{view.title[1:]}", detail=detail)
+    return view
+
+
+def _view(run: RunState, connected: Sequence[str], now: float) -> RunView:
     early = run.state == "stopping" and now - run.pressed_s < STOPPING_SHOWN_AFTER_S
     views: dict[str, Callable[[RunState, float], RunView]] = {
         "running": _running,

@@ -6,12 +6,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol
 
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.document import Document
 from app.core.fleet import Fleet
+from app.core.run_needs import Behaviours, Network
 from app.core.run_view import RunState, RunView, result_words, stop_words, unanswered_words, view_of
 from app.core.runner import Runner, RunnerEvent
 from app.core.stop_events import OneStopped, RobotAnswered, StopDone
@@ -21,19 +21,12 @@ from app.errors import AppError
 STOP_TIMEOUT_S = 1.0
 
 
-class Network(Protocol):
-    """What a run needs of the network."""
-
-    address: str
-    stopper: RobotStopper | None
-
-
 class Runs:
     """The behaviour's runs. One thread uses it (the window's); the stop itself happens beside it."""
 
     def __init__(
         self,
-        document: Document,
+        documents: Behaviours,
         fleet: Fleet,
         network: Network,
         *,
@@ -43,8 +36,10 @@ class Runs:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Nothing runs yet."""
-        self._document, self._fleet, self._network = document, fleet, network
+        self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
+        self.document: Document | None = None
+        """The behaviour that the run belongs to; its blocks glow, fail and stop."""
         self._runner: Runner | None = None
         self._used: tuple[str, ...] = ()
         self._program_id: str | None = None  # the last one's: robots refuse what still comes from it
@@ -72,7 +67,8 @@ class Runs:
     def view(self) -> RunView:
         """What the run bar says now."""
         names = [link.name for link in self._fleet.connected]
-        return view_of(self._run, names, self._clock())
+        elsewhere = self.document is not None and self.document is not self._documents.current
+        return view_of(self._run, names, self._clock(), elsewhere=elsewhere)
 
     def run(self) -> None:
         """Run the behaviour as it is now; while paused, go on. Problems are told on their blocks."""
@@ -185,25 +181,26 @@ class Runs:
     # -- inside ------------------------------------------------------------------------------------------
 
     def _begin(self, *, paused: bool) -> None:
+        document = self.document = self._documents.current
         self._alerts.cure("program")
         self._set_errors({})
         self._mark()
         try:
-            program = self._document.program()
+            program = document.program()
             wrong = {p.block_id: p.sentence for p in program.problems if p.severity == "error" and p.block_id}
             if wrong:
                 self._set_errors(wrong)
                 return
             runner = Runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
-            runner.start(program, robots, self._network.address, name=self._document.name, paused=paused)
+            runner.start(program, robots, self._network.address, name=document.name, paused=paused)
         except AppError as error:
             self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self.kept, self._program_id = frozenset(program.robots), runner.program_id
         self._run = RunState(
-            "running", self._document.name, started_s=self._clock(), last_words=self._run.last_words
+            "running", document.name, started_s=self._clock(), last_words=self._run.last_words
         )
         self._console.add("info", self._run.name, "started")
 

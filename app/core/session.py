@@ -16,6 +16,7 @@ from app.core.arrivals import arrivals
 from app.core.companions import CompanionFailed, Companions
 from app.core.console import Console
 from app.core.document import Document
+from app.core.documents import Documents
 from app.core.fleet import Fleet
 from app.core.health import Health
 from app.core.images import Images
@@ -85,11 +86,11 @@ class Session:
         self.images = Images(lambda topic: self._watches.open([topic]).close, clock)
         self.source: Source = source if source is not None else self._live_network()
         self.fleet = Fleet(self._watches, self.source.submit, clock)
-        self.document = Document(lambda: Journal(journal_folder))
+        self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.stopper: RobotStopper | None = None
         self.companions = Companions(self.address, self._mailbox.post_event)
         self.runs = Runs(
-            self.document,
+            self.documents,
             self.fleet,
             self,
             alerts=self.alerts,
@@ -116,6 +117,11 @@ class Session:
 
     # -- what the window and its panels call -----------------------------------------------------------------
 
+    @property
+    def document(self) -> Document:
+        """The behaviour whose tab shows."""
+        return self.documents.current
+
     def start(self) -> None:
         """Start the threads; a master is started when none answers."""
         self.source.start()
@@ -141,7 +147,7 @@ class Session:
             self._next_check = now + CHECK_S
             self.companions.check()
             self._health.check(self.runs.kept if self.runs.active else ())
-            self._health.journal(self.document.journal_error)
+            self._health.journal(self.documents.journal_error)
             if self.master.kind == "none" and self._start_companions:
                 self.companions.ensure_master()
         self.tick_ms = (self._clock() - began) * 1000
@@ -149,7 +155,7 @@ class Session:
     def close(self) -> None:
         """End the program, the threads and the processes that were started here."""
         self.runs.close()
-        self.document.close()
+        self.documents.end()
         self.fleet.close()
         if self.stopper is not None:
             self.stopper.close()
@@ -262,13 +268,13 @@ class Session:
         if self.fleet.revision != self._robots_seen:
             self._robots_seen = self.fleet.revision
             robots = [link.robot for link in self.fleet.connected]
-            self.document.set_connected(robots)
+            self.documents.set_connected(robots)
             for robot in robots:
                 self.alerts.cure(f"companion:{robot.name}")
         self._keep_within_reach()
         if self.topics.revision != self._topics_seen:
             self._topics_seen = self.topics.revision
-            self.document.set_topics(sorted(topic.name for topic in self.topics.live()))
+            self.documents.set_topics(sorted(topic.name for topic in self.topics.live()))
 
     def _keep_within_reach(self) -> None:
         """Whom a stop reaches: who is there, and who went away while a program used it."""

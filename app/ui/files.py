@@ -11,7 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.blocks.mend import mend
-from app.core.document import SUFFIX
+from app.core.behaviour_file import SUFFIX
 from app.core.journal import Unsaved
 from app.core.session import Session
 from app.core.settings import home

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.core.document import LARGEST_BYTES, Document, read
+from app.core.behaviour_file import LARGEST_BYTES
+from app.core.document import Document, read
 from app.core.journal import Journal, left_behind
 from app.errors import DocumentError
 from app.robots import rize

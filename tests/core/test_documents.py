@@ -1,0 +1,224 @@
+"""Several behaviours open at once: tabs, the current one, closing and opening again, the next start."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.core.behaviour_file import BehaviourFile, write_file
+from app.core.document import Document
+from app.core.documents import Documents
+from app.core.journal import Journal, left_behind
+from app.errors import DocumentError
+from app.robots import rize
+
+STARTED: dict[str, object] = {
+    "blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": "a", "x": 1, "y": 2}]}
+}
+OTHER: dict[str, object] = {
+    "blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": "b", "x": 1, "y": 2}]}
+}
+
+
+@pytest.fixture
+def journals(tmp_path: Path) -> Path:
+    return tmp_path / "journal"
+
+
+def opened(journals: Path) -> Documents:
+    return Documents(lambda: Document(lambda: Journal(journals)))
+
+
+@pytest.fixture
+def documents(journals: Path) -> Documents:
+    return opened(journals)
+
+
+def file(folder: Path, name: str, blocks: dict[str, object] = STARTED) -> Path:
+    path = folder / f"{name}.nepb"
+    write_file(path, BehaviourFile(name, blocks, {}))
+    return path
+
+
+def names(documents: Documents) -> list[str]:
+    return [document.name for document in documents]
+
+
+def as_if_dead(journals: Path) -> None:
+    """The journals' process is gone."""
+    for journal in journals.glob("*.json"):
+        entry = json.loads(journal.read_bytes())
+        entry["pid"], entry["born_s"] = 2**22 + 5, 0.0
+        journal.write_text(json.dumps(entry))
+
+
+def test_a_file_takes_the_place_of_an_untouched_behaviour_and_then_a_tab_each(documents, tmp_path) -> None:
+    documents.open(file(tmp_path, "A"))
+    documents.open(file(tmp_path, "B"))
+    assert names(documents) == ["A", "B"]
+    assert documents.current.name == "B"
+    documents.show(next(iter(documents)))
+    documents.open(file(tmp_path, "C"))
+    assert names(documents) == ["A", "C", "B"], "beside the tab that shows"
+
+
+def test_a_file_that_is_open_shows_its_tab(documents, tmp_path) -> None:
+    path = file(tmp_path, "A")
+    first = documents.open(path)
+    documents.open(file(tmp_path, "B"))
+    assert documents.open(tmp_path / "." / "A.nepb") is first
+    assert documents.current is first
+    assert len(documents) == 2
+
+
+def test_a_bad_file_changes_no_tab(documents, tmp_path) -> None:
+    documents.open(file(tmp_path, "A"))
+    (tmp_path / "bad.nepb").write_text("{")
+    revision = documents.revision
+    with pytest.raises(DocumentError):
+        documents.open(tmp_path / "bad.nepb")
+    assert (names(documents), documents.revision) == (["A"], revision)
+
+
+def test_new_behaviours_have_names_of_their_own(documents) -> None:
+    first = documents.new()
+    assert documents.new() is first, "an untouched one is taken as it is"
+    documents.current.edited(STARTED)
+    documents.new()
+    documents.current.edited(STARTED)
+    documents.new()
+    assert names(documents) == ["New behaviour", "New behaviour 2", "New behaviour 3"]
+    assert len({document.key for document in documents}) == 3
+
+
+def test_each_tab_has_its_own_blocks_journal_and_mark(documents, journals, tmp_path) -> None:
+    documents.open(file(tmp_path, "A"))
+    documents.open(file(tmp_path, "B"))
+    first, second = documents
+    first.edited(OTHER)
+    assert (first.dirty, second.dirty) == (True, False)
+    assert (first.workspace, second.workspace) == (OTHER, STARTED)
+    assert [journal.name for journal in journals.glob("*.json")] == [first.journal]
+
+
+def test_tabs_are_reached_round_the_ends_and_moved(documents, tmp_path) -> None:
+    for name in "ABC":
+        documents.open(file(tmp_path, name))
+    assert documents.neighbour(1).name == "A"
+    assert documents.neighbour(-1).name == "B"
+    documents.move(documents.current, 0)
+    assert names(documents) == ["C", "A", "B"]
+    assert documents.current.name == "C"
+
+
+def test_closing_shows_the_neighbour_and_the_last_leaves_an_empty_one(documents, tmp_path) -> None:
+    for name in "ABC":
+        documents.open(file(tmp_path, name))
+    documents.show(documents.with_path(tmp_path / "B.nepb"))
+    documents.close(documents.current)
+    assert documents.current.name == "C"
+    documents.close(documents.current)
+    documents.close(documents.current)
+    assert names(documents) == ["New behaviour"]
+    assert documents.current.blank
+
+
+def test_closed_tabs_open_again_the_last_first(documents, tmp_path) -> None:
+    for name in "AB":
+        documents.open(file(tmp_path, name))
+    for document in tuple(documents):
+        documents.close(document)
+    assert documents.can_reopen
+    assert [documents.reopen().name, documents.reopen().name] == ["B", "A"]
+    assert documents.reopen() is None
+    assert not documents.can_reopen
+
+
+def test_saving_over_the_file_of_another_tab_keeps_its_blocks(documents, journals, tmp_path) -> None:
+    path = file(tmp_path, "A")
+    first = documents.open(path)
+    documents.open(file(tmp_path, "B", OTHER))
+    documents.current.save(path)
+    documents.saved(documents.current)
+    assert (first.path, first.dirty, first.workspace) == (None, True, STARTED)
+    assert (journals / first.journal).is_file()
+
+
+def test_every_tab_knows_the_robots_also_one_that_opens_later(documents, tmp_path) -> None:
+    documents.open(file(tmp_path, "A"))
+    documents.set_connected([rize.robot("Pepper")])
+    documents.set_topics(["/faces"])
+    documents.open(file(tmp_path, "B"))
+    for document in documents:
+        text = json.dumps(document.definitions())
+        assert "Pepper" in text
+        assert "/faces" in text
+
+
+def test_tabs_come_back_with_what_was_not_saved(documents, journals, tmp_path) -> None:
+    for name in "AB":
+        documents.open(file(tmp_path, name))
+    documents.show(next(iter(documents)))
+    documents.current.edited(OTHER)
+    documents.new()
+    documents.current.edited(STARTED)
+    kept = json.loads(json.dumps(documents.kept()))
+    documents.end()
+    as_if_dead(journals)
+    after = opened(journals)
+    taken = after.put_back(kept, left_behind(journals), ended_well=True)
+    assert names(after) == ["A", "New behaviour", "B"]
+    assert [document.dirty for document in after] == [True, True, False]
+    assert next(iter(after)).workspace == OTHER
+    assert after.current.name == "New behaviour"
+    assert len(taken) == 2
+    assert len(list(journals.glob("*.json"))) == 2, "journalled anew"
+
+
+def test_after_a_crash_files_come_back_as_saved_and_unsaved_work_waits_for_an_answer(
+    documents, journals, tmp_path
+) -> None:
+    documents.open(file(tmp_path, "A"))
+    documents.current.edited(OTHER)
+    kept = documents.kept()
+    as_if_dead(journals)
+    after = opened(journals)
+    left = left_behind(journals)
+    assert after.put_back(kept, left, ended_well=False) == set()
+    assert (names(after), after.current.workspace, after.current.dirty) == (["A"], STARTED, False)
+    after.recover(left[0])
+    assert (names(after), after.current.workspace, after.current.dirty) == (["A"], OTHER, True)
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        {},
+        {"tabs": 3, "current": "x"},
+        {"tabs": [None, {"path": 3}, {"path": "/no/such.nepb", "journal": []}, {}], "current": 7},
+    ],
+)
+def test_settings_that_make_no_sense_open_nothing(documents, kept) -> None:
+    documents.put_back(kept, [], ended_well=True)
+    assert names(documents) == ["New behaviour"]
+
+
+def test_a_file_that_was_damaged_meanwhile_does_not_come_back(documents, tmp_path) -> None:
+    path = file(tmp_path, "A")
+    documents.open(path)
+    kept = documents.kept()
+    path.write_text("{")
+    after = opened(tmp_path / "other")
+    after.put_back(kept, [], ended_well=True)
+    assert after.current.blank
+
+
+def test_closing_leaves_no_journal_of_what_is_saved(documents, journals, tmp_path) -> None:
+    documents.open(file(tmp_path, "A"))
+    documents.current.edited(OTHER)
+    documents.current.save()
+    documents.close(documents.current)
+    documents.end()
+    assert list(journals.glob("*")) == []
