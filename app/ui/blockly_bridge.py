@@ -19,7 +19,7 @@ class BlocklyBridge(QObject):
 
     told = Signal(str, str)  # to the page: a command and its JSON
     came_up = Signal()
-    edited = Signal(int, str)  # generation of the loaded file, workspace as JSON
+    edited = Signal(str, int, str)  # a tab's key, generation of the program loaded there, workspace as JSON
     undo_changed = Signal(bool, bool)
     block_chosen = Signal(str)
     answered = Signal(int, str)  # token of a flush, workspace as JSON
@@ -42,9 +42,9 @@ class BlocklyBridge(QObject):
     def ready(self) -> None:
         self.came_up.emit()
 
-    @Slot(int, str)
-    def changed(self, generation: int, workspace: str) -> None:
-        self.edited.emit(generation, workspace)
+    @Slot(str, int, str)
+    def changed(self, key: str, generation: int, workspace: str) -> None:
+        self.edited.emit(key, generation, workspace)
 
     @Slot(bool, bool)
     def history(self, can_undo: bool, can_redo: bool) -> None:

@@ -86,13 +86,15 @@ class Person:
         QTest.keyClick(self.target, key, modifiers)
 
     def open_category(self, name: str) -> None:
-        labels = "[...document.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+        shown = "document.querySelector('.nepTab:not([hidden])')"
+        labels = f"[...{shown}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
         number = self.ask(f"{labels}.findIndex(e => e.textContent == {name!r})")
         assert number >= 0
         rows = ".blocklyToolboxCategoryContainer"
-        self.ask(f"document.querySelectorAll({rows!r})[{number}].setAttribute('data-test', 'open')")
+        self.ask("document.querySelector('[data-test=open]')?.removeAttribute('data-test')")
+        self.ask(f"{shown}.querySelectorAll({rows!r})[{number}].setAttribute('data-test', 'open')")
         self.click("[data-test=open]", dx=60)
-        self.box(".blocklyFlyout .blocklyBlock")
+        self.box(".nepTab:not([hidden]) .blocklyFlyout .blocklyBlock")
 
     def hold(self, selector: str) -> QPoint:
         box = self.box(selector)

@@ -22,7 +22,7 @@ def test_gives_the_page_its_beginning():
 def test_passes_on_what_the_page_says(qtbot):
     bridge = BlocklyBridge(dict)
     for slot, signal, args in [
-        (bridge.changed, bridge.edited, [3, "{}"]),
+        (bridge.changed, bridge.edited, ["a", 3, "{}"]),
         (bridge.history, bridge.undo_changed, [True, False]),
         (bridge.selected, bridge.block_chosen, ["b1"]),
         (bridge.flushed, bridge.answered, [7, "{}"]),

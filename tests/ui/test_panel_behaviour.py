@@ -18,7 +18,7 @@ from tests.ui.panel_case import Window, button, press, ticks
 class Editor(QWidget):
     """Stands for the block editor: writes down what it is told."""
 
-    changed = Signal(dict)
+    changed = Signal(str, dict)
     history_changed = Signal(bool, bool)
     key_pressed = Signal(str)
 
@@ -34,7 +34,7 @@ class Editor(QWidget):
 
     def flush(self, done: Callable[[dict[str, object]], None]) -> None:
         if self.late:
-            self.changed.emit(self.late)  # the page tells an edit before it answers
+            self.changed.emit("", self.late)  # the page tells an edit before it answers
         done(self.late)
 
     def last(self, name: str) -> object:
@@ -76,7 +76,7 @@ def test_the_editor_is_given_definitions_before_the_blocks_once(panel, window) -
 
 def test_only_replacing_the_document_loads_it_anew(panel, window) -> None:
     document = window.session.document
-    editor(panel).changed.emit({"blocks": {"blocks": [{"type": "x"}]}})
+    editor(panel).changed.emit("", {"blocks": {"blocks": [{"type": "x"}]}})
     panel.refresh()
     assert document.workspace == {"blocks": {"blocks": [{"type": "x"}]}}
     assert editor(panel).count("load") == 1
@@ -185,7 +185,7 @@ def test_the_first_block_takes_the_offer_away(qtbot, qapp) -> None:
     qtbot.addWidget(panel)
     assert isinstance(panel, BehaviourPanel)
     qtbot.addWidget(panel.replaces_title())
-    editor(panel).changed.emit({"blocks": {"blocks": [{"type": "events_started"}]}})
+    editor(panel).changed.emit("", {"blocks": {"blocks": [{"type": "events_started"}]}})
     panel.refresh()
     assert not panel.empty.isVisible()
 

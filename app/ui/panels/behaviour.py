@@ -241,7 +241,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.show_block(block)
 
-    def _edited(self, workspace: dict[str, object]) -> None:
+    def _edited(self, _key: str, workspace: dict[str, object]) -> None:
         self.session.document.edited(workspace)
 
     def _history(self, can_undo: bool, can_redo: bool) -> None:

@@ -33,8 +33,6 @@ export class Program {
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly listener: Listener) {
     workspace.addChangeListener((event) => this.onEvent(event));
-    // A hidden page draws no frames, and Blockly tells of edits only after a frame.
-    document.addEventListener('visibilitychange', () => document.hidden && this.flush());
   }
 
   /** A new file: forgets the old one and its undo. */
@@ -46,6 +44,12 @@ export class Program {
     this.told = JSON.stringify(this.save());
     this.tellHistory();
     this.goHome();
+  }
+
+  /** Tells nothing any more. */
+  dispose(): void {
+    window.clearTimeout(this.timer);
+    this.loading = true;
   }
 
   /** The same program made again (definitions changed): undo, view and selection stay. */
@@ -153,10 +157,11 @@ export class Program {
     }, QUIET_MS);
   }
 
-  private tellHistory(): void {
+  /** Tells what can be undone; `again`: also when that was told before. */
+  tellHistory(again = false): void {
     const canUndo = this.workspace.getUndoStack().length > 0;
     const canRedo = this.workspace.getRedoStack().length > 0;
-    if (`${canUndo} ${canRedo}` === this.historyTold) return;
+    if (`${canUndo} ${canRedo}` === this.historyTold && !again) return;
     this.historyTold = `${canUndo} ${canRedo}`;
     this.listener.history(canUndo, canRedo);
   }

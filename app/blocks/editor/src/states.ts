@@ -51,6 +51,15 @@ export class States {
     this.showLive();
   }
 
+  /** Another program is here: nothing of it runs, nothing is wrong with it. */
+  forget(): void {
+    this.running = new Set();
+    this.stopped = new Set();
+    this.errors = new Map();
+    this.absent = new Set();
+    this.restore();
+  }
+
   /** Puts everything on again after the blocks were made anew. */
   restore(): void {
     this.outlined.clear();

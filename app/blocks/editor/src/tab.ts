@@ -1,0 +1,159 @@
+// One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
+import * as Blockly from 'blockly/core';
+import {FieldChoice} from './choices';
+import {CHECKER, Program, holdsAny} from './program';
+import {RENDERER} from './renderer';
+import {States} from './states';
+import {makeTheme} from './theme';
+import {Toolbox} from './toolbox';
+
+const SCALE = 0.8;
+
+export interface TabListener {
+  changed(tab: Tab, json: string): void;
+  history(tab: Tab, canUndo: boolean, canRedo: boolean): void;
+  selected(tab: Tab, id: string): void;
+}
+
+export class Tab {
+  readonly workspace: Blockly.WorkspaceSvg;
+  readonly program: Program;
+  readonly states: States;
+  key = '';
+  generation = 0;
+  private readonly frame = document.createElement('div');
+  /** Types whose definition changed since the blocks here were made. */
+  private readonly outdated = new Set<string>();
+  private toolboxDefinition: unknown = null;
+  private choicesOutdated = false;
+  private themeOutdated = false;
+
+  constructor(place: HTMLElement, listener: TabListener) {
+    this.frame.className = 'nepTab';
+    place.append(this.frame);
+    this.workspace = Blockly.inject(this.frame, {
+      media: 'media/', renderer: RENDERER, sounds: false, trashcan: false, theme: makeTheme(),
+      toolbox: {kind: 'categoryToolbox', contents: []},
+      plugins: {toolbox: Toolbox, [Blockly.registry.Type.CONNECTION_CHECKER.toString()]: CHECKER},
+      grid: {spacing: 28, length: 2, snap: true, colour: 'transparent'},
+      move: {scrollbars: true, drag: true, wheel: true},
+      zoom: {controls: false, wheel: true, pinch: true, startScale: SCALE, minScale: 0.3, maxScale: 2},
+    });
+    this.program = new Program(this.workspace, {
+      changed: (json) => listener.changed(this, json),
+      history: (canUndo, canRedo) => listener.history(this, canUndo, canRedo),
+      selected: (id) => listener.selected(this, id),
+    });
+    this.states = new States(this.workspace);
+    this.workspace.registerButtonCallback('CREATE_VARIABLE', (button) =>
+      Blockly.Variables.createVariableButtonHandler(button.getTargetWorkspace()));
+  }
+
+  /** Shows another program here, with an empty history. */
+  load(generation: number, state: Record<string, unknown>): void {
+    this.letGo();
+    this.program.load(state);
+    this.generation = generation;
+    this.states.forget();
+  }
+
+  show(): void {
+    this.frame.hidden = false;
+    Blockly.common.setMainWorkspace(this.workspace);
+    // Blockly pastes where was copied; a person means what they see.
+    Blockly.clipboard.setLastCopiedWorkspace(this.workspace);
+    Blockly.svgResize(this.workspace);
+    this.update();
+    this.program.tellHistory(true);
+  }
+
+  /** Tells the newest edits and takes it off the screen; what is told to it meanwhile waits until `show`. */
+  hide(): void {
+    this.letGo();
+    Blockly.renderManagement.triggerQueuedRenders();
+    this.program.flush();
+    this.frame.hidden = true;
+  }
+
+  dispose(): void {
+    this.letGo();
+    this.program.dispose();
+    this.workspace.dispose();
+    this.frame.remove();
+  }
+
+  /** Ends what the mouse or an open field is in the middle of. */
+  letGo(): void {
+    this.workspace.hideChaff();
+    this.workspace.getGesture(new PointerEvent('pointercancel'))?.cancel();
+  }
+
+  get hasFocus(): boolean {
+    return this.frame.contains(document.activeElement);
+  }
+
+  focus(): void {
+    Blockly.getFocusManager().focusTree(this.workspace);
+  }
+
+  themeChanged(): void {
+    this.themeOutdated = true;
+    if (!this.frame.hidden) this.update();
+  }
+
+  definitionsChanged(types: Iterable<string>, toolbox: unknown, choices: boolean): void {
+    for (const type of types) this.outdated.add(type);
+    this.toolboxDefinition = toolbox;
+    this.choicesOutdated ||= choices;
+    if (!this.frame.hidden) this.update();
+  }
+
+  /** Makes up for what changed while nobody saw it. */
+  private update(): void {
+    if (this.themeOutdated) this.workspace.setTheme(makeTheme());
+    const rebuilt = this.outdated.size > 0 && holdsAny(this.workspace, this.outdated);
+    if (rebuilt) {
+      this.program.flush();
+      this.program.rebuild();
+    }
+    if (this.themeOutdated || rebuilt) this.states.restore();
+    const toolbox = this.workspace.getToolbox();
+    if (toolbox instanceof Toolbox && this.toolboxDefinition) {
+      toolbox.update(this.toolboxDefinition, this.outdated.size > 0);
+    }
+    if (this.choicesOutdated) this.refreshChoices();
+    this.outdated.clear();
+    this.toolboxDefinition = null;
+    this.choicesOutdated = this.themeOutdated = false;
+  }
+
+  private refreshChoices(): void {
+    const flyout = this.workspace.getFlyout()?.getWorkspace();
+    for (const workspace of flyout ? [this.workspace, flyout] : [this.workspace]) {
+      for (const block of workspace.getAllBlocks(false)) {
+        for (const field of block.getFields()) if (field instanceof FieldChoice) field.refresh();
+      }
+    }
+  }
+
+  /** Whether a block is in the hand here. */
+  get isDragging(): boolean {
+    return this.workspace.isDragging();
+  }
+
+  fit(): void {
+    if (!this.workspace.getTopBlocks(false).length) return;
+    this.workspace.zoomToFit();
+    if (this.workspace.scale > 1) {
+      this.workspace.setScale(1);
+      this.workspace.scrollCenter();
+    }
+  }
+
+  reveal(id: string): void {
+    const block = this.workspace.getBlockById(id);
+    if (!block) return;
+    this.workspace.centerOnBlock(id, true);
+    Blockly.getFocusManager().focusNode(block);
+  }
+}

@@ -1,0 +1,176 @@
+"""Several behaviours in the one page, each with its own undo, zoom and scroll position."""
+
+from __future__ import annotations
+
+import copy
+import os
+import signal
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from app.ui.blockly_tabs import EMPTY, Tabs
+from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+
+WAIT = {"type": "control_wait", "id": "w", "x": 140, "y": 140}
+A, B = workspace(START), workspace(WAIT)
+PATH = "[data-id=start] > .blocklyPath"
+SHOWN = "document.querySelector('.nepTab:not([hidden])')"
+TABS = "document.querySelectorAll('.nepTab').length"
+
+
+def test_the_first_tab_goes_when_a_real_one_comes() -> None:
+    tabs = Tabs()
+    assert tabs.shown.workspace == EMPTY
+    assert tabs.show("a", A) == ""
+    assert tabs[""] is None
+    assert tabs.show("b", B) is None
+    assert tabs.show("a", {}) is None
+    assert tabs.shown.workspace == A
+
+
+def test_edits_of_a_closed_or_replaced_program_do_not_count() -> None:
+    tabs = Tabs()
+    tabs.show("a", A)
+    before = tabs.shown.generation
+    assert tabs.edited("a", before) is tabs.shown
+    tabs.replace(B)
+    assert tabs.edited("a", before) is None
+    generation = tabs.shown.generation
+    assert tabs.close("a")
+    assert tabs.edited("a", generation) is None
+    assert not tabs.close("a")
+    assert tabs.shown.workspace == EMPTY
+
+
+@pytest.fixture
+def two(qtbot, view, person):
+    """Tab "a" is shown, "b" was shown before; the person at the page."""
+    view.show_tab("b", B)
+    them = person(state=B)
+    view.show_tab("a", A)
+    them.wait_for(f"!!{SHOWN}.querySelector('[data-id=start]')")
+    return them
+
+
+def delete_the_hat(qtbot, them) -> None:
+    them.click(PATH, dy=30)
+    them.press(Qt.Key_Delete)
+    qtbot.waitUntil(lambda: them.tops() == [], timeout=WAIT_MS)
+
+
+def turn_to(them, key: str) -> None:
+    them.view.show_tab(key, {})
+    block = {"a": "start", "b": "w"}[key]
+    them.wait_for(f"!!{SHOWN}.querySelector('[data-id={block}]')")
+
+
+@pytest.mark.web
+def test_each_tab_has_its_own_undo(qtbot, view, two) -> None:
+    history: list[tuple[bool, bool]] = []
+    view.history_changed.connect(lambda *each: history.append(each))
+    delete_the_hat(qtbot, two)
+    qtbot.waitUntil(lambda: history[-1:] == [(True, False)], timeout=WAIT_MS)
+    turn_to(two, "b")
+    assert two.tops() == [WAIT]
+    qtbot.waitUntil(lambda: history[-1] == (False, False), timeout=WAIT_MS)
+    view.undo()
+    assert two.tops() == [WAIT]
+    view.show_tab("a", {})
+    qtbot.waitUntil(lambda: history[-1] == (True, False), timeout=WAIT_MS)
+    view.undo()
+    qtbot.waitUntil(lambda: two.tops() == [START], timeout=WAIT_MS)
+    assert history[-1] == (False, True)
+
+
+@pytest.mark.web
+def test_zoom_and_place_stay_with_the_tab(qtbot, view, two) -> None:
+    box = "document.querySelector('[data-id=start]').getBoundingClientRect()"
+    place = f"(r => [r.left, r.top, r.width])({box})"
+    first = two.ask(place)
+    view.zoom_in()
+    two.wait_for(f"({place})[2] > {first[2]}")
+    before = two.ask(place)
+    turn_to(two, "b")
+    view.zoom_out()
+    view.zoom_out()
+    turn_to(two, "a")
+    assert two.ask(place) == pytest.approx(before, abs=1)
+    assert view.web.page is not None
+    assert two.ask(TABS) == 2
+
+
+@pytest.mark.web
+def test_an_edit_just_before_leaving_is_told_with_its_tab(qtbot, view, two) -> None:
+    two.open_category("Control")
+    told: list[tuple[str, dict]] = []
+    view.changed.connect(lambda *each: told.append(each))
+    two.drag(".nepTab:not([hidden]) .blocklyFlyout .control_wait", QPoint(700, 400))
+    view.show_tab("b", {})
+    qtbot.waitUntil(lambda: bool(told), timeout=WAIT_MS)
+    assert {key for key, _ in told} == {"a"}
+    assert len(view.workspace_of("a")["blocks"]["blocks"]) == 2
+    assert view.workspace == B
+    assert two.tops() == [WAIT]
+
+
+@pytest.mark.web
+def test_every_tab_comes_back_after_the_web_process_was_killed(qtbot, view, two) -> None:
+    delete_the_hat(qtbot, two)
+    view.highlight(["start"])
+    turn_to(two, "b")
+    view.highlight(["w"])
+    again: list[bool] = []
+    view.recovered.connect(lambda: again.append(True))
+    with qtbot.waitSignal(view.recovered, timeout=20_000):
+        os.kill(view.web.page.renderProcessPid(), signal.SIGKILL)
+    assert two.tops() == [WAIT]
+    two.wait_for(outlined("running"), ["w"])
+    view.show_tab("a", {})
+    assert two.tops() == []
+    view.load(A)
+    assert two.tops() == [START]
+    turn_to(two, "b")
+    assert two.tops() == [WAIT]
+    assert again == [True]
+
+
+@pytest.mark.web
+def test_what_changed_meanwhile_is_made_up_for_when_a_tab_is_shown(qtbot, view, two) -> None:
+    changed = copy.deepcopy(DEFINITIONS)
+    next(each for each in changed["blocks"] if each["type"] == "control_wait")["message0"] = "%1 pause %2 s"
+    view.set_definitions(changed)
+    view.set_theme(TOKENS, dark=True)
+    turn_to(two, "b")
+    two.wait_for(f"{SHOWN}.querySelector('[data-id=w]').textContent.includes('pause')")
+    dark = TOKENS["block"]["control"]["dark"]["primary"].lower()
+    fill = f"{SHOWN}.querySelector('[data-id=w] > .blocklyPath').getAttribute('fill').toLowerCase()"
+    two.wait_for(fill, dark)
+    assert two.tops() == [WAIT]
+
+
+@pytest.mark.web
+def test_a_closed_tab_is_forgotten(qtbot, view, two) -> None:
+    view.close_tab("b")
+    two.wait_for(TABS, 1)
+    assert two.tops() == [START]
+    view.close_tab("a")
+    qtbot.waitUntil(lambda: two.tops() == [], timeout=WAIT_MS)
+    assert two.ask(TABS) == 1
+    view.show_tab("b", B)
+    assert two.tops() == [WAIT]
+    assert two.ask(TABS) == 1
+
+
+@pytest.mark.web
+def test_the_keys_go_to_the_tab_that_is_shown(qtbot, view, two) -> None:
+    two.click(PATH, dy=30)
+    two.press(Qt.Key_C, Qt.ControlModifier)
+    turn_to(two, "b")
+    two.press(Qt.Key_V, Qt.ControlModifier)
+    qtbot.waitUntil(lambda: [top["type"] for top in two.tops()] == ["control_wait", "events_started"],
+                    timeout=WAIT_MS)  # fmt: skip
+    turn_to(two, "a")
+    assert two.tops() == [START]
