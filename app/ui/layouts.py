@@ -42,7 +42,13 @@ BEHAVIOUR = Layout(
         Column(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140))),
     ),
     ("robot", "camera"),
-    {"robots": "behaviour", "console": "problems", "alerts": "problems", "image": "camera"},
+    {
+        "robots": "behaviour",
+        "console": "problems",
+        "alerts": "problems",
+        "nodes": "problems",
+        "image": "camera",
+    },
 )
 DEVELOPER = Layout(
     "developer",
@@ -52,7 +58,7 @@ DEVELOPER = Layout(
     (
         Column(640, ((("topics",), 780),)),
         Column(330, ((("inspector",), 780),)),
-        Column(0, ((("image",), 380), (("console", "alerts"), 394))),
+        Column(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
     ("topics", "inspector"),
     {"robots": "topics", "robot": "image", "camera": "image"},

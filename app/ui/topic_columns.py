@@ -103,11 +103,11 @@ def _loss_tip(topic: Topic) -> str:
 
 COLUMNS: tuple[Column[Topic], ...] = (
     Column("topic", "Topic", 140, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
-    Column("type", "Type", 92, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
+    Column("type", "Type", 80, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
     Column(
         "publishers",
         "Publishers",
-        74,
+        72,
         publishers_cell,
         lambda t: t.publishers,
         figures=True,
@@ -118,11 +118,11 @@ COLUMNS: tuple[Column[Topic], ...] = (
         "subscribers", "Subscribers", 80, subscribers_cell, lambda t: t.subscribers, figures=True, off=True
     ),
     Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
-    Column("curve", "", 66, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
-    Column("rate", "Rate /s", 56, rate_cell, lambda t: t.rate_hz, figures=True),
-    Column("bandwidth", "Bandwidth", 77, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
-    Column("age", "Age", 56, age_cell, lambda t: t.age_s, figures=True, yields=2),
-    Column("loss", "Loss", 60, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
+    Column("curve", "", 64, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
+    Column("rate", "Rate /s", 54, rate_cell, lambda t: t.rate_hz, figures=True),
+    Column("bandwidth", "Bandwidth", 74, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
+    Column("age", "Age", 63, age_cell, lambda t: t.age_s, figures=True, yields=2),
+    Column("loss", "Loss", 70, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
 )
 
 

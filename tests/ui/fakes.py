@@ -18,10 +18,12 @@ import numpy as np
 from app.blocks import Problem, editor_definitions
 from app.core.alerts import Alerts
 from app.core.console import Console
+from app.core.nodes import Nodes
 from app.robots.inputs import Choice, Parameter
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
 from app.robots.parts import Topics as RobotTopics
 from nep.message import Message
+from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 
 @dataclass(eq=False)
@@ -267,6 +269,7 @@ WORKSPACE = {
 class Document:
     def __init__(self, calls: list[tuple[object, ...]]) -> None:
         self.calls = calls
+        self.key = "behaviour-1"
         self.path = None
         self.name = "New behaviour"
         self.workspace: Mapping[str, object] = {}
@@ -274,6 +277,7 @@ class Document:
         self.dirty = False
         self.saved_at: float | None = None
         self.revision = 0
+        self.mends = 0
         self.edits = 0
         self.definitions_revision = 0
         self.found: tuple[Problem, ...] = ()
@@ -303,6 +307,27 @@ class Document:
         self.calls.append(("mend", action, block_id))
 
 
+class Documents:
+    """The open behaviours; tests put more into ``them``."""
+
+    def __init__(self, first: Document) -> None:
+        self.them = [first]
+        self.current = first
+
+    def __iter__(self) -> Iterator[Document]:
+        return iter(self.them)
+
+    def with_key(self, key: str) -> Document | None:
+        return next((each for each in self.them if each.key == key), None)
+
+    @property
+    def definitions_revision(self) -> object:
+        return tuple(each.definitions_revision for each in self.them)
+
+    def definitions(self) -> Mapping[str, object]:
+        return self.current.definitions()
+
+
 class Session:
     """Has nothing: no master, no topic, no robot, an empty behaviour."""
 
@@ -310,14 +335,16 @@ class Session:
         self.calls: list[tuple[object, ...]] = []
         self.settings = SimpleNamespace(get=lambda _key, default: default, set=lambda _key, _value: None)
         self.topics = Topics()
+        self.nodes = Nodes()
         self.alerts = Alerts()
         self.console = Console()
         self.fleet = Fleet(self.calls)
         self.images = Images()
-        self.document = Document(self.calls)
+        self.documents = Documents(Document(self.calls))
         self.document.known = lambda: [link.robot for link in self.fleet.connected]
         self.runs = SimpleNamespace(
             running_blocks=(), stopped_blocks=(), block_errors={}, blocks_revision=0, active=False,
+            document=self.document,
             stop_robot=lambda name: self.calls.append(("stop_robot", name)),
         )  # fmt: skip
         self.companions = SimpleNamespace(
@@ -327,11 +354,14 @@ class Session:
         )
         self.graph: SimpleNamespace | None = None
         self.master = SimpleNamespace(kind="none", address="127.0.0.1:7780", sentence="")
-        self.messages_per_s: float | None = None
-        self.lost_30s = 0
+        self.traffic = SimpleNamespace(messages_per_s=None, lost_30s=0, shown_30s=0, sent_30s=0)
         self.tick_ms = 0.0
         self.watched: list[str] = []
         self.ticks = 0
+
+    @property
+    def document(self) -> Document:
+        return self.documents.current
 
     def watch(self, topic: str) -> Watch:
         self.watched.append(topic)
@@ -370,6 +400,9 @@ class Session:
         session.graph = SimpleNamespace(nodes=nodes, topics={})
         for topic in topics():
             session.topics.put(topic)
+        session.nodes.update(nodes_seen(1), 0.0)
+        session.nodes.update(nodes_seen(2), 1.0)
+        session.nodes.age(5.2)
         link = session.fleet.join(RobotLink("Pepper", pepper()))
         link.values.update(
             head_touched=False, distance=0.82, battery=84, sees_face=True, sound=34.0, heard_word="hello",
@@ -390,7 +423,7 @@ class Session:
         )  # fmt: skip
         now = time.time()
         for ago, level, origin, text in LOG:
-            session.console._records.append(
+            session.console._lines.append(
                 SimpleNamespace(stamp_s=now - ago, level=level, origin=origin, text=text)
             )
         session.console.revision = len(LOG)
@@ -445,9 +478,41 @@ def topics() -> list[Topic]:
     made[1].lost, made[1].loss_ratio = 7, 0.004
     made[11].lost, made[11].loss_ratio = 12, 0.021
     made[10].new = True
+    for place, topic in enumerate(made):
+        wave = 0.02 if place % 3 == 0 else 0.5
+        topic.rates.extend((topic.rate_hz or 1.0) * (1 + wave * math.sin(k * 0.7 + place)) for k in range(40))
     gone = made[12]
     gone.gone_s, gone.rate_hz, gone.bandwidth_Bps, gone.age_s, gone.lost, gone.loss_ratio = 4.2, *[None] * 5
     return made
+
+
+def nodes_seen(revision: int) -> GraphView:
+    """The nodes of picture 04: at first with the lidar, then without it and with RIZE."""
+    rows = [
+        ("1", "camera_driver", "lab-pc", 4110, "Python", "native", 0.12),
+        ("2", "pepper_driver", "lab-pc", 4132, "Python", "native", 0.31),
+        ("3", "blackboard", "lab-pc", 4140, "Python", "native", 0.04),
+        ("4", "studio", "lab-pc", 4090, "Python", "native", 0.081),
+        ("5", "old_voice", "lab-pc", 4155, "Python", "B", 0.02),
+        ("6", "lidar_driver", "lab-pc", 4160, "C++", "native", 0.2)
+        if revision == 1
+        else ("7", "RIZE", "lab-pc", 4166, "JavaScript", "A", 1.3),
+    ]
+    nodes = {row[0]: NodeInfo(*row[:6], 1_795_164_000_000_000_000, row[6]) for row in rows}  # type: ignore[arg-type]
+    ends = {
+        "/robot/camera": "14", "/robot/depth": "1", "/odom": "2", "/touch": "24", "/distance": "2",
+        "/joint_states": "2", "/blackboard": "34", "robot_action": "7", "/speech/words": "5",
+        "/lidar/scan": "6",
+    }  # fmt: skip
+    topics = {
+        name: TopicInfo(
+            name, "json", "json",
+            (PublisherInfo(1, ids[0], (), False, 0, 0, 0, None, None, None),),
+            tuple(SubscriberInfo(2, id, 0, 0) for id in ids[1:]),
+        )
+        for name, ids in ends.items()
+    }  # fmt: skip
+    return GraphView(1, revision, nodes, topics)
 
 
 def blackboard(t: float = 0.0) -> dict[str, object]:

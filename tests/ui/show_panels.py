@@ -21,6 +21,7 @@ from app.ui.panels import (
     console,
     image,
     inspector,
+    nodes,
     problems,
     robot,
     robots,
@@ -36,6 +37,7 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "inspector": (inspector.PANEL, 330, 782, "compact"),
     "image": (image.PANEL, 220, 220, "compact"),
     "console": (console.PANEL, 446, 222, "compact"),
+    "nodes": (nodes.PANEL, 446, 260, "compact"),
     "alerts": (alerts.PANEL, 446, 222, "compact"),
     "robot": (robot.PANEL, 384, 327, "comfortable"),
     "camera": (camera.PANEL, 384, 275, "comfortable"),
@@ -84,6 +86,10 @@ def prepare(name: str, widget: PanelWidget) -> None:
         widget.session.send("/blackboard", {**__import__("tests.ui.fakes").ui.fakes.blackboard(0.0)})  # type: ignore[attr-defined]
         widget.refresh()
         widget.tree.setCurrentIndex(widget.model.reveal(("robots", "Pepper", "pose", "y")))
+    if name == "nodes" and isinstance(widget, nodes.NodesPanel) and len(widget.session.nodes):
+        widget.refresh()
+        widget.table.opened.emit(widget.model.key_of(widget.model.row_at(widget.model.index(1, 0))))  # type: ignore[arg-type]
+        widget.table.setCurrentIndex(widget.model.index(5, 0))
     if name == "topics" and isinstance(widget, topics.TopicsPanel):
         widget.refresh()
         widget.show_topic("/blackboard")

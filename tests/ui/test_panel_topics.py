@@ -188,7 +188,7 @@ def test_the_order_comes_back_with_the_layout(qtbot, panel, window) -> None:
 
 def test_the_curve_of_the_last_rates_stands_before_the_rate(panel, window) -> None:
     topic = window.session.topics["/odom"]
-    topic.rates.extend([49.0, 50.0, 51.0])
+    topic.rates[:] = [49.0, 50.0, 51.0]
     cell = panel.model.data(
         panel.model.index(panel.model.index_of("/odom").row(), place_of(panel, "curve")), CELL_ROLE
     )

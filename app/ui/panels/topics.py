@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeyEvent
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core.source import NODE_NAME
+from app.ui.filter_field import FilterField
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.table import TableModel
 from app.ui.table_view import TableView
 from app.ui.topic_columns import columns
-from app.ui.widgets import EmptyAction, EmptyState, Line, SearchField, label
+from app.ui.widgets import EmptyAction, EmptyState, Line, label
 from app.ui.words import plural
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ class TopicsPanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Topics")
         theme = self.theme
-        self.filter = _Filter(self)
+        self.filter = FilterField(theme, "Filter topics")
+        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.filter.textChanged.connect(self._rebuild)
         self.count = label("", "small", role="textSecondary")
         self.header = [self.count, self.filter]
@@ -151,25 +153,6 @@ class TopicsPanel(PanelWidget):
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         self.table.restore(state)
-
-
-class _Filter(SearchField):
-    """The filter: Down goes into the table, Esc clears."""
-
-    def __init__(self, panel: TopicsPanel) -> None:
-        super().__init__(panel.theme, "Filter", "/")
-        self._panel = panel
-        self.setAccessibleName("Filter topics")
-        self.setMaximumWidth(190)
-        self.setMinimumWidth(90)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape and self.text():
-            self.clear()
-        elif event.key() in {Qt.Key.Key_Down, Qt.Key.Key_Return}:
-            self._panel.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
-        else:
-            super().keyPressEvent(event)
 
 
 def _haystack(topic: Topic) -> str:

@@ -1,0 +1,140 @@
+"""Who is on the network, as the window shows it: every node with what it publishes and subscribes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from nep.views import GraphView, NodeInfo
+
+GONE_SHOWN_S = 10.0
+GATEWAY = "gateway"
+NATIVE = frozenset({"native", GATEWAY})
+
+
+@dataclass(slots=True, eq=False)
+class NodeEntry:
+    """One node. What is not known is None or empty; a panel shows it blank.
+
+    ``publishes`` and ``subscribes`` are topics in the order of their names; a topic that a node subscribes
+    twice stands there once. ``cpu_ratio`` is the share of one core of its process. ``gone_s`` is None while
+    it is there, else the seconds since it vanished; then what it published stays, to be read.
+    """
+
+    id: str
+    name: str
+    host: str = ""
+    pid: int | None = None
+    language: str = ""
+    generation: str = "native"
+    since_ns: int = 0
+    cpu_ratio: float | None = None
+    publishes: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    new: bool = False
+    gone_s: float | None = None
+    gone_since: float | None = None
+
+    @property
+    def is_original(self) -> bool:
+        """Whether it is a program of the original NEP."""
+        return self.generation not in NATIVE
+
+
+class Nodes:
+    """All nodes, in the order in which they were first seen. One thread uses it (the window's).
+
+    The gateway's own node is left out: it stands for the originals, which have entries of their own.
+    """
+
+    def __init__(self) -> None:
+        """Know no node yet."""
+        self._nodes: dict[str, NodeEntry] = {}
+        self._first_graph = True
+        self._seen = (0, 0)
+        self.revision = 0
+        self.values_revision = 0
+
+    def __iter__(self) -> Iterator[NodeEntry]:
+        """Every node, the vanished ones too for ten seconds."""
+        return iter(self._nodes.values())
+
+    def __len__(self) -> int:
+        """How many `__iter__` gives."""
+        return len(self._nodes)
+
+    def get(self, id: str) -> NodeEntry | None:
+        """The node of that id, or None."""
+        return self._nodes.get(id)
+
+    def mark_seen(self, id: str) -> None:
+        """A person looked at it: it is not new any more."""
+        node = self._nodes.get(id)
+        if node is not None and node.new:
+            node.new = False
+            self.revision += 1
+
+    def update(self, view: GraphView, now: float) -> None:
+        """Take over a new graph; ``now`` is a monotonic clock in s."""
+        if (view.epoch, view.revision) != self._seen:
+            self._seen = (view.epoch, view.revision)
+            self._take_all(view, now)
+        for id, node in self._nodes.items():
+            if id in view.nodes:
+                node.cpu_ratio = view.nodes[id].cpu_ratio
+        self._first_graph = False
+        self.values_revision += 1
+
+    def age(self, now: float) -> None:
+        """Let time pass: what vanished ten seconds ago leaves."""
+        for node in list(self._nodes.values()):
+            if node.gone_since is None:
+                continue
+            node.gone_s = now - node.gone_since
+            if node.gone_s >= GONE_SHOWN_S:
+                del self._nodes[node.id]
+                self.revision += 1
+
+    def _take_all(self, view: GraphView, now: float) -> None:
+        publishes, subscribes = _topics_by_node(view)
+        for id, info in view.nodes.items():
+            if info.generation == GATEWAY:
+                continue
+            node = self._nodes.get(id)
+            if node is None:
+                self._replace_gone(info)
+                node = self._nodes[id] = NodeEntry(id, info.name, new=not self._first_graph)
+            _take(node, info)
+            node.publishes, node.subscribes = publishes.get(id, ()), subscribes.get(id, ())
+        for id, node in self._nodes.items():
+            if id not in view.nodes and node.gone_since is None:
+                node.gone_since, node.gone_s, node.cpu_ratio = now, 0.0, None
+        self.revision += 1
+
+    def _replace_gone(self, info: NodeInfo) -> None:
+        """A program that was started again takes the place of its struck-through self."""
+        for id, node in list(self._nodes.items()):
+            if node.gone_since is not None and (node.name, node.host) == (info.name, info.host):
+                del self._nodes[id]
+
+
+def _take(node: NodeEntry, info: NodeInfo) -> None:
+    node.name, node.host, node.pid = info.name, info.host, info.pid
+    node.language, node.generation, node.since_ns = info.language, info.generation, info.since_ns
+    node.gone_since = node.gone_s = None
+
+
+def _topics_by_node(view: GraphView) -> tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]:
+    """(node id → topics that it publishes, node id → topics that it subscribes), each once, by name."""
+    publishes: dict[str, dict[str, None]] = {}
+    subscribes: dict[str, dict[str, None]] = {}
+    for name in sorted(view.topics):
+        info = view.topics[name]
+        for publisher in info.publishers:
+            publishes.setdefault(publisher.node_id, {})[name] = None
+        for subscriber in info.subscribers:
+            subscribes.setdefault(subscriber.node_id, {})[name] = None
+    return (
+        {id: tuple(names) for id, names in publishes.items()},
+        {id: tuple(names) for id, names in subscribes.items()},
+    )

@@ -1,0 +1,224 @@
+from __future__ import annotations
+
+import platform
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from app.core.nodes import NodeEntry, Nodes
+from app.ui.node_rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
+from app.ui.panels.nodes import PANEL, NodesPanel
+from app.ui.table import CELL_ROLE
+from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, button, press, ticks
+
+NODES = (
+    NodeInfo("1", "camera_driver", "lab-pc", 411, "Python", "native", 1, 0.12),
+    NodeInfo("2", "rize", platform.node(), 512, "JavaScript", "A", 2, 1.3),
+    NodeInfo("3", "studio", platform.node(), 600, "Python", "native", 3, 0.004),
+)
+
+
+def topic(name: str, by: str, to: str = "") -> TopicInfo:
+    return TopicInfo(
+        name, "json", "json",
+        tuple(PublisherInfo(9, id, (), False, 0, 0, 0, None, None, None) for id in by),
+        tuple(SubscriberInfo(8, id, 0, 0) for id in to),
+    )  # fmt: skip
+
+
+def graph(revision: int = 1, nodes: tuple[NodeInfo, ...] = NODES) -> GraphView:
+    topics = [topic("/robot/camera", "1", "3"), topic("/odom", "1"), topic("robot_action", "2")]
+    return GraphView(1, revision, {node.id: node for node in nodes}, {each.name: each for each in topics})
+
+
+@pytest.fixture
+def window(qapp) -> Window:
+    made = Window(Session.full())
+    made.session.nodes = Nodes()
+    made.session.nodes.update(graph(), 0.0)
+    return made
+
+
+@pytest.fixture
+def panel(qtbot, window) -> NodesPanel:
+    made = window.make(PANEL, (900, 400))
+    qtbot.addWidget(made)
+    for widget in made.header:
+        qtbot.addWidget(widget)
+    assert isinstance(made, NodesPanel)
+    return made
+
+
+def shown(panel: NodesPanel) -> list[list[str]]:
+    model = panel.model
+    names = [column.name for column in panel.table.columns if column.name != "since"]
+    places = [place for place, column in enumerate(panel.table.columns) if column.name in names]
+    return [[model.data(model.index(row, place)) for place in places] for row in range(model.rowCount())]
+
+
+def test_every_node_with_its_facts(panel) -> None:
+    here = platform.node()
+    assert shown(panel) == [
+        ["camera_driver", "native", "Python", "lab-pc", "411", "12 %", "2", "0"],
+        ["rize", "NEP to 0.5.4.5", "JavaScript", here, "512", "130 %", "1", "0"],
+        ["studio", "native", "Python", here, "600", "0.4 %", "0", "1"],
+    ]
+
+
+def test_an_opened_node_shows_its_topics_and_a_click_leads_there(panel, window) -> None:
+    panel.table.choose(NodeRow(next(iter(window.session.nodes))).key)
+    QTest.keyClick(panel.table, Qt.Key.Key_Return)
+    assert [line[:2] for line in shown(panel)][:3] == [
+        ["camera_driver", "native"],
+        ["/odom", "publishes 50.0/s"],
+        ["/robot/camera", "publishes 30.0/s"],
+    ]
+    assert name_cell(NodeRow(window.session.nodes.get("1"), opened=True)).icon == "chevron-down"
+    row = panel.table.rowViewportPosition(2)
+    QTest.mouseClick(panel.table.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(60, row + 8))
+    assert window.opened == ["/robot/camera"]
+    QTest.mouseClick(panel.table.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(60, 8))
+    assert len(shown(panel)) == 3
+
+
+def test_the_arrow_keys_open_and_close(panel, window) -> None:
+    panel.table.setFocus(Qt.FocusReason.TabFocusReason)
+    QTest.keyClick(panel.table, Qt.Key.Key_Right)
+    assert len(shown(panel)) == 5
+    QTest.keyClick(panel.table, Qt.Key.Key_Down)
+    QTest.keyClick(panel.table, Qt.Key.Key_Right)  # a topic has nothing to open
+    assert panel.table.currentIndex().row() == 1
+    QTest.keyClick(panel.table, Qt.Key.Key_Return)
+    assert window.opened == ["/odom"]
+    QTest.keyClick(panel.table, Qt.Key.Key_Left)
+    assert len(shown(panel)) == 3
+    assert panel.table.chosen_key() == NodeRow(window.session.nodes.get("1")).key
+
+
+def test_a_node_without_topics_opens_too(panel, window) -> None:
+    window.session.nodes.update(graph(2, (*NODES, NodeInfo("4", "idle", "h", 1, "", "native", 1))), 1.0)
+    panel.refresh()
+    place = [line[0] for line in shown(panel)].index("idle")
+    panel.table.opened.emit(panel.model.key_of(panel.model.row_at(panel.model.index(place, 0))))
+    assert panel.model.data(panel.model.index(place, 0), CELL_ROLE).icon == "chevron-down"
+
+
+def test_new_nodes_are_bold_until_opened_and_studio_is_no_news(panel, window) -> None:
+    nodes = window.session.nodes
+    more = (NodeInfo("4", "arm", "h", 1, "", "native", 1), NodeInfo("5", "Pepper", "h", 1, "", "native", 1))
+    window.session.companions.virtual_robots = ("Pepper",)
+    nodes.update(graph(2, (*NODES, *more)), 1.0)
+    panel.refresh()
+
+    def chip(name: str) -> str | None:
+        place = [line[0] for line in shown(panel)].index(name)
+        cell = panel.model.data(panel.model.index(place, 0), CELL_ROLE)
+        assert cell.bold is bool(cell.chip)
+        return cell.chip  # type: ignore[no-any-return]
+
+    assert (chip("arm"), chip("Pepper"), chip("rize")) == ("new", None, None)
+    panel.table.opened.emit(NodeRow(nodes.get("4")).key)
+    panel.refresh()
+    assert chip("arm") is None
+
+
+def test_a_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> None:
+    nodes = window.session.nodes
+    nodes.update(graph(2, NODES[1:]), 1.0)
+    nodes.age(5.2)
+    panel.refresh()
+    line = shown(panel)[0]
+    assert (line[0], line[5]) == ("camera_driver", "gone 4 s")
+    cell = panel.model.data(panel.model.index(0, 0), CELL_ROLE)
+    assert (cell.struck, cell.role) == (True, "textDisabled")
+    nodes.age(11.1)
+    panel.refresh()
+    assert [line[0] for line in shown(panel)] == ["rize", "studio"]
+
+
+def test_what_an_original_cannot_do_is_said_for_the_chosen_one(panel, window) -> None:
+    panel.table.choose(NodeRow(window.session.nodes.get("2")).key)
+    assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, here since ")
+    assert "up to 0.5.4.5" in panel.foot.text()
+    assert "no numbers and no times" in panel.foot.text()
+    panel.table.choose(NodeRow(window.session.nodes.get("1")).key)
+    assert "no numbers" not in panel.foot.text()
+    assert "on lab-pc" in panel.foot.text()
+
+
+@pytest.mark.parametrize(
+    ("generation", "words", "version"),
+    [("A", "NEP to 0.5.4.5", " up to 0.5.4.5:"), ("B", "NEP 0.5.4.8", " 0.5.4.8:"), ("C", "NEP C", "NEP:")],
+)
+def test_generations_have_words(generation, words, version) -> None:
+    node = NodeEntry("1", "old", generation=generation)
+    assert generation_cell(NodeRow(node)).text == words
+    assert version in limits_of(node)
+    assert generation_cell(NodeRow(node)).icon == "history"
+    assert limits_of(NodeEntry("1", "new")) == ""
+
+
+def test_a_version_that_nobody_understands_is_named_with_its_mend() -> None:
+    node = NodeEntry("1", "old", generation="0.5.4.6")
+    cell = generation_cell(NodeRow(node))
+    assert (cell.text, cell.icon, cell.role) == ("NEP 0.5.4.6", "triangle-alert", "warn")
+    assert limits_of(node).endswith("Install 0.5.4.8 or 0.5.4.5.")
+
+
+def test_what_is_not_known_is_left_out() -> None:
+    assert facts_of(NodeEntry("1", "bare")) == "bare"
+    assert cpu_words(None) == ""
+    assert (cpu_words(0.0), cpu_words(0.099), cpu_words(0.0999)) == ("0.0 %", "9.9 %", "10 %")
+
+
+def test_the_filter_finds_names_topics_and_languages(panel, window) -> None:
+    panel.filter.setText("javascript")
+    assert [line[0] for line in shown(panel)] == ["rize"]
+    panel.filter.setText("/robot/cam")
+    assert [line[0] for line in shown(panel)] == ["camera_driver", "studio"]
+    panel.filter.setText("nobody")
+    press(button(panel.empty, "Clear the filter"))
+    assert len(shown(panel)) == 3
+
+
+def test_the_load_is_renewed_when_it_was_told_and_sorted_once_a_second(panel, window) -> None:
+    place = [column.name for column in panel.table.columns].index("cpu")
+    panel.table.horizontalHeader().sectionClicked.emit(place)
+    assert [line[0] for line in shown(panel)] == ["rize", "camera_driver", "studio"]
+    busy = NodeInfo("3", "studio", platform.node(), 600, "Python", "native", 3, 2.0)
+    window.session.nodes.update(graph(1, (*NODES[:2], busy)), 1.0)
+    ticks(window, panel, 2)
+    assert shown(panel)[0][0] == "rize"
+    ticks(window, panel, 30)
+    assert shown(panel)[0][0] == "studio"
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "pressed"),
+    [("none", "No master is running", "Start a master here"), ("connected", "No nodes yet", None)],
+)
+def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed) -> None:
+    window = Window(Session())
+    window.session.master.kind = kind
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
+    assert isinstance(panel, NodesPanel)
+    assert panel.empty.isVisible()
+    assert panel.empty._title.text() == words
+    if pressed is not None:
+        press(button(panel.empty, pressed))
+        assert ("ensure_master",) in window.session.calls
+
+
+def test_order_and_columns_come_back_with_the_layout(qtbot, panel, window) -> None:
+    panel.table.choice.show("pid", False)
+    panel.table.horizontalHeader().sectionClicked.emit(3)
+    again = window.make(PANEL, (900, 400))
+    qtbot.addWidget(again)
+    again.restore_state(panel.save_state())
+    assert isinstance(again, NodesPanel)
+    assert again.table.order.column is again.table.columns[3]
+    assert again.save_state() == panel.save_state()
