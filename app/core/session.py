@@ -23,6 +23,7 @@ from app.core.images import Images
 from app.core.journal import Journal
 from app.core.losses import RecentLosses
 from app.core.mailbox import Drained, Mailbox
+from app.core.nodes import Nodes
 from app.core.runner import RunnerEvent
 from app.core.runs import Runs
 from app.core.settings import Settings
@@ -81,6 +82,7 @@ class Session:
         self._start_companions = start_companions
         self.settings = settings if settings is not None else Settings()
         self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
+        self.nodes = Nodes()
         self._mailbox = Mailbox()
         self._watches = Watches(self._begin_watch, self._end_watch)
         self.images = Images(lambda topic: self._watches.open([topic]).close, clock)
@@ -142,6 +144,7 @@ class Session:
             self._on_event(event, now)
         self._on_messages(drained, now)
         self.topics.age(now, now_ns)
+        self.nodes.age(now)
         self._follow_robots()
         if now >= self._next_check:
             self._next_check = now + CHECK_S
@@ -238,6 +241,7 @@ class Session:
                 self.console.add("info", "master", line)
         self.graph = view
         self.topics.update(view, now)
+        self.nodes.update(view, now)
         self.fleet.update(view)
         self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
         self.messages_per_s = total_rate_hz(list(view.topics.values()))
