@@ -21,8 +21,8 @@ GENERATIONS = {
 UNSERVED = frozenset({"0.5.4.6", "0.5.4.7"})
 NOT_SERVED = "NEP {version} is not served: nobody understands its messages. Install 0.5.4.8 or 0.5.4.5."
 LIMITS = (
-    "A program of the original NEP{version}: it sends no numbers and no times, so what was lost and how old a "
-    "message is can't be known."
+    "A program of the original NEP{version}: it sends no numbers and no times, so what was lost and how old "
+    "a message is can't be known."
 )
 VERSIONS = {"A": " up to 0.5.4.5", "B": " 0.5.4.8"}
 
