@@ -17,6 +17,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import TextIO
 
 import nep
@@ -44,6 +45,8 @@ class Out:
         self._lock = threading.Lock()
         self._printed: queue.Queue[str] = queue.Queue(LINES_PER_SAMPLE)
         self._left = MOST_LINES
+        self.told: Callable[[str], object] = lambda _line: None
+        """Is given each line that the program prints."""
         self._dropped = 0
 
     def send(self, kind: str, **content: object) -> None:
@@ -63,6 +66,7 @@ class Out:
                 self._printed.put_nowait(line[:LONGEST_LINE])
             except queue.Full:
                 self._dropped += 1
+            self.told(line[:LONGEST_LINE])
 
     def send_printed(self) -> None:
         """Send what was kept."""
@@ -133,9 +137,11 @@ class Run:
     def run(self) -> bool:
         """Run to the end, also the robots' end; whether no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
+            self._out.told = partial(node.log.info, "%s")
             silent = self._run_on(node)
             error = self._runtime.error
             if error is not None:
+                node.log.error("%s", error.sentence)
                 self._out.send("error", block=error.block, sentence=error.sentence)
             self._out.send_printed()
             elapsed_s = round(time.monotonic() - self._began, 3)

@@ -1,24 +1,41 @@
-"""What happened, line by line: the newest 5000 records."""
+"""What happened, line by line: the newest 5000 records, Studio's own and those that programs log on the bus.
+
+Records of the bus (`nep.logs`) are kept as the messages that they are and decoded when somebody reads
+`Console.records`: a console that nobody looks at costs next to nothing.
+"""
 
 from __future__ import annotations
 
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from nep import logs
+from nep.errors import NepError
+from nep.message import Message
 
 CAPACITY = 5000
 TEXT_LIMIT = 2000
+OWN_KEPT = 50
+_LEVELS = {"warning": "warn"}
 
 
 @dataclass(frozen=True, slots=True)
 class LogRecord:
-    """One line: epoch seconds, level (``info``, ``warn``, ``error``), who says it, and the text."""
+    """One line: epoch seconds, level (debug, info, warn, error, critical), who says it, and the text.
+
+    ``number`` counts all lines from 1. ``logger`` is the part of the program that says it and ``place`` the
+    file and line, where that is known.
+    """
 
     stamp_s: float
     level: str
     origin: str
     text: str
+    number: int = 0
+    logger: str = ""
+    place: str = ""
 
 
 class Console:
@@ -27,22 +44,76 @@ class Console:
     def __init__(self, clock: Callable[[], float] = time.time, capacity: int = CAPACITY) -> None:
         """Keep at most ``capacity`` records; ``clock`` gives epoch seconds."""
         self._clock = clock
-        self._records: deque[LogRecord] = deque(maxlen=capacity)
+        self._lines: deque[LogRecord | Message] = deque(maxlen=capacity)
+        self._unread = 0
+        self._own: deque[int] = deque(maxlen=OWN_KEPT)
+        self._count = 0
+        self.left_out = 0
+        """Records of the bus that were dropped because too many came at once."""
         self.revision = 0
 
     @property
     def records(self) -> Sequence[LogRecord]:
-        """The records, oldest first."""
-        return self._records
+        """The records, oldest first; those of the bus that nobody has read yet are decoded now."""
+        self._read()
+        return self._lines  # type: ignore[return-value]  # all are records now
 
     def add(self, level: str, origin: str, text: str) -> None:
         """Add one line; a very long text is cut and says so."""
-        if len(text) > TEXT_LIMIT:
-            text = f"{text[:TEXT_LIMIT]}… ({len(text)} characters)"
-        self._records.append(LogRecord(self._clock(), level, origin, text))
-        self.revision += 1
+        self._put([LogRecord(self._clock(), level, origin, _cut(text))])
+
+    def take(self, messages: Sequence[Message], dropped: int = 0) -> None:
+        """Add records of the bus; ``dropped`` are those that were lost before these."""
+        if dropped:
+            self.left_out += dropped
+            lost = "1 log record was" if dropped == 1 else f"{dropped} log records were"
+            self.add("warn", "studio", f"{lost} left out: too many at once")
+        if messages:
+            self._put(messages)
+
+    def leave_out(self, pid: int | None) -> None:
+        """Records of that process are told in another way: a program that runs here prints into our pipe."""
+        if pid is not None:
+            self._own.append(pid)
 
     def clear(self) -> None:
         """Forget all records."""
-        self._records.clear()
+        self._lines.clear()
+        self._unread = 0
         self.revision += 1
+
+    def _put(self, lines: Sequence[LogRecord | Message]) -> None:
+        self._lines.extend(lines)
+        self._unread = min(self._unread + len(lines), len(self._lines))
+        self.revision += 1
+
+    def _read(self) -> None:
+        """Put records in the place of the messages at the end, and number them."""
+        unread = [self._lines.pop() for _ in range(self._unread)]
+        self._unread = 0
+        for line in reversed(unread):
+            record = self._record(line) if isinstance(line, Message) else line
+            if record is not None:
+                self._count += 1
+                self._lines.append(replace(record, number=self._count))
+
+    def _record(self, message: Message) -> LogRecord | None:
+        try:
+            given = logs.LogRecord.from_plain(message.payload, message.stamp_ns)
+        except NepError:
+            return None  # an alert says so, as for every topic
+        if given.pid is not None and given.pid in self._own:
+            return None
+        place = f"{given.file}:{given.line}" if given.file and given.line else given.file or ""
+        return LogRecord(
+            given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
+            _LEVELS.get(given.level, given.level),
+            given.node or given.name or "somebody",
+            _cut(given.text),
+            logger="" if given.name == given.node else given.name,
+            place=place,
+        )
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= TEXT_LIMIT else f"{text[:TEXT_LIMIT]}… ({len(text)} characters)"

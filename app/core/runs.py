@@ -199,6 +199,7 @@ class Runs:
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self.kept, self._program_id = frozenset(program.robots), runner.program_id
+        self._console.leave_out(runner.pid)
         self._run = RunState(
             "running", document.name, started_s=self._clock(), last_words=self._run.last_words
         )

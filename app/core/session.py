@@ -41,6 +41,7 @@ from app.core.stopping import RobotStopper
 from app.core.topics import Topics, total_rate_hz
 from app.core.watches import Watch, Watches
 from app.robots.description import Robot
+from nep.logs import LOG_TOPIC, LOG_TYPE
 from nep.masters import master_address
 from nep.nodes import Node
 from nep.views import GraphView
@@ -115,7 +116,7 @@ class Session:
 
     def _live_network(self) -> LiveSource:
         sinks = [self._mailbox.post, self.images.offer]
-        return LiveSource(self.address, sinks, self._mailbox.post_event)
+        return LiveSource(self.address, sinks, self._mailbox.post_event, always={LOG_TOPIC: LOG_TYPE})
 
     # -- what the window and its panels call -----------------------------------------------------------------
 
@@ -184,6 +185,8 @@ class Session:
 
     def _on_messages(self, drained: Drained, now: float) -> None:
         for topic, batch in drained.batches.items():
+            if topic == LOG_TOPIC:
+                self.console.take(batch.messages, batch.dropped)
             if not self._watches.watched(topic):
                 continue  # the last of a subscription that has just ended
             self.topics.add(topic, batch, now)

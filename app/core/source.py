@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -90,8 +90,19 @@ class LiveSource:
     One thread asks the master, subscribes and does jobs; none of it in the window.
     """
 
-    def __init__(self, address: str, sinks: Sequence[Sink], post_event: Callable[[object], None]) -> None:
-        """Give batches of messages to every sink (in nep's thread) and events to ``post_event``."""
+    def __init__(
+        self,
+        address: str,
+        sinks: Sequence[Sink],
+        post_event: Callable[[object], None],
+        *,
+        always: Mapping[str, str] | None = None,
+    ) -> None:
+        """Give batches of messages to every sink (in nep's thread) and events to ``post_event``.
+
+        ``always``: topics, with their types, that are subscribed from the start, before anybody publishes.
+        """
+        self._always = always or {}
         self.address = address
         self._sinks = tuple(sinks)
         self._post_event = post_event
@@ -201,19 +212,20 @@ class LiveSource:
         if view is None:
             return
         with self._lock:
-            wanted = set(self._wanted)
+            wanted = {*self._wanted, *self._always}
         for topic in [topic for topic in self._subscribers if topic not in wanted]:
             self._subscribers.pop(topic)[1].close()
         for topic in wanted:
             info = view.topics.get(topic)
-            if info is None:
+            msg_type = self._always.get(topic) if info is None else info.msg_type
+            if msg_type is None:
                 continue
             held = self._subscribers.get(topic)
-            if held is not None and held[0] != info.msg_type:
+            if held is not None and held[0] != msg_type:
                 held[1].close()
                 held = None
             if held is None:
-                self._subscribe(topic, info.msg_type)
+                self._subscribe(topic, msg_type)
 
     def _subscribe(self, topic: str, msg_type: str) -> None:
         if self._node is None:

@@ -8,7 +8,8 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import FrameType
 
 import psutil
@@ -44,7 +45,7 @@ def run(
     owner = _process(owner_pid)
     if owner_pid is not None and owner is None:
         return
-    with nep.node(name, master=master) as node:
+    with nep.node(name, master=master) as node, _published(node):
         driver = Driver(kind, name, node)
         try:
             while not _started(driver):
@@ -54,6 +55,17 @@ def run(
                 ended.wait(_OWNER_CHECK_S)
         finally:
             driver.close()
+
+
+@contextmanager
+def _published(node: nep.Node) -> Iterator[None]:
+    """What this process logs is also published: Studio's Console and `nep log` show it."""
+    root = logging.getLogger()
+    root.addHandler(node.log_handler)
+    try:
+        yield
+    finally:
+        root.removeHandler(node.log_handler)
 
 
 def _started(driver: Driver) -> bool:

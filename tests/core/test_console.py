@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import orjson
+
 from app.core.console import TEXT_LIMIT, Console
+from nep.logs import LOG_TOPIC, LOG_TYPE
+from nep.message import Message
 
 
 def test_it_keeps_the_newest_records_in_order() -> None:
@@ -25,3 +29,76 @@ def test_clear_forgets_all() -> None:
     console.add("warn", "test", "a")
     console.clear()
     assert not console.records
+
+
+class Sent(Message):
+    """A message that knows how often it was decoded."""
+
+    reads = 0
+
+    @property
+    def payload(self) -> object:
+        self.reads += 1
+        return super().payload
+
+
+def record(**given: object) -> Sent:
+    return Sent(LOG_TOPIC, orjson.dumps(given), "json", LOG_TYPE, stamp_ns=7_000_000_000)
+
+
+def test_records_of_the_bus_are_decoded_when_somebody_reads_them() -> None:
+    console = Console(lambda: 5.0)
+    console.add("info", "studio", "first")
+    sent = record(
+        level="warning", text="low", name="driver", node="Pepper", stamp_ns=9_000_000_000, file="a.py", line=3
+    )
+    console.take([sent])
+    console.add("info", "studio", "last")
+    assert console.revision == 3
+    assert sent.reads == 0
+    first, told, last = console.records
+    assert (first.text, last.text) == ("first", "last")
+    assert (told.level, told.origin, told.logger, told.text) == ("warn", "Pepper", "driver", "low")
+    assert (told.stamp_s, told.place) == (9.0, "a.py:3")
+    assert [line.number for line in console.records] == [1, 2, 3]
+    assert (console.revision, sent.reads) == (3, 1)  # reading is no change, and done once
+
+
+def test_what_the_window_was_too_slow_for_is_counted() -> None:
+    console = Console()
+    console.take([record(text="newest")], dropped=744)
+    console.take([], dropped=1)
+    assert [line.text for line in console.records] == [
+        "744 log records were left out: too many at once",
+        "newest",
+        "1 log record was left out: too many at once",
+    ]
+    assert console.left_out == 745
+
+
+def test_a_program_that_runs_here_is_not_heard_twice() -> None:
+    console = Console()
+    console.leave_out(None)
+    console.leave_out(77)
+    console.take([record(text="mine", pid=77), record(text="theirs", pid=78), record(text="unsaid")])
+    assert [line.text for line in console.records] == ["theirs", "unsaid"]
+
+
+def test_whatever_comes_on_the_topic_is_one_line_or_an_alert_elsewhere() -> None:
+    console = Console(lambda: 5.0)
+    console.take([
+        Message(LOG_TOPIC, b"{oops", "json", LOG_TYPE),
+        Message(LOG_TOPIC, b'"only words"', "json", LOG_TYPE),
+        record(level="critical", text="x" * (TEXT_LIMIT + 1), node="a", name="a"),
+    ])  # fmt: skip
+    words, long = console.records
+    assert (words.text, words.origin, words.stamp_s) == ("only words", "somebody", 5.0)
+    assert (long.level, long.logger) == ("critical", "")
+    assert long.text.endswith(f"… ({TEXT_LIMIT + 1} characters)")
+
+
+def test_a_ring_that_is_full_of_unread_records_keeps_the_newest() -> None:
+    console = Console(capacity=3)
+    console.take([record(text=str(number)) for number in range(10)])
+    console.add("info", "studio", "end")
+    assert [line.text for line in console.records] == ["8", "9", "end"]
