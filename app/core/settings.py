@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -32,6 +32,7 @@ class RecentFile:
     path: Path
     name: str
     opened_s: float
+    there: bool = True
 
 
 class Settings:
@@ -61,27 +62,33 @@ class Settings:
     @property
     def recent(self) -> list[RecentFile]:
         """Files opened lately, newest first; those that are gone are left out."""
+        return [file for file in self.recent_known if file.there]
+
+    @property
+    def recent_known(self) -> list[RecentFile]:
+        """Files opened lately, newest first; those that are gone say so."""
         found = []
         entries: list[object] = self.get("recent", [])
         for entry in entries:
             if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
-                path = Path(entry["path"])
-                if path.is_file():
-                    found.append(
-                        RecentFile(path, str(entry.get("name", path.stem)), float(entry.get("opened_s", 0)))
-                    )
+                path, when = Path(entry["path"]), entry.get("opened_s", 0)
+                opened_s = float(when) if isinstance(when, int | float) else 0.0
+                found.append(RecentFile(path, str(entry.get("name", path.stem)), opened_s, path.is_file()))
         return found
 
     def add_recent(self, path: Path, name: str | None = None) -> None:
         """Put ``path`` first among the recent files. Raises SettingsError."""
         path = path.resolve()
-        kept: list[dict[str, object]] = [
-            {"path": str(item.path), "name": item.name, "opened_s": item.opened_s}
-            for item in self.recent
-            if item.path != path
+        kept = [file for file in self.recent_known if file.path != path]
+        self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
+
+    def set_recent(self, files: Sequence[RecentFile]) -> None:
+        """Remember these files and no others, newest first. Raises SettingsError."""
+        told = [
+            {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
+            for file in files[:RECENT_LIMIT]
         ]
-        first: dict[str, object] = {"path": str(path), "name": name or path.stem, "opened_s": self._clock()}
-        self.set("recent", [first, *kept][:RECENT_LIMIT])
+        self.set("recent", told)
 
     def _read(self) -> dict[str, object]:
         try:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
-from PySide6.QtWidgets import QMenu, QMenuBar, QWidget
+from PySide6.QtWidgets import QMenuBar, QWidget
 
 from app.ui.theme import Theme
 from app.ui.widgets.menus import Menu
@@ -19,7 +19,8 @@ MENUS = ("File", "Edit", "View", "Run", "Robots", "Help")
 class Row:
     """One command. ``group`` makes it one of several choices; ``above`` puts a line over it.
 
-    ``check`` makes it something that is on or off, ``everywhere`` a key that works in all windows.
+    Without a ``menu`` it is only in the palette and among the shortcuts. ``check`` makes it something that is
+    on or off, ``everywhere`` a key that works in all windows.
     """
 
     name: str
@@ -38,21 +39,33 @@ TABLE: tuple[Row, ...] = (
     Row("file.open", "File", "Open a file", "Ctrl+O", "folder-open"),
     Row("file.save", "File", "Save", "Ctrl+S", "save", above=True),
     Row("file.save_as", "File", "Save as", "Ctrl+Shift+S"),
+    Row("tab.close", "File", "Close the behaviour", "Ctrl+W", "x"),
+    Row("tab.reopen", "File", "Open the closed one again", "Ctrl+Shift+T", "history"),
+    Row("file.forget_recent", "", "Clear the list of recent files"),
     Row("file.start_page", "File", "Start page", "", "house", above=True),
+    Row("settings.open", "File", "Settings", "Ctrl+,", "settings"),
     Row("file.quit", "File", "Quit", "Ctrl+Q", above=True),
     Row("edit.undo", "Edit", "Undo", "Ctrl+Z", "rotate-ccw"),
     Row("edit.redo", "Edit", "Redo", "Ctrl+Shift+Z", "rotate-cw"),
-    Row("layout.behaviour", "View", "Behaviour layout", "Alt+1", "blocks", group="layout"),
+    Row("palette.open", "View", "Find a command or panel", "Ctrl+K", "search"),
+    Row("layout.behaviour", "View", "Behaviour layout", "Alt+1", "blocks", group="layout", above=True),
     Row("layout.developer", "View", "Developer layout", "Alt+2", "activity", group="layout"),
+    Row("layout.keep", "View", "Keep this layout as"),
+    Row("layout.rename", "View", "Rename this layout"),
+    Row("layout.delete", "View", "Delete this layout", "", "trash-2"),
     Row("layout.reset", "View", "Put the panels back"),
     Row("panel.next", "View", "Next panel", "F6"),
     Row("panel.previous", "View", "Previous panel", "Shift+F6"),
+    *(Row(f"panel.{n}", "", f"Go to panel {n}", f"Ctrl+{n}") for n in range(1, 10)),
+    Row("tab.next", "View", "Next behaviour", "Ctrl+Tab", above=True),
+    Row("tab.previous", "View", "Previous behaviour", "Ctrl+Shift+Tab"),
     Row("theme.light", "View", "Light", "", "sun", group="theme", above=True),
     Row("theme.dark", "View", "Dark", "", "moon", group="theme"),
     Row("theme.system", "View", "As the system", "", "monitor", group="theme"),
     Row("text.larger", "View", "Larger text", "Ctrl++", "zoom-in", above=True),
     Row("text.smaller", "View", "Smaller text", "Ctrl+-", "zoom-out"),
     Row("text.normal", "View", "Normal text", "Ctrl+0"),
+    Row("theme.contrast", "View", "High contrast", check=True, above=True),
     Row("theme.motion", "View", "Less motion", check=True),
     Row("run.run", "Run", "Run", "F5", "play"),
     Row("run.pause", "Run", "Pause", "F8", "pause"),
@@ -103,6 +116,21 @@ class Actions:
         """Whether the table has a command of that name."""
         return name in self._actions
 
+    def set_keys(self, keys_of: Callable[[str], Sequence[str]]) -> None:
+        """Give every command the keys that a person chose; the first stands in menus."""
+        for name, action in self._actions.items():
+            action.setShortcuts([QKeySequence(key) for key in keys_of(name)])
+
+    def disable(self, why_not: Callable[[str], str]) -> None:
+        """Grey what can't be done now; Stop never is."""
+        for name, action in self._actions.items():
+            action.setEnabled(name == "run.stop" or not why_not(name))
+
+    def enable_all(self) -> None:
+        """Let keys do everything again: each command looks itself whether it can be done."""
+        for action in self._actions.values():
+            action.setEnabled(True)
+
     def run(self, name: str) -> bool:
         """Do a command by its name; False when there is none or it can't be done now."""
         action = self._actions.get(name)
@@ -115,12 +143,14 @@ class Actions:
         """Mark one choice of a group, without doing it."""
         self._actions[name].setChecked(True)
 
-    def fill(self, bar: QMenuBar) -> dict[str, QMenu]:
+    def fill(self, bar: QMenuBar) -> dict[str, Menu]:
         """Make the menus of the table in a menu bar; they are returned by name."""
-        menus: dict[str, QMenu] = {name: Menu(self._theme, bar, name) for name in MENUS}
+        menus: dict[str, Menu] = {name: Menu(self._theme, bar, name) for name in MENUS}
         for made in menus.values():
             bar.addMenu(made)
         for row in TABLE:
+            if not row.menu:
+                continue
             menu = menus[row.menu]
             if row.above:
                 menu.addSeparator()

@@ -1,4 +1,4 @@
-"""The bar above every layout: logo, menus, layout switch, the robots' chip, on the start page Stop."""
+"""The bar above every layout: logo, menus, layout switch, palette field, the robots' chip, at the start Stop."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, Q
 
 from app.ui.layouts import Layout
 from app.ui.logo import Logo
+from app.ui.palette_field import PaletteField
 from app.ui.theme import Theme
 from app.ui.widgets import Chip, Segments, StopButton
 
@@ -33,6 +34,7 @@ class AppBar(QWidget):
             theme, [(layout.name, layout.title, layout.icon) for layout in layouts], name="Layout"
         )
         self.switch.changed.connect(self.layout_chosen)
+        self.find = PaletteField(theme)
         self.chip = Chip(theme, "", "off", large=True)
         self.stop = StopButton(theme, "appBar")
         self.stop.clicked.connect(self.stop_pressed)
@@ -52,6 +54,8 @@ class AppBar(QWidget):
         robots.setContentsMargins(0, 0, 0, 0)
         robots.setSpacing(6)
         robots.addStretch(1)
+        robots.addWidget(self.find)
+        robots.addSpacing(6)
         robots.addWidget(self.chip)
         robots.addWidget(self.stop)
         grid = QGridLayout(self)

@@ -10,19 +10,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, Qt, QTimer
-from PySide6.QtGui import QGuiApplication, QIcon
+from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
 from app import resources
 from app.core.journal import left_behind
 from app.core.session import Session
-from app.ui import fonts, messages
+from app.core.settings import home
+from app.ui import fonts, messages, single_window
 from app.ui.blockly_scheme import register_scheme
 from app.ui.commands import Commands
+from app.ui.incoming_files import IncomingFiles
 from app.ui.logo import LogoEngine
 from app.ui.main_window import MainWindow
 from app.ui.panels.base import Panel
 from app.ui.self_drive import SelfDrive
+from app.ui.single_window import Asked
 from app.ui.start_page import read_examples
 from app.ui.theme import MODES, Theme
 from nep.plugins import discover
@@ -34,10 +37,16 @@ LOG_EVERY_MS = 500
 class Options:
     """What the command line asks of the window."""
 
-    file: Path | None = None
+    files: tuple[Path, ...] = ()
     demo: bool = False
     theme: str | None = None
     self_drive: Path | None = None
+    new_window: bool = False
+
+    @property
+    def alone(self) -> bool:
+        """Whether this window shares nothing with others: neither files of later starts nor tabs."""
+        return self.new_window or self.self_drive is not None
 
 
 def make_application() -> QApplication:
@@ -67,8 +76,6 @@ def make_window(session: Session, options: Options) -> tuple[MainWindow, Command
     """The window with its commands, as it was left; nothing runs yet."""
     theme = Theme("light")
     window = MainWindow(session, theme, find_panels(), read_examples(resources.folder() / "examples"))
-    hints = QGuiApplication.styleHints().accessibility()
-    theme.high_contrast = hints.contrastPreference() == Qt.ContrastPreference.HighContrast
     window.state.apply_theme(theme)
     chosen = next((mode for mode in MODES if mode == options.theme), None)
     if chosen is not None:
@@ -76,13 +83,16 @@ def make_window(session: Session, options: Options) -> tuple[MainWindow, Command
     window.setWindowIcon(QIcon(LogoEngine(theme)))
     commands = Commands(window)
     window.state.place(window)
-    if options.self_drive is None:
-        commands.offer_unsaved(left_behind())
+    if not options.alone:
+        commands.tabs.come_back(left_behind(), window.banner)
     return window, commands
 
 
 def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order."""
+    meeting_place = single_window.place(home())
+    if not options.alone and single_window.hand_over(meeting_place, Asked(options.files, options.demo)):
+        return 0
     log = messages.listen()
     messages.quiet_chromium(os.environ)
     application = make_application()
@@ -97,10 +107,12 @@ def run(options: Options) -> int:
     hearing.start(LOG_EVERY_MS)
     window.show()
     window.begin()
-    if options.file is not None:
-        commands.open_at_start(options.file)
-    elif options.demo:
-        commands.demo()
+    commands.do_asked(Asked(options.files, options.demo))
+    if not options.alone:
+        single_window.Meeting(meeting_place, commands.do_asked, window)
+    incoming = IncomingFiles(window, commands.files.open_all)
+    if sys.platform == "darwin":
+        application.installEventFilter(incoming)  # the Finder tells the application, not its window
     driver = SelfDrive(window, commands, options.self_drive) if options.self_drive is not None else None
     code = application.exec()
     if driver is not None and not driver.well:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtCore import Qt
 
-from app.core.journal import Unsaved
-from app.ui.actions import Actions, Handler, shortcuts
+from app.ui.actions import Actions, Handler
 from app.ui.docks import Dock
 from app.ui.files import Asks, Files, SystemDialogs
+from app.ui.habits import Habits
 from app.ui.main_window import MainWindow
 from app.ui.popup import Sheet
-from app.ui.theme import Mode
-from app.ui.widgets.menus import Menu
+from app.ui.single_window import Asked
+from app.ui.tabs import Tabs
 
-TEXT_STEP = 25
 ABOUT = (
     "See what robots say, and tell them what to do.",
     "NEP Studio is free software (MIT licence).",
@@ -54,7 +52,10 @@ class Commands:
         self.files = Files(
             window.session, asking, window.toast.say, lambda: self._show("behaviour"), self._editor
         )
-        self.actions = Actions(window, window.theme, self._handlers())
+        self.tabs = Tabs(window.session, self.files, lambda: self._show("behaviour"))
+        self.habits = Habits(window, self.files)
+        handlers = self._handlers() | self.tabs.handlers() | self.habits.handlers()
+        self.actions = Actions(window, window.theme, handlers)
         self._asked: dict[str, Callable[[str], object]] = {
             "panel": window.open_panel,
             "inspect": self._inspect,
@@ -62,14 +63,9 @@ class Commands:
             "block": self._show_block,
             "connect": self._connect_robot,
             "run.confirm": lambda _nothing: self._session.runs.confirm_still(),
+            **self.tabs.asked(),
         }
-        self._menus = self.actions.fill(window.bar.menus)
-        self._recent = Menu(window.theme, window, "Recent")
-        self._menus["File"].insertMenu(self.actions["file.save"], self._recent)
-        self._panels = Menu(window.theme, window, "Panels")
-        self._menus["View"].insertMenu(self.actions["layout.reset"], self._panels)
-        self._menus["File"].aboutToShow.connect(self._list_recent)
-        self._menus["View"].aboutToShow.connect(self._list_panels)
+        self.habits.use(self.actions, self.actions.fill(window.bar.menus))
         window.run = self.run
         self._connect()
 
@@ -84,25 +80,12 @@ class Commands:
             "file.quit": window.close,
             "edit.undo": lambda: self._edit("undo"),
             "edit.redo": lambda: self._edit("redo"),
-            "layout.behaviour": lambda: self._show("behaviour"),
-            "layout.developer": lambda: self._show("developer"),
-            "layout.reset": self._reset,
-            "panel.next": lambda: window.next_panel(1),
-            "panel.previous": lambda: window.next_panel(-1),
-            "theme.light": lambda: self._theme("light"),
-            "theme.dark": lambda: self._theme("dark"),
-            "theme.system": lambda: self._theme("system"),
-            "theme.motion": self._motion,
-            "text.larger": lambda: self._text(window.theme.text_percent + TEXT_STEP),
-            "text.smaller": lambda: self._text(window.theme.text_percent - TEXT_STEP),
-            "text.normal": lambda: self._text(100),
             "run.run": self._run_or_go_on,
             "run.pause": session.runs.pause,
             "run.step": lambda: files.with_newest(session.runs.step),
             "run.stop": session.runs.stop,
             "robots.virtual": self._virtual_robot,
             "robots.show": lambda: window.open_panel("robots"),
-            "help.shortcuts": lambda: self._sheet("Keyboard shortcuts", shortcuts()),
             "help.about": lambda: self._sheet("NEP Studio", [(line, "") for line in ABOUT]),
         }
 
@@ -126,11 +109,6 @@ class Commands:
         window.banner.on_action = self.run
         window.banner.on_dismiss = self._session.alerts.dismiss
         window.banner.on_more = lambda: self._open_in("developer", "alerts")
-        for number in range(1, 10):
-            keys = QShortcut(QKeySequence(f"Ctrl+{number}"), window)
-            keys.activated.connect(lambda number=number: window.panel_number(number))
-        self.actions.choose(f"theme.{window.theme.mode}")
-        self.actions["theme.motion"].setChecked(window.theme.reduced_motion)
 
     # -- by name ----------------------------------------------------------------------------------
 
@@ -179,12 +157,7 @@ class Commands:
     # -- what they do -----------------------------------------------------------------------------
 
     def _show(self, layout: str) -> None:
-        self._window.show_layout(layout)
-        self.actions.choose(f"layout.{layout}")
-
-    def _reset(self) -> None:
-        if self._window.bench is not None:
-            self._window.bench.arrange()
+        self.habits.show_layout(layout)
 
     def _editor(self) -> object:
         bench = self._window.benches.get("behaviour")
@@ -195,18 +168,6 @@ class Commands:
         editor = self._editor()
         if isinstance(editor, Undoes):
             (editor.undo if what == "undo" else editor.redo)()
-
-    def _theme(self, mode: Mode) -> None:
-        self._window.theme.set_mode(mode)
-        self._window.state.keep_theme(self._window.theme)
-
-    def _motion(self) -> None:
-        self._window.theme.set_reduced_motion(self.actions["theme.motion"].isChecked())
-        self._window.state.keep_theme(self._window.theme)
-
-    def _text(self, percent: int) -> None:
-        self._window.theme.set_text_percent(percent)
-        self._window.state.keep_theme(self._window.theme)
 
     def _run_or_go_on(self) -> None:
         runs = self._session.runs
@@ -225,47 +186,19 @@ class Commands:
     def _sheet(self, title: str, lines: list[tuple[str, str]]) -> None:
         Sheet(self._window.theme, self._window, title, lines).show_over()
 
-    # -- menus that change ------------------------------------------------------------------------
-
-    def _list_recent(self) -> None:
-        self._recent.clear()
-        recent = self._session.settings.recent
-        self._recent.menuAction().setVisible(bool(recent))
-        for file in recent:
-            entry = self._recent.addAction(file.name)
-            entry.setToolTip(str(file.path))
-            entry.triggered.connect(lambda _on=False, path=file.path: self.files.open(path))
-
-    def _list_panels(self) -> None:
-        self._panels.clear()
-        window = self._window
-        self._panels.menuAction().setVisible(window.bench is not None)
-        if window.bench is None:
-            return
-        self.actions.choose(f"layout.{window.showing}")
-        opened = window.bench.open_names()
-        for panel in sorted(window.panels.values(), key=lambda panel: panel.title):
-            if panel.name == "behaviour" and window.showing != "behaviour":
-                continue
-            entry = self._panels.addAction(window.theme.icon(panel.icon), panel.title)
-            entry.setCheckable(True)
-            entry.setChecked(panel.name in opened)
-            entry.triggered.connect(lambda on=False, name=panel.name: self._toggle(name, on))
-
-    def _toggle(self, name: str, on: bool) -> None:
-        bench = self._window.bench
-        if bench is None:
-            return
-        if on:
-            bench.open(name)
-        else:
-            bench.docks[name].close()
-
     # -- at the start -----------------------------------------------------------------------------
 
-    def open_at_start(self, path: Path) -> None:
-        """Open the file that was given on the command line."""
-        self.files.open(path)
+    def do_asked(self, asked: Asked) -> None:
+        """Do what a start asks, this one or a later one that found this window."""
+        if asked.files:
+            self.files.open_all(asked.files)
+        elif asked.demo:
+            self.demo()
+        window = self._window
+        if window.isVisible():
+            window.setWindowState(window.windowState() & ~Qt.WindowState.WindowMinimized)
+            window.raise_()
+            window.activateWindow()
 
     def demo(self) -> None:
         """Begin with the virtual robot and the first example."""
@@ -273,24 +206,3 @@ class Commands:
         self._virtual_robot()
         if cards:
             self.files.example(cards[0].path)
-
-    def offer_unsaved(self, left: list[Unsaved]) -> None:
-        """Offer what a Studio that died left behind, one after the other."""
-        if not left:
-            return
-        first, rest = left[0], left[1:]
-
-        def put_back() -> None:
-            self.files.recover(first)
-            self.offer_unsaved(rest)
-
-        def leave() -> None:
-            first.journal.unlink(missing_ok=True)
-            self.offer_unsaved(rest)
-
-        self._window.banner.offer(
-            "Put back the unsaved work?",
-            f"“{first.name}” was not saved when Studio ended last time.",
-            ("Put it back", put_back),
-            ("Throw it away", leave),
-        )

@@ -6,16 +6,18 @@ import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import QSize, QTimer
+from PySide6.QtCore import QSize, QTimer, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.session import Session
 from app.ui.app_bar import AppBar
+from app.ui.arrangements import Arrangements
 from app.ui.banner import BannerPlace
 from app.ui.docks import Dock
 from app.ui.focus_ring import FocusRing
 from app.ui.layouts import LAYOUTS, layout_named
+from app.ui.move_question import MoveQuestion
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext
 from app.ui.robots_chip import robots_chip
 from app.ui.run_bar import RunBar, ToolBar
@@ -39,14 +41,16 @@ _log = logging.getLogger(__name__)
 class MainWindow(QMainWindow):
     """One session in one window. `run` is set by the commands (`app.ui.commands`)."""
 
+    bench_made = Signal()
+
     def __init__(
         self, session: Session, theme: Theme, panels: Mapping[str, Panel], examples: Sequence[Example] = ()
     ) -> None:
         super().__init__()
         self.session, self.theme, self.panels = session, theme, panels
-        self.state = WindowState(
-            session.settings, lambda sentence: session.console.add("warn", "studio", sentence)
-        )
+        self.state = WindowState(session.settings, self.complain)
+        self.arrangements = Arrangements(self.state, self.complain)
+        self.layouts = LAYOUTS
         self.run: Callable[[str], object] = lambda _name: None
         self.on_shut: Callable[[], object] = lambda: None
         self.showing = ""
@@ -91,6 +95,7 @@ class MainWindow(QMainWindow):
         column.addWidget(self.status)
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
+        self.question = MoveQuestion(theme, self, self.session.fleet.moving)
 
     # -- what shows -------------------------------------------------------------------------------
 
@@ -98,9 +103,17 @@ class MainWindow(QMainWindow):
         """Show the start page."""
         self.showing = START
         self.pages.setCurrentWidget(self.start)
-        self.start.show_recent(self.session.settings.recent)
+        self.show_recent()
         self._show_bars(None)
         self.start.focus_first()
+
+    def show_recent(self) -> None:
+        """Show on the start page which files were opened lately."""
+        self.start.show_recent(self.session.settings.recent)
+
+    def complain(self, sentence: str) -> None:
+        """Say in the Console what went wrong and needs nobody's hand."""
+        self.session.console.add("warn", "studio", sentence)
 
     def show_layout(self, name: str) -> Workbench:
         """Show a layout; it is made, as it was left, when it is the first time."""
@@ -111,9 +124,8 @@ class MainWindow(QMainWindow):
             self.benches[layout.name] = bench
             self.pages.addWidget(bench)
             bench.resize(self.pages.size())
-            saved = self.state.of_layout(layout.name)
-            if not saved or not bench.restore(saved):
-                bench.arrange()
+            self.arrangements.bring_back(bench, layout.name)
+            self.bench_made.emit()
         bench = self.benches[layout.name]
         focus = QApplication.focusWidget()
         inside = focus is None or self.pages.isAncestorOf(focus)
@@ -197,6 +209,7 @@ class MainWindow(QMainWindow):
         if self._ticks % FACTS_EVERY == 0:
             self._show_facts()
         self._show_alerts()
+        self.question.refresh()
 
     def _show_facts(self) -> None:
         """Figures that nobody can read 30 times a second."""
@@ -205,7 +218,8 @@ class MainWindow(QMainWindow):
             self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach()))
         elif self.showing == "developer":
             reach = ("lock", facts.reach()[1], None)
-            self.status.show_facts((facts.master(), reach, facts.traffic(), facts.lost()), (facts.window(),))
+            left = (facts.master(), reach, facts.traffic(), facts.lost())
+            self.status.show_facts(left, (facts.shown(), facts.window()))
         title = "NEP Studio" if self.showing == START else f"{document.name} - NEP Studio"
         if title != self.windowTitle():
             self.setWindowTitle(title)
@@ -269,7 +283,8 @@ class MainWindow(QMainWindow):
             self._shut = True
             self.timer.stop()
             self.state.keep_place(self)
-            self.state.keep_layouts({name: bench.save() for name, bench in self.benches.items()})
+            for name, bench in self.benches.items():
+                self.arrangements.keep(bench, name)
             self.state.keep_theme(self.theme)
             self.hide()
             if self._moves():

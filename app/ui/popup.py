@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.ui.shortcuts import spoken_key as spoken_key
 from app.ui.theme import Theme
 from app.ui.widgets import IconButton, label, paint
-
-
-def spoken_key(shortcut: str) -> str:
-    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"."""
-    return re.sub(r"\+(?=.)", " ", shortcut)
 
 
 class KeyCap(QWidget):

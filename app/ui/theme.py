@@ -13,8 +13,9 @@ from PySide6.QtCore import QObject, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QGuiApplication, QIcon, QPalette, QStyleHints
 from PySide6.QtWidgets import QApplication, QStyleFactory
 
-from app.ui import fonts, theme_sheet, theme_tokens
+from app.ui import fonts, theme_blockly, theme_sheet, theme_system, theme_tokens
 from app.ui.icons import IconEngine
+from app.ui.theme_system import Wish
 from app.ui.theme_tokens import Status, Tokens
 
 Mode = Literal["light", "dark", "system"]
@@ -22,6 +23,7 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 MONO_KINDS = frozenset({"code", "mono"})
 DISPLAY_SPACING_EM = -0.02
 TEXT_PERCENT = (100, 200)
+STRONGER = frozenset({"border", "borderStrong", "okBorder", "warnBorder", "errorBorder"})
 DEPRIVED_OF_TINT = ("okTint", "warnTint", "errorTint", "infoTint", "accentTint", "changedTint")
 
 _PALETTE: Mapping[QPalette.ColorRole, str] = {
@@ -71,12 +73,14 @@ class Theme(QObject):
         self._hints = hints if hints is not None else QGuiApplication.styleHints()
         self._mode: Mode = mode
         self._text_percent = TEXT_PERCENT[0]
-        self.reduced_motion = False
-        self.high_contrast = False
+        self.motion: Wish = "off"  # less of it
+        self.contrast: Wish = "off"  # more of it
+        self.reduced_motion = self.high_contrast = False
         self._dark = self._wanted_dark()
         self._icons: dict[tuple[str, str, str], QIcon] = {}
         self._fonts: dict[str, QFont] = {}
         self._hints.colorSchemeChanged.connect(self._system_changed)
+        theme_system.on_contrast(self._hints, lambda: self.set_contrast(self.contrast))
 
     # -- the mode ---------------------------------------------------------------------------------
 
@@ -100,16 +104,39 @@ class Theme(QObject):
         self._mode = mode
         self._refresh()
 
+    def begin(self, mode: Mode, text_percent: int, motion: Wish, contrast: Wish) -> None:
+        """Take over everything that was chosen before, and apply it once."""
+        self._mode, self.contrast = mode, contrast
+        self.high_contrast = self._wanted_contrast()
+        self._text_percent = min(max(text_percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
+        self._fonts.clear()
+        self.set_motion(motion)
+        self._refresh()
+
     def set_text_percent(self, percent: int) -> None:
         """Text and what is measured by it, 100 to 200 per cent."""
         self._text_percent = min(max(percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
         self._fonts.clear()
         self.apply()
 
-    def set_reduced_motion(self, reduced: bool) -> None:
-        """Whether nothing fades, glides or breathes."""
-        self.reduced_motion = reduced
+    def set_motion(self, wish: Wish) -> None:
+        """Whether nothing fades, glides or breathes: "on" is less motion, "system" as the system says."""
+        self.motion = wish
+        self.reduced_motion = wish == "on" or (wish == "system" and theme_system.wants_less_motion())
         self.changed.emit()
+
+    def set_contrast(self, wish: Wish) -> None:
+        """Whether edges are strong and tints are off: "on", "off", or as the system says."""
+        self.contrast = wish
+        if self._wanted_contrast() != self.high_contrast:
+            self.high_contrast = not self.high_contrast
+            self.apply()
+        else:
+            self.changed.emit()
+
+    def _wanted_contrast(self) -> bool:
+        asked = self.contrast == "system" and theme_system.wants_contrast(self._hints)
+        return self.contrast == "on" or asked
 
     @property
     def text_percent(self) -> int:
@@ -149,7 +176,7 @@ class Theme(QObject):
     def hex(self, role: str) -> str:
         """A role's colour as the tokens write it; KeyError when there is no such role."""
         if self.high_contrast:
-            if role in {"border", "borderStrong"}:
+            if role in STRONGER:
                 role = "controlBorder"
             elif role in DEPRIVED_OF_TINT:
                 role = "panel"
@@ -274,19 +301,10 @@ class Theme(QObject):
 
     def blockly_tokens(self) -> dict[str, object]:
         """What the page of the block editor needs: all roles and block colours of the mode that shows now."""
-        return {
-            "dark": self._dark,
-            "colour": dict(self._tokens.colours[self._scheme]),
-            "block": {
-                name: {
-                    **parts[self._scheme],
-                    "text": self._tokens.block_text[name],
-                    "icon": self.block_icon(name),
-                }
-                for name, parts in self._tokens.blocks.items()
-            },
-            "glow": self._tokens.raw.get("blockGlow", {}),
-            "font": {"text": self.family("text"), "mono": self.family("mono")},
-            "reducedMotion": self.reduced_motion,
-            "textPercent": self._text_percent,
-        }
+        return theme_blockly.tokens_for_page(
+            self._tokens,
+            self.hex,
+            dark=self._dark,
+            reduced_motion=self.reduced_motion,
+            text_percent=self._text_percent,
+        )

@@ -74,6 +74,7 @@ QLineEdit, QPlainTextEdit, QTextEdit {{
 }}
 QLineEdit[quiet="true"] {{ border-color: {borderStrong}; }}
 QLineEdit[wrong="true"] {{ border-color: {error}; }}
+QLineEdit[bare="true"] {{ border: none; border-radius: 0; background: transparent; padding: 0; }}
 QLineEdit:disabled {{ color: {textDisabled}; border-color: {border}; }}
 QPlainTextEdit[bare="true"], QTextEdit[bare="true"] {{ border: none; border-radius: 0; background: {panel}; }}
 QComboBox QAbstractItemView {{
@@ -90,6 +91,7 @@ QAbstractItemView {{
     background: {panel}; color: {text}; border: none; outline: none; alternate-background-color: {sunken};
     selection-background-color: {selected}; selection-color: {selectedText};
 }}
+QAbstractItemView[raised="true"] {{ background: {raised}; }}
 QHeaderView {{ background: {panel}; border: none; }}
 QHeaderView::section {{
     background: {panel}; color: {textTertiary}; border: none; border-bottom: 1px solid {border};

@@ -12,12 +12,13 @@ from PySide6.QtWidgets import QMainWindow
 from app.core.settings import Settings
 from app.errors import SettingsError
 from app.ui.theme import MODES, Mode, Theme
+from app.ui.theme_system import wish_of
 
 Saved = dict[str, object]
 
 
 class WindowState:
-    """Reads and writes the keys "window", "layout", "layouts", "theme", "text_percent" and "less_motion"."""
+    """Reads and writes what concerns the window: place, layouts, theme, size of text, motion, contrast."""
 
     def __init__(self, settings: Settings, complain: Callable[[str], object]) -> None:
         """``complain`` is told, in a sentence, what can't be kept."""
@@ -28,15 +29,20 @@ class WindowState:
         """Give the theme what was chosen before; it is applied once."""
         chosen = self._settings.get("theme", "system")
         mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
-        theme.reduced_motion = self._settings.get("less_motion", False)
-        theme.set_text_percent(self._settings.get("text_percent", 100))
-        theme.set_mode(mode)
+        motion = wish_of(self._settings.get("less_motion", None))
+        contrast = wish_of(self._settings.get("high_contrast", None))
+        theme.begin(mode, self._settings.get("text_percent", 100), motion, contrast)
 
     def keep_theme(self, theme: Theme) -> None:
         """Keep what is chosen now."""
         self._set("theme", theme.mode)
         self._set("text_percent", theme.text_percent)
-        self._set("less_motion", theme.reduced_motion)
+        self._set("less_motion", theme.motion)
+        self._set("high_contrast", theme.contrast)
+
+    def keep(self, key: str, value: object) -> None:
+        """Keep anything that JSON can say."""
+        self._set(key, value)
 
     def place(self, window: QMainWindow) -> bool:
         """Put the window where it was; False when it was nowhere yet."""
@@ -60,17 +66,34 @@ class WindowState:
         """Keep which layout shows."""
         self._set("layout", name)
 
+    def layouts(self) -> Mapping[str, object]:
+        """Everything that is kept about layouts, by name."""
+        kept: Saved = self._settings.get("layouts", {})
+        return kept
+
     def of_layout(self, name: str) -> Mapping[str, object]:
         """What a layout looked like; empty when it never showed."""
-        layouts: Saved = self._settings.get("layouts", {})
-        found = layouts.get(name)
+        found = self.layouts().get(name)
         return found if isinstance(found, Mapping) else {}
+
+    def forget_layout(self, name: str) -> None:
+        """Keep nothing about a layout any more."""
+        self._set("layouts", {key: value for key, value in self.layouts().items() if key != name})
+
+    def chosen(self, base: str) -> str:
+        """The name of the own layout that a built-in one's workbench showed last; "" for none."""
+        kept: Saved = self._settings.get("chosen_layouts", {})
+        name = kept.get(base)
+        return name if isinstance(name, str) else ""
+
+    def keep_chosen(self, base: str, name: str) -> None:
+        """Keep which own layout a workbench shows."""
+        kept: Saved = self._settings.get("chosen_layouts", {})
+        self._set("chosen_layouts", {**kept, base: name})
 
     def keep_layouts(self, found: Mapping[str, Mapping[str, object]]) -> None:
         """Keep what these layouts look like now."""
-        layouts: Saved = dict(self._settings.get("layouts", {}))
-        layouts.update(found)
-        self._set("layouts", layouts)
+        self._set("layouts", {**self.layouts(), **found})
 
     def _set(self, key: str, value: object) -> None:
         try:

@@ -108,6 +108,10 @@ class Segments(QWidget):
         """The chosen value, or "" when there are no options."""
         return next((key for key, segment in self._segments.items() if segment.isChecked()), "")
 
+    def chosen_button(self) -> QAbstractButton | None:
+        """The segment that is chosen, for the keyboard."""
+        return self._segments.get(self.value)
+
     def set_value(self, value: str) -> None:
         """Choose without telling; a value that is not offered changes nothing."""
         if value in self._segments:

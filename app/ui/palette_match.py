@@ -1,0 +1,154 @@
+"""Fuzzy search for the command palette: which words fit what was typed, how well, and by which letters.
+
+A whole piece of a word fits better than letters that are spread over it; the beginning of a word fits better
+than its middle. Letters that are only somewhere do not fit at all: a person would not know why.
+"""
+
+from __future__ import annotations
+
+import heapq
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+
+WHOLE, WORD, INSIDE, SPREAD = 100.0, 80.0, 55.0, 40.0
+LEAST_SPREAD = 0.6  # share of the letters that begin a word or follow the letter before
+PER_LETTER = 0.05
+Span = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One thing that can be found and done.
+
+    ``id`` is "command:file.save", "panel:topics", "topic:/faces", "robot:Pepper" or "file:/home/me/a.nepb".
+    ``note`` stands quietly at the right, ``key`` is its shortcut; ``reason`` says why it can't be done now.
+    """
+
+    id: str
+    words: str
+    icon: str = ""
+    note: str = ""
+    key: str = ""
+    reason: str = ""
+
+    @property
+    def kind(self) -> str:
+        """What it is: "command", "panel", "topic", "robot" or "file"."""
+        return self.id.partition(":")[0]
+
+    @property
+    def name(self) -> str:
+        """The name that its kind knows it by."""
+        return self.id.partition(":")[2]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """An entry that fits, how well (more is better), and the letters that fit: (from, to)."""
+
+    entry: Entry
+    score: float = 0.0
+    spans: tuple[Span, ...] = ()
+
+
+def match(query: str, words: str) -> tuple[float, tuple[Span, ...]] | None:
+    """How well ``words`` fit a query of one or more pieces, in any order; None when they do not."""
+    lower = words.lower()
+    if len(lower) != len(words):  # letters that grow when they are small: positions would be wrong
+        lower = words
+    score, spans = 0.0, []
+    pieces = query.lower().split()
+    for piece in pieces:
+        found = _piece(piece, lower)
+        if found is None:
+            return None
+        score += found[0]
+        spans.extend(found[1])
+    return score / max(1, len(pieces)) - PER_LETTER * len(words), _joined(spans)
+
+
+def _piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
+    place = text.find(piece)
+    if place == 0:
+        return WHOLE, [(0, len(piece))]
+    first = place
+    while place > 0:
+        if not text[place - 1].isalnum():
+            return WORD - min(10.0, place / 10), [(place, place + len(piece))]
+        place = text.find(piece, place + 1)
+    if first > 0:
+        return INSIDE - min(10.0, first / 10), [(first, first + len(piece))]
+    return _spread(piece, text)
+
+
+def _spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
+    """The letters of a piece in their order, each best as the next letter or at a word's beginning."""
+    places: list[int] = []
+    good, at = 0, 0
+    for letter in piece:
+        if places and at < len(text) and text[at] == letter:
+            place, well = at, True
+        else:
+            place = _word_beginning(letter, text, at)
+            well = place >= 0
+            if not well:
+                place = text.find(letter, at)
+        if place < 0:
+            return None
+        good += well
+        places.append(place)
+        at = place + 1
+    share = good / len(piece)
+    if share < LEAST_SPREAD:
+        return None
+    return SPREAD * share - min(15.0, (places[-1] - places[0]) / 10), [(place, place + 1) for place in places]
+
+
+def _word_beginning(letter: str, text: str, start: int) -> int:
+    place = text.find(letter, start)
+    while place > 0 and text[place - 1].isalnum():
+        place = text.find(letter, place + 1)
+    return place
+
+
+def _joined(spans: Iterable[Span]) -> tuple[Span, ...]:
+    """The same letters in as few spans as possible, from the left."""
+    made: list[Span] = []
+    for begin, end in sorted(spans):
+        if made and begin <= made[-1][1]:
+            made[-1] = (made[-1][0], max(made[-1][1], end))
+        else:
+            made.append((begin, end))
+    return tuple(made)
+
+
+class Finder:
+    """Searches entries; a query that grows searches only what the shorter one found."""
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        """Search ``entries``, in the order in which equals are to stand."""
+        self.entries = entries
+        self._last: tuple[str, Sequence[Entry]] = ("", entries)
+
+    def find(self, query: str, most: int) -> tuple[list[Found], int]:
+        """The best for each kind, at most ``most`` of a kind, best first; and how many fit altogether."""
+        query = " ".join(query.split())
+        longer = query.startswith(self._last[0]) and " " not in query
+        candidates = self._last[1] if longer else self.entries
+        if query:
+            letters = re.compile(".*?".join(map(re.escape, query.split(" ")[0].lower())), re.IGNORECASE)
+            candidates = [entry for entry in candidates if letters.search(entry.words)]
+        self._last = (query.split(" ")[0], candidates)
+        kinds: dict[str, list[Found]] = {}
+        count = 0
+        for entry in candidates:
+            fits = match(query, entry.words)
+            if fits is not None:
+                count += 1
+                score = fits[0] - (0.5 if entry.reason else 0.0)
+                kinds.setdefault(entry.kind, []).append(Found(entry, score, fits[1]))
+        best = [heapq.nlargest(most, found, key=attrgetter("score")) for found in kinds.values()]
+        best.sort(key=lambda found: -found[0].score)
+        return [each for found in best for each in found], count

@@ -1,0 +1,189 @@
+"""Which keys do what: those of the table of commands as a person changed them, and those that stay.
+
+Kept in the settings under "shortcuts": only what differs from the table. F12 is Stop and stays so; Stop may
+have a second key.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QKeyCombination, QObject, Qt, Signal
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import QApplication
+
+from app.core.settings import Settings
+from app.errors import SettingsError
+from app.ui.actions import TABLE, Row
+
+STOP, STOP_KEY = "run.stop", "F12"
+NEEDS_WITH = "A key alone is for typing. Hold Ctrl or Alt with it, or use a function key."
+ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
+HOLDS = (
+    Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """A key that can't be changed: where it works, what it does, the key as it is spelled on keys."""
+
+    place: str
+    words: str
+    key: str
+
+
+FIXED: tuple[Fixed, ...] = (
+    Fixed("Everywhere", "Close the palette or a sheet, leave a field", "Esc"),
+    Fixed("Everywhere", "Next control in the panel", "Tab"),
+    Fixed("Everywhere", "Control before it", "Shift+Tab"),
+    Fixed("Everywhere", "Press the button that has the ring", "Space"),
+    Fixed("Tables and trees", "Go to the filter", "/"),
+    Fixed("Tables and trees", "Row above or below", "Up, Down"),
+    Fixed("Tables and trees", "Open the row", "Enter"),
+    Fixed("Tables and trees", "Open or close what is inside", "Right, Left"),
+    Fixed("Inspector", "Copy the value", "Ctrl+C"),
+    Fixed("Inspector", "Copy the path", "Ctrl+Shift+C"),
+    Fixed("Sliders", "One step", "Left, Right"),
+    Fixed("Sliders", "Ten steps", "PgUp, PgDown"),
+    Fixed("Sliders", "Lowest and highest", "Home, End"),
+    Fixed("Block editor", "Copy, cut, paste blocks", "Ctrl+C, Ctrl+X, Ctrl+V"),
+    Fixed("Block editor", "Delete the block", "Delete"),
+    Fixed("Block editor", "Move through blocks and gaps", "Up, Down, Left, Right"),
+    Fixed("Block editor", "Open the field or the menu of the block", "Enter"),
+    Fixed("Palette", "Choose", "Up, Down"),
+    Fixed("Palette", "Do it", "Enter"),
+    Fixed("Palette", "Change the shortcut", "Ctrl+Enter"),
+)
+
+
+def spoken_key(shortcut: str) -> str:
+    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"."""
+    return re.sub(r"\+(?=.)", " ", shortcut)
+
+
+def normal(key: str) -> str:
+    """A key in the one spelling that is compared and kept; "" when it is none."""
+    return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
+
+
+def key_of(pressed: QKeyCombination) -> str:
+    """The key of a key press."""
+    return QKeySequence(pressed).toString(QKeySequence.SequenceFormat.PortableText)
+
+
+class Shortcuts(QObject):
+    """The keys of all commands; `changed` when any of them did."""
+
+    changed = Signal()
+
+    def __init__(
+        self, settings: Settings, complain: Callable[[str], object], rows: Sequence[Row] = TABLE
+    ) -> None:
+        """``complain`` is told, in a sentence, what can't be kept."""
+        super().__init__()
+        self._settings, self._complain = settings, complain
+        self.rows: Mapping[str, Row] = {row.name: row for row in rows}
+        self._own = self._read()
+
+    def _read(self) -> dict[str, tuple[str, ...]]:
+        """What a person changed, as far as it makes sense."""
+        kept: dict[str, object] = self._settings.get("shortcuts", {})
+        found: dict[str, tuple[str, ...]] = {}
+        for name, keys in kept.items():
+            if name in self.rows and isinstance(keys, list):
+                good = tuple(normal(key) for key in keys if isinstance(key, str) and normal(key))
+                found[name] = good
+        return found
+
+    # -- asking -----------------------------------------------------------------------------------
+
+    def default(self, name: str) -> tuple[str, ...]:
+        """The keys that the table gives a command."""
+        row = self.rows.get(name)
+        return (normal(row.shortcut),) if row is not None and row.shortcut else ()
+
+    def of(self, name: str) -> tuple[str, ...]:
+        """The keys of a command now, the first of them in menus and tooltips."""
+        keys = self._own.get(name, self.default(name))
+        if name == STOP:
+            return (STOP_KEY, *(key for key in keys if key != STOP_KEY))
+        return tuple(key for key in keys if key != STOP_KEY)
+
+    def first(self, name: str) -> str:
+        """The first key of a command; "" when it has none."""
+        return next(iter(self.of(name)), "")
+
+    def own(self, name: str) -> bool:
+        """Whether a person changed the keys of a command."""
+        return self.of(name) != self.default(name)
+
+    def holder(self, key: str) -> str:
+        """The command that has a key; "" when none has."""
+        return next((name for name in self.rows if normal(key) in self.of(name)), "")
+
+    def refusal(self, name: str, pressed: QKeyCombination) -> str:
+        """Why a key can't be a command's, in a sentence; "" when it can."""
+        key = key_of(pressed)
+        if key == STOP_KEY:
+            return "" if name == STOP else "F12 is Stop in every program state, and stays so."
+        held = pressed.keyboardModifiers() & HOLDS
+        if not held and pressed.key() not in ALONE:
+            return NEEDS_WITH
+        for fixed in FIXED:
+            if key in [normal(each) for each in fixed.key.split(", ")] and held:
+                return f"{spoken_key(key)} stays “{fixed.words}” ({fixed.place})."
+        return ""
+
+    # -- changing ---------------------------------------------------------------------------------
+
+    def give(self, name: str, key: str) -> None:
+        """Give a command this key, alone; Stop gets it beside F12. Another command loses it."""
+        key, holder = normal(key), self.holder(key)
+        if holder and holder != name:
+            self._own[holder] = tuple(each for each in self.of(holder) if each != key)
+        self._own[name] = (key,) if key else ()
+        self._keep()
+
+    def swap(self, name: str, key: str) -> None:
+        """Give a command this key, and the one that had it this command's first key."""
+        holder, before = self.holder(key), self.first(name)
+        self._own[name] = (normal(key),)
+        if holder and holder != name:
+            self._own[holder] = (before,) if before and before != STOP_KEY else ()
+        self._keep()
+
+    def reset(self, name: str) -> None:
+        """Give a command the key of the table; another command that had got it loses it."""
+        self._own.pop(name, None)
+        for key in self.default(name):
+            for other in [each for each in self._own if each != name]:
+                self._own[other] = tuple(each for each in self._own[other] if each != key)
+        self._keep()
+
+    def reset_all(self) -> None:
+        """Every command has the key of the table again."""
+        self._own = {}
+        self._keep()
+
+    def _keep(self) -> None:
+        for name in [name for name in self._own if not self.own(name)]:
+            del self._own[name]
+        try:
+            self._settings.set("shortcuts", {name: list(keys) for name, keys in self._own.items()})
+        except SettingsError as error:
+            self._complain(str(error))
+        self.changed.emit()
+
+    # -- where they are shown ---------------------------------------------------------------------
+
+    def tell(self) -> None:
+        """Put the keys of the moment into the tooltips of all buttons that have the property ``command``."""
+        for widget in QApplication.allWidgets():
+            command = widget.property("command")
+            if isinstance(command, str):
+                said = widget.property("tip") or widget.accessibleName()
+                key = ", ".join(spoken_key(each) for each in self.of(command))
+                widget.setToolTip(f"{said} ({key})" if key else str(said))
