@@ -1,6 +1,6 @@
 """NEP Studio's entries: the window, a behaviour without a window, and the processes of a frozen build.
 
-``python -m app [FILE]`` opens the window, ``python -m app run FILE`` runs a behaviour with none. A frozen
+``python -m app [FILE ...]`` opens the window, ``python -m app run FILE`` runs a behaviour with none. A frozen
 Studio is also its own child: ``--child`` runs a program, ``--module NAME`` a module that is a process.
 """
 
@@ -20,7 +20,10 @@ def window_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="nep-studio", description="NEP Studio. `nep-studio run FILE` runs a behaviour with no window."
     )
-    made.add_argument("file", nargs="?", type=Path, metavar="FILE", help="a behaviour to open")
+    made.add_argument("files", nargs="*", type=Path, metavar="FILE", help="behaviours to open")
+    made.add_argument(
+        "--new-window", action="store_true", help="a window of its own, although Studio runs already"
+    )
     made.add_argument(
         "--demo", action="store_true", help="begin with the virtual robot and the first example"
     )
@@ -55,10 +58,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return hand_over(given[1], given[2:])
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
-    options = window_parser().parse_args(given)
+    options = window_parser().parse_intermixed_args(given)
     from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
-    return run(Options(options.file, options.demo, options.theme, options.self_drive))
+    return run(
+        Options(tuple(options.files), options.demo, options.theme, options.self_drive, options.new_window)
+    )
 
 
 def run_behaviour(arguments: Sequence[str]) -> int:

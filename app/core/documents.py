@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from app.blocks import editor_definitions
 from app.core.document import UNNAMED, Document
 from app.core.journal import Unsaved
 from app.errors import DocumentError
@@ -141,6 +142,19 @@ class Documents:
         self._topics = tuple(topics)
         for document in self._open:
             document.set_topics(topics)
+
+    @property
+    def definitions_revision(self) -> object:
+        """Differs when `definitions` may differ."""
+        return tuple((each.key, each.definitions_revision, len(each.robots)) for each in self._open)
+
+    def definitions(self) -> Mapping[str, object]:
+        """Blocks and toolbox for the editor: the robots that are connected, and those of any open behaviour.
+
+        They are the same for all tabs, so that a tab that does not show keeps its blocks.
+        """
+        absent = {robot.name: robot for document in self._open for robot in document.absent}
+        return editor_definitions(self._robots, tuple(absent.values()), self._topics)
 
     @property
     def journal_error(self) -> str | None:

@@ -68,6 +68,13 @@ class RunView:
     stop_filled: bool = True
 
 
+def place_of(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
+    """The block at which a program is held: in words, or its name when they hold a quotation."""
+    if "“" not in says or not blocks:
+        return says
+    return labels.get(blocks[0], says)
+
+
 def view_of(run: RunState, connected: Sequence[str], now: float, *, elsewhere: bool = False) -> RunView:
     """The run bar for this state, the names of the connected robots, and the time.
 

@@ -11,8 +11,9 @@ from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.document import Document
 from app.core.fleet import Fleet
+from app.core.moving import wanted_by
 from app.core.run_needs import Behaviours, Network
-from app.core.run_view import RunState, RunView, result_words, stop_words, unanswered_words, view_of
+from app.core.run_view import RunState, RunView, place_of, result_words, stop_words, unanswered_words, view_of
 from app.core.runner import Runner, RunnerEvent
 from app.core.stop_events import OneStopped, RobotAnswered, StopDone
 from app.core.stopping import RobotStop, RobotStopper, StopReport
@@ -104,6 +105,7 @@ class Runs:
 
     def stop(self) -> None:
         """End the program and tell every robot to stop; what they answer is the run bar's result."""
+        self._fleet.moving.withdraw()
         self._stop(None)
 
     def stop_robot(self, name: str) -> None:
@@ -146,7 +148,7 @@ class Runs:
                     self._console.add("info", run.name, event.says)
                 self._mark(running=event.blocks, stopped=self.stopped_blocks)
             case "paused" if run.state in {"running", "paused"}:
-                run.state, run.paused_at = "paused", self._place(event)
+                run.state, run.paused_at = "paused", place_of(event.says, event.blocks, self._labels)
                 run.pause_began_s = run.pause_began_s or self._clock()
                 self._mark(stopped=event.blocks)
             case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
@@ -191,6 +193,10 @@ class Runs:
             if wrong:
                 self._set_errors(wrong)
                 return
+            used = [link.robot for link in self._fleet.connected if link.name in program.robots]
+            again = self.step if paused else self.run
+            if not self._fleet.moving.permits(wanted_by(program.runnable, used), again):
+                return  # a person is asked first; the question stands in the window
             runner = Runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
             runner.start(program, robots, self._network.address, name=document.name, paused=paused)
@@ -204,12 +210,6 @@ class Runs:
             "running", document.name, started_s=self._clock(), last_words=self._run.last_words
         )
         self._console.add("info", self._run.name, "started")
-
-    def _place(self, event: RunnerEvent) -> str:
-        """The block at which the program is held: in words, or its name when they hold a quotation."""
-        if "“" not in event.says or not event.blocks:
-            return event.says
-        return self._labels.get(event.blocks[0], event.says)
 
     def _on_error(self, event: RunnerEvent) -> None:
         self._console.add("error", self._run.name, event.text)

@@ -7,12 +7,14 @@ over what they posted.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from app.core.alerts import Alerts
 from app.core.arrivals import arrivals
+from app.core.checks import Checks
 from app.core.companions import CompanionFailed, Companions
 from app.core.console import Console
 from app.core.document import Document
@@ -21,8 +23,9 @@ from app.core.fleet import Fleet
 from app.core.health import Health
 from app.core.images import Images
 from app.core.journal import Journal
-from app.core.losses import RecentLosses
+from app.core.kept_tabs import KeptTabs
 from app.core.mailbox import Drained, Mailbox
+from app.core.moving import Moving
 from app.core.nodes import Nodes
 from app.core.runner import RunnerEvent
 from app.core.runs import Runs
@@ -38,11 +41,13 @@ from app.core.source import (
 )
 from app.core.stop_events import OneStopped, RobotAnswered, StopDone
 from app.core.stopping import RobotStopper
-from app.core.topics import Topics, total_rate_hz
+from app.core.topics import Topics
+from app.core.traffic import Traffic
 from app.core.watches import Watch, Watches
 from app.robots.description import Robot
 from nep.logs import LOG_TOPIC, LOG_TYPE
 from nep.masters import master_address
+from nep.message import Message
 from nep.nodes import Node
 from nep.views import GraphView
 
@@ -83,13 +88,15 @@ class Session:
         self._start_companions = start_companions
         self.settings = settings if settings is not None else Settings()
         self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
+        self.traffic = Traffic(self.topics)
         self.nodes = Nodes()
-        self._mailbox = Mailbox()
+        self._mailbox, self._checks = Mailbox(), Checks()
         self._watches = Watches(self._begin_watch, self._end_watch)
         self.images = Images(lambda topic: self._watches.open([topic]).close, clock)
         self.source: Source = source if source is not None else self._live_network()
-        self.fleet = Fleet(self._watches, self.source.submit, clock)
+        self.fleet = Fleet(self._watches, self.source.submit, clock, Moving(self.settings))
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
+        self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
         self.companions = Companions(self.address, self._mailbox.post_event)
         self.runs = Runs(
@@ -104,10 +111,7 @@ class Session:
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
-        self.messages_per_s: float | None = None
-        self.lost_30s = 0
         self.tick_ms = 0.0
-        self._losses = RecentLosses()
         self._robots_seen = -1
         self._reachable: tuple[Robot, ...] = ()
         self._topics_seen = -1
@@ -115,8 +119,11 @@ class Session:
         self._new_epoch = (0, 0.0)
 
     def _live_network(self) -> LiveSource:
-        sinks = [self._mailbox.post, self.images.offer]
+        sinks = [self._checks.look, self._mailbox.post, self._offer]
         return LiveSource(self.address, sinks, self._mailbox.post_event, always={LOG_TOPIC: LOG_TYPE})
+
+    def _offer(self, _topic: str, messages: Sequence[Message]) -> None:
+        self.images.offer(messages)
 
     # -- what the window and its panels call -----------------------------------------------------------------
 
@@ -150,6 +157,8 @@ class Session:
         if now >= self._next_check:
             self._next_check = now + CHECK_S
             self.companions.check()
+            missed = self.source.missed()
+            self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
             self._health.check(self.runs.kept if self.runs.active else ())
             self._health.journal(self.documents.journal_error)
             if self.master.kind == "none" and self._start_companions:
@@ -159,6 +168,7 @@ class Session:
     def close(self) -> None:
         """End the program, the threads and the processes that were started here."""
         self.runs.close()
+        self.tabs.keep(ended_well=True)
         self.documents.end()
         self.fleet.close()
         if self.stopper is not None:
@@ -178,7 +188,7 @@ class Session:
     def _end_watch(self, topic: str) -> None:
         self.source.unwatch(topic)
         self.topics.unwatch(topic)
-        self.alerts.cure(f"message:{topic}")
+        self._health.forget(topic)
 
     def _make_stopper(self, node: Node) -> None:
         self.stopper = RobotStopper(node)
@@ -191,8 +201,10 @@ class Session:
                 continue  # the last of a subscription that has just ended
             self.topics.add(topic, batch, now)
             self.topics[topic].watched = True
+        self.traffic.add(drained.batches, now)
         self.fleet.add(drained.batches)
-        self._health.look(drained.batches)
+        found = self._checks.take()
+        self._health.look({topic: what for topic, what in found.items() if self._watches.watched(topic)})
         if drained.lost_events:
             self.alerts.put(
                 "mailbox",
@@ -246,8 +258,7 @@ class Session:
         self.topics.update(view, now)
         self.nodes.update(view, now)
         self.fleet.update(view)
-        self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
-        self.messages_per_s = total_rate_hz(list(view.topics.values()))
+        self.traffic.follow(view, now)
         self._health.graph_alerts(view)
 
     def _on_master_lost(self, event: MasterLost) -> None:

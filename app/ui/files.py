@@ -1,9 +1,9 @@
-"""Opening, saving and putting back behaviours; nothing is lost, so nothing asks."""
+"""Opening, saving, closing and putting back behaviours; nothing is lost, so nothing asks."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -12,10 +12,11 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.blocks.mend import mend
 from app.core.behaviour_file import SUFFIX
+from app.core.document import Document
 from app.core.journal import Unsaved
 from app.core.session import Session
 from app.core.settings import home
-from app.errors import AppError, SettingsError
+from app.errors import AppError, DocumentError, SettingsError
 
 FILTER = f"Behaviours (*{SUFFIX})"
 
@@ -83,7 +84,7 @@ def kept_path(folder: Path, name: str, now_s: float) -> Path:
 
 
 class Files:
-    """The document's files. ``say`` is the toast, ``shown`` is called when another document shows."""
+    """The open behaviours' files. ``say`` is the toast, ``shown`` is called when another one shows."""
 
     def __init__(
         self,
@@ -96,11 +97,12 @@ class Files:
     ) -> None:
         """``editor`` gives the behaviour panel, or None while there is none."""
         self._session, self._asks, self._say, self._shown = session, asks, say, shown
+        self._documents = session.documents
         self._editor, self._clock = editor, clock
 
     def new(self) -> None:
-        """Begin an empty behaviour."""
-        self.with_newest(lambda: self._replace(self._session.document.new))
+        """Begin an empty behaviour in a tab of its own."""
+        self.with_newest(lambda: self._show(self._documents.new))
 
     def ask_open(self) -> None:
         """Let a person choose a file and open it."""
@@ -108,21 +110,70 @@ class Files:
         self._asks.open(str(path.parent if path is not None else Path.home()), self.open)
 
     def open(self, path: Path) -> None:
-        """Open a behaviour file; what is wrong with it becomes an alert."""
+        """Open a behaviour file in a tab; what is wrong with it becomes an alert."""
 
         def opened() -> None:
-            self._session.document.open(path)
+            self._documents.open(path)
             self._remember(path)
 
-        self.with_newest(lambda: self._replace(opened, path))
+        self.with_newest(lambda: self._show(opened))
+
+    def open_all(self, paths: Sequence[Path]) -> None:
+        """Open files that came from outside: the command line, a drop, another start.
+
+        Those that are no behaviours become one alert, the others open.
+        """
+        strange = [path for path in paths if path.suffix.lower() != SUFFIX]
+        for path in paths:
+            if path not in strange:
+                self.open(path)
+        if strange:
+            self._complain(strange_words(strange), "file.open", "Open another file", alert="strange")
 
     def example(self, path: Path) -> None:
         """Open an example as a new behaviour."""
-        self.with_newest(lambda: self._replace(lambda: self._session.document.example(path), path))
+        self.with_newest(lambda: self._show(lambda: self._documents.example(path)))
 
-    def recover(self, unsaved: Unsaved) -> None:
-        """Put back what a Studio that died left behind."""
-        self.with_newest(lambda: self._replace(lambda: self._session.document.recover(unsaved)))
+    def recover(self, left: Sequence[Unsaved]) -> None:
+        """Put back what a Studio that died left behind, each in its tab."""
+
+        def put_back() -> None:
+            for unsaved in left:
+                self._documents.recover(unsaved)
+
+        self.with_newest(lambda: self._show(put_back))
+
+    def close(self, document: Document) -> None:
+        """Close a tab. Its program is stopped; unsaved work goes to its file, or where Recent finds it."""
+
+        def closed() -> None:
+            runs = self._session.runs
+            if runs.active and runs.document is document:
+                runs.stop()
+            if self._keep(document):
+                self._documents.close(document)
+                self._session.tabs.keep()
+
+        self.with_newest(closed)
+
+    def reopen(self) -> None:
+        """Open the tab that was closed last."""
+
+        def reopened() -> None:
+            if self._documents.reopen() is None:
+                self._say("No tab was closed")
+
+        self.with_newest(lambda: self._show(reopened))
+
+    def show(self, document: Document) -> None:
+        """Show an open behaviour's tab."""
+        self._documents.show(document)
+        self._session.tabs.keep()
+
+    def move(self, document: Document, place: int) -> None:
+        """Put a tab to another place."""
+        self._documents.move(document, place)
+        self._session.tabs.keep()
 
     def save(self) -> None:
         """Save, or ask where when the behaviour has no file yet."""
@@ -148,7 +199,7 @@ class Files:
             made = mend(document.workspace, action)
             if made is not None:
                 document.edited(made)
-                document.revision += 1
+                document.mends += 1
 
         self.with_newest(change)
         return True
@@ -166,37 +217,37 @@ class Files:
         try:
             document.save(path)
         except AppError as error:
-            self._complain(str(error), "file.save_as", "Save somewhere else")
+            self._cant_save(error)
             return
+        self._documents.saved(document)
+        self._session.tabs.keep()
         self._session.alerts.cure("file")
         if document.path is not None:
             self._remember(document.path)
         self._say(f"Saved {document.name}")
 
-    def _replace(self, act: Callable[[], None], path: Path | None = None) -> None:
-        """Show another document; unsaved work is put where Recent finds it."""
-        if not self._keep():
-            return
+    def _show(self, act: Callable[[], object]) -> None:
+        """Show another tab."""
         try:
             act()
         except AppError as error:
-            name = path.name if path is not None else "the file"
-            self._complain(f"{name} can't be opened: {error}", "file.open", "Open another file")
+            self._complain(sentence_of(error), "file.open", "Open another file")
             return
+        self._session.tabs.keep()
         self._session.alerts.cure("file")
         self._shown()
 
-    def _keep(self) -> bool:
-        document = self._session.document
+    def _keep(self, document: Document) -> bool:
+        """Save what is not saved yet; False, and an alert, when that can't be done."""
         if not document.dirty:
             return True
         had_file, name = document.path is not None, document.name
         path = document.path or kept_path(home() / "kept", document.name, self._clock())
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
             document.save(None if had_file else path)
-        except (AppError, OSError) as error:
-            self._complain(str(error), "file.save_as", "Save somewhere else")
+        except AppError as error:
+            self._documents.show(document)
+            self._cant_save(error)
             return False
         self._remember(path, name)
         self._say(f"Saved {name}" if had_file else f"Kept {name} in Recent")
@@ -208,6 +259,26 @@ class Files:
         except SettingsError as error:
             self._session.console.add("warn", "studio", str(error))
 
-    def _complain(self, sentence: str, action: str, button: str) -> None:
-        title = sentence[:1].upper() + sentence[1:].rstrip(".") + "."
-        self._session.alerts.put("file", "error", title, button=button, action=action)
+    def _cant_save(self, error: Exception) -> None:
+        self._complain(sentence_of(error), "file.save_as", "Save somewhere else")
+
+    def _complain(self, sentence: str, action: str, button: str, alert: str = "file") -> None:
+        what, _, then = sentence.partition("; ")
+        detail = f"{then[:1].upper()}{then[1:]}." if then else ""
+        self._session.alerts.put(alert, "error", f"{what}.", detail, button=button, action=action)
+
+
+def sentence_of(error: Exception) -> str:
+    """What is wrong with a file, beginning with its name."""
+    if isinstance(error, DocumentError) and error.path is not None:
+        return f"{error.path.name} {error.reason}"
+    words = str(error)
+    return words[:1].upper() + words[1:]
+
+
+def strange_words(paths: Sequence[Path]) -> str:
+    """What is wrong with files that are no behaviours."""
+    names = [path.name or str(path) for path in paths]
+    shown = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    are = "is no behaviour" if len(names) == 1 else "are no behaviours"
+    return f"{shown} {are}; behaviours are files ending in {SUFFIX}"

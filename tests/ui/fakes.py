@@ -18,6 +18,7 @@ import numpy as np
 from app.blocks import Problem, editor_definitions
 from app.core.alerts import Alerts
 from app.core.console import Console
+from app.core.moving import Moving
 from app.core.nodes import Nodes
 from app.robots.inputs import Choice, Parameter
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
@@ -166,6 +167,11 @@ class Invocation:
     output: Mapping[str, object] = field(default_factory=dict)
     error: str | None = None
     elapsed_s: float = 0.0
+    given: Mapping[str, object] = field(default_factory=dict)
+    left_s: float | None = None
+    waits_for: tuple[str, ...] = ()
+    replaces: tuple[str, ...] = ()
+    at_s: float = 0.0
 
     @property
     def running(self) -> bool:
@@ -184,6 +190,7 @@ class RobotLink:
     values: dict[str, object] = field(default_factory=dict)
     drawing: Mapping[str, object] | None = None
     invocations: dict[str, Invocation] = field(default_factory=dict)
+    tried: list[Invocation] = field(default_factory=list)
     last_stop: str | None = "answered in 41 ms, at 8:40"
 
 
@@ -194,6 +201,7 @@ class Fleet:
         self.links: list[RobotLink] = []
         self.looked_at: list[str] = []
         self.refuse: tuple[str, ...] = ()
+        self.moving = Moving()
 
     @property
     def connected(self) -> list[RobotLink]:
@@ -222,7 +230,8 @@ class Fleet:
         wrong = described.check(input)
         if wrong:
             raise RobotInputError(wrong)
-        made = link.invocations[action] = Invocation(f"{len(self.calls)}", action)
+        made = link.invocations[action] = Invocation(f"{len(self.calls)}", action, given=dict(input))
+        link.tried.append(made)
         return made
 
     def cancel(self, name: str, action: str) -> None:

@@ -27,13 +27,14 @@ def python(*arguments: str, words: str = "") -> subprocess.CompletedProcess[str]
     )
 
 
-def test_the_window_takes_a_file_and_its_colours() -> None:
-    options = window_parser().parse_args(["story.nepb", "--theme", "dark", "--demo"])
-    assert (options.file, options.theme, options.demo, options.self_drive) == (
-        Path("story.nepb"),
+def test_the_window_takes_files_and_its_colours() -> None:
+    options = window_parser().parse_intermixed_args(["story.nepb", "--theme", "dark", "--demo", "tour.nepb"])
+    assert options.files == [Path("story.nepb"), Path("tour.nepb")]
+    assert (options.theme, options.demo, options.self_drive, options.new_window) == (
         "dark",
         True,
         None,
+        False,
     )
 
 

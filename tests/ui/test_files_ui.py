@@ -56,47 +56,130 @@ def test_the_editors_newest_edit_is_saved(
     assert bench.docks["behaviour"].panel.flushed == 1
 
 
-def test_work_without_a_file_is_kept_when_another_opens(
-    commands: Commands, window: MainWindow, document: Document, home: Path, tmp_path: Path
-) -> None:
+def changed(id: str) -> dict[str, object]:
+    return {"blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": id}]}}
+
+
+def names(window: MainWindow) -> list[str]:
+    return [document.name for document in window.session.documents]
+
+
+def test_another_file_opens_beside_work_that_is_not_saved(commands, window, tmp_path: Path) -> None:
     path = saved(tmp_path / "Other.nepb")
-    document.edited(BLOCKS)
+    window.session.document.edited(BLOCKS)
     commands.files.open(path)
-    assert document.name == "Other"
-    kept = list((home / "kept").glob("New behaviour*.nepb"))
-    assert len(kept) == 1
-    assert {file.path for file in window.session.settings.recent} == {kept[0].resolve(), path.resolve()}
-    assert window.toast.text == "Kept New behaviour in Recent"
+    assert names(window) == ["New behaviour", "Other"]
+    assert window.session.document.name == "Other"
+    assert next(iter(window.session.documents)).dirty
     assert window.showing == "behaviour"
 
 
-def test_a_changed_file_is_saved_when_a_new_behaviour_begins(
-    commands: Commands, document: Document, tmp_path
-) -> None:
+def test_work_without_a_file_is_kept_when_its_tab_is_closed(commands, window, home: Path) -> None:
+    window.session.document.edited(BLOCKS)
+    commands.run("tab.close")
+    kept = list((home / "kept").glob("New behaviour*.nepb"))
+    assert len(kept) == 1
+    assert [file.path for file in window.session.settings.recent] == [kept[0].resolve()]
+    assert window.toast.text == "Kept New behaviour in Recent"
+    assert names(window) == ["New behaviour"]
+    assert window.session.document.blank
+
+
+def test_a_changed_file_is_saved_when_its_tab_is_closed_and_opens_again(commands, window, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
-    changed = {"blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": "z"}]}}
-    document.edited(changed)
-    commands.run("file.new")
-    assert document.name == "New behaviour"
-    commands.files.open(path)
-    assert document.workspace == changed
+    window.session.document.edited(changed("z"))
+    commands.run("tab.close")
+    assert window.toast.text == "Saved Mine"
+    assert names(window) == ["New behaviour"]
+    commands.run("tab.reopen")
+    assert names(window) == ["Mine"]
+    assert window.session.document.workspace == changed("z")
+    commands.run("tab.reopen")
+    assert window.toast.text == "No tab was closed"
+
+
+def test_a_tab_that_can_not_be_saved_stays(commands, window, tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    commands.files.open(saved(folder / "Mine.nepb"))
+    window.session.document.edited(changed("z"))
+    (folder / "Mine.nepb").unlink()
+    folder.rmdir()
+    folder.write_text("in the way", "utf-8")
+    commands.run("tab.close")
+    assert names(window) == ["Mine"]
+    alert = window.session.alerts.active[0]
+    assert alert.title.startswith("Mine.nepb can't be written (")
+    assert alert.button == "Save somewhere else"
+
+
+def test_closing_the_tab_of_a_program_stops_it(commands, window, monkeypatch) -> None:
+    runs, stopped = window.session.runs, []
+    window.session.document.edited(BLOCKS)
+    runs.document, runs._run.state = window.session.document, "running"
+    monkeypatch.setattr(runs, "stop", lambda: stopped.append(True))
+    commands.run("tab.close")
+    assert stopped == [True]
+
+
+def test_tabs_are_reached_moved_and_closed_by_name(commands, window, tmp_path: Path) -> None:
+    for name in "ABC":
+        commands.files.open(saved(tmp_path / f"{name}.nepb"))
+    commands.run("tab.next")
+    assert window.session.document.name == "A"
+    commands.run("tab.previous")
+    assert window.session.document.name == "C"
+    key = window.session.document.key
+    commands.run(f"tab.move:{key}:0")
+    assert names(window) == ["C", "A", "B"]
+    commands.run(f"tab.close_others:{key}")
+    assert names(window) == ["C"]
+    commands.run("tab.close:nobody")
+    assert names(window) == ["C"]
 
 
 def test_an_untouched_behaviour_leaves_no_file(commands: Commands, home: Path) -> None:
     commands.run("file.new")
+    commands.run("tab.close")
     assert not (home / "kept").exists()
 
 
-def test_a_file_that_is_no_behaviour_becomes_an_alert(
-    commands: Commands, window, document, tmp_path: Path
+def test_saving_as_names_the_tab_and_keeps_the_old_file(
+    commands, window, document, answers, tmp_path
 ) -> None:
+    old = saved(tmp_path / "Old.nepb")
+    before = old.read_bytes()
+    commands.files.open(old)
+    window.session.document.edited(changed("z"))
+    answers.path = tmp_path / "New.nepb"
+    commands.run("file.save_as")
+    assert names(window) == ["New"]
+    assert old.read_bytes() == before
+    assert b'"z"' in answers.path.read_bytes()
+    assert [file.name for file in window.session.settings.recent] == ["New", "Old"]
+    assert answers.asked[-1] == f"save {tmp_path / 'Old.nepb'}"
+
+
+def test_files_from_outside_open_and_strange_ones_are_told_once(commands, window, tmp_path: Path) -> None:
+    picture = tmp_path / "photo.png"
+    picture.write_bytes(b"x")
+    paths = [saved(tmp_path / "A.nepb"), picture, saved(tmp_path / "B.nepb"), tmp_path]
+    commands.files.open_all(paths)
+    assert names(window) == ["A", "B"]
+    alert = window.session.alerts.active[0]
+    assert alert.title == "photo.png and 1 more are no behaviours."
+    assert alert.detail == "Behaviours are files ending in .nepb."
+
+
+def test_a_file_that_is_no_behaviour_becomes_an_alert(commands, window, document, tmp_path: Path) -> None:
     path = tmp_path / "bad.nepb"
     path.write_text("not json", "utf-8")
     document.edited(BLOCKS)
     commands.files.open(path)
     alert = window.session.alerts.active[0]
-    assert alert.title.startswith("Bad.nepb can't be opened") or alert.title.startswith("bad.nepb can't")
+    assert alert.title == "bad.nepb is damaged or no behaviour."
+    assert alert.detail == "Open a copy from before."
     assert alert.action == "file.open"
     assert document.workspace == BLOCKS
 
@@ -118,10 +201,10 @@ def test_a_place_that_can_not_be_written_becomes_an_alert(
 def test_mending_changes_the_blocks_and_tells_the_editor(commands: Commands, document: Document) -> None:
     wait = {"type": "control_wait_until", "id": "w"}
     document.edited({"blocks": {"languageVersion": 0, "blocks": [wait]}})
-    before = document.revision
+    before = document.mends
     assert commands.run("limit:w")
     assert document.workspace["blocks"]["blocks"][0]["type"] == "control_wait_until_at_most"
-    assert document.revision > before
+    assert document.mends > before
     assert document.dirty
 
 

@@ -21,6 +21,7 @@ class Editor(QWidget):
     changed = Signal(str, dict)
     history_changed = Signal(bool, bool)
     key_pressed = Signal(str)
+    recovered = Signal()
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -34,7 +35,7 @@ class Editor(QWidget):
 
     def flush(self, done: Callable[[dict[str, object]], None]) -> None:
         if self.late:
-            self.changed.emit("", self.late)  # the page tells an edit before it answers
+            self.changed.emit("behaviour-1", self.late)  # the page tells an edit before it answers
         done(self.late)
 
     def last(self, name: str) -> object:
@@ -68,18 +69,18 @@ def editor(panel: BehaviourPanel) -> Editor:
 
 def test_the_editor_is_given_definitions_before_the_blocks_once(panel, window) -> None:
     names = [call[0] for call in editor(panel).told]
-    assert names.index("set_theme") < names.index("set_definitions") < names.index("load")
+    assert names.index("set_theme") < names.index("set_definitions") < names.index("show_tab")
     ticks(window, panel, 10)
-    assert editor(panel).count("load") == editor(panel).count("set_definitions") == 1
-    assert editor(panel).last("load") == window.session.document.workspace
+    assert editor(panel).count("show_tab") == editor(panel).count("set_definitions") == 1
+    assert ("show_tab", "behaviour-1", window.session.document.workspace) in editor(panel).told
 
 
 def test_only_replacing_the_document_loads_it_anew(panel, window) -> None:
     document = window.session.document
-    editor(panel).changed.emit("", {"blocks": {"blocks": [{"type": "x"}]}})
+    editor(panel).changed.emit("behaviour-1", {"blocks": {"blocks": [{"type": "x"}]}})
     panel.refresh()
     assert document.workspace == {"blocks": {"blocks": [{"type": "x"}]}}
-    assert editor(panel).count("load") == 1
+    assert editor(panel).count("load") == 0
     document.workspace, document.revision = {"blocks": {}}, 1
     document.definitions_revision = 1
     panel.refresh()
@@ -152,7 +153,7 @@ def test_function_keys_in_the_page_are_the_windows_commands(panel, window) -> No
 
 
 def test_the_title_names_the_behaviour_and_says_whether_it_is_saved(panel, window) -> None:
-    tab = panel._bar.tab
+    (tab,) = panel._bar.tabs.tabs.values()
     assert tab.accessibleName() == "Greeting"
     window.session.document.dirty = True
     panel.refresh()
@@ -185,7 +186,7 @@ def test_the_first_block_takes_the_offer_away(qtbot, qapp) -> None:
     qtbot.addWidget(panel)
     assert isinstance(panel, BehaviourPanel)
     qtbot.addWidget(panel.replaces_title())
-    editor(panel).changed.emit("", {"blocks": {"blocks": [{"type": "events_started"}]}})
+    editor(panel).changed.emit("behaviour-1", {"blocks": {"blocks": [{"type": "events_started"}]}})
     panel.refresh()
     assert not panel.empty.isVisible()
 

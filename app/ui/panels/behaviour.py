@@ -3,57 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, Qt, SignalInstance
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
+from app.ui.behaviour_tab import TabFacts
 from app.ui.behaviour_title import BehaviourTitle
+from app.ui.editor import Editor, blockly
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.program_view import ProgramView
 from app.ui.sensor_words import reading_of
 from app.ui.widgets import EmptyAction, EmptyState
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from app.core.document import Document
+    from app.core.runs import Runs
     from app.core.watches import Watch
 
 KEYS = {"F5": "run.run", "F8": "run.pause", "F10": "run.step", "F12": "run.stop"}
 LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
 TOOLBOX_WIDTH = 196
 EMPTY_SIZE = (460, 250)
-Json = Mapping[str, object]
-
-
-class Editor(Protocol):
-    """What the panel needs of the block editor (`app.ui.blockly_view.BlocklyView`)."""
-
-    changed: SignalInstance
-    history_changed: SignalInstance
-    key_pressed: SignalInstance
-
-    def set_definitions(self, definitions: Json) -> None: ...
-    def load(self, workspace: Json) -> None: ...
-    def flush(self, done: Callable[[dict[str, object]], None]) -> None: ...
-    def set_theme(self, tokens: Json, dark: bool) -> None: ...
-    def highlight(self, ids: Sequence[str]) -> None: ...
-    def mark_stopped(self, ids: Sequence[str]) -> None: ...
-    def set_errors(self, errors: Mapping[str, str]) -> None: ...
-    def set_absent(self, ids: Sequence[str]) -> None: ...
-    def set_live_values(self, values: Mapping[str, str]) -> None: ...
-    def undo(self) -> None: ...
-    def redo(self) -> None: ...
-    def show_block(self, id: str) -> None: ...
-
-
-def blockly(parent: QWidget) -> Editor:
-    """The real editor."""
-    # Qt WebEngine takes a fifth of a second to import: only when the editor is seen for the first time.
-    from app.ui.blockly_view import BlocklyView  # noqa: PLC0415
-
-    return cast("Editor", BlocklyView(parent))  # its signals are instances, which mypy cannot see
 
 
 class BehaviourPanel(PanelWidget):
@@ -66,6 +38,12 @@ class BehaviourPanel(PanelWidget):
         self._bar.copy.clicked.connect(self.copy_program)
         self._bar.undo.clicked.connect(self.undo)
         self._bar.redo.clicked.connect(self.redo)
+        tabs = self._bar.tabs
+        tabs.chosen.connect(lambda key: context.run(f"tab:{key}"))
+        tabs.closed.connect(lambda key: context.run(f"tab.close:{key}"))
+        tabs.moved.connect(lambda key, place: context.run(f"tab.move:{key}:{place}"))
+        tabs.asked.connect(lambda command, key: context.run(f"{command}:{key}"))
+        tabs.add.clicked.connect(lambda: context.run("file.new"))
         self.mode = "blocks"
         self.program = ProgramView(self.theme)
         self._make_editor = make_editor
@@ -93,6 +71,7 @@ class BehaviourPanel(PanelWidget):
         self.empty.setParent(self._place)
         self.empty.hide()
         self._shown: dict[str, object] = {}
+        self._given: dict[str, tuple[int, int]] = {}
         self._watches: dict[str, Watch] = {}
         self._sensors: tuple[tuple[str, str], ...] = ()
         self._ticks = 0
@@ -104,27 +83,42 @@ class BehaviourPanel(PanelWidget):
 
     def refresh(self) -> None:
         self._ticks += 1
-        document = self.session.document
-        if self.editor is None:
-            self._open_editor()
-        self._bar.tab.show_name(document.name, document.dirty)
-        if self.editor is None:
-            return
-        if self._new("definitions", document.definitions_revision):
-            self.editor.set_definitions(document.definitions())
-        if self._new("document", document.revision):
-            self.editor.load(document.workspace)
-        facts = (document.revision, document.edits, document.definitions_revision)
-        if self._new("facts", facts):
-            self._program_changed()
+        documents, document = self.session.documents, self.session.document
         runs = self.session.runs
-        if self._new("blocks", runs.blocks_revision):
-            self.editor.highlight(runs.running_blocks)
-            self.editor.mark_stopped(runs.stopped_blocks)
-            self.editor.set_errors(runs.block_errors)
+        self._bar.tabs.show_tabs([tab_facts(each, runs) for each in documents], document.key)
+        if self.editor is None:
+            self.editor = self._open_editor()
+        if self._new("definitions", documents.definitions_revision):
+            self.editor.set_definitions(documents.definitions())
+        self._show_blocks(self.editor)
+        if self._new("facts", (document.revision, document.edits, document.definitions_revision)):
+            self._program_changed()
+        mine = runs.document is document
+        if self._new("blocks", (runs.blocks_revision, mine)):
+            self.editor.highlight(runs.running_blocks if mine else ())
+            self.editor.mark_stopped(runs.stopped_blocks if mine else ())
+            self.editor.set_errors(runs.block_errors if mine else {})
         if self._ticks % LIVE_EVERY == 0:
             self._show_live()
         self._show_empty()
+
+    def _show_blocks(self, editor: Editor) -> None:
+        """Let the editor show the current behaviour, and forget those that were closed."""
+        document = self.session.document
+        now = (document.revision, document.mends)
+        known = self._given.get(document.key)
+        if self._new("tab", document.key):
+            editor.show_tab(document.key, document.workspace)
+            for what in ("facts", "blocks"):
+                self._shown.pop(what, None)
+        if known is not None and known[0] != now[0]:
+            editor.load(document.workspace)
+        elif known is not None and known[1] != now[1]:
+            editor.change(document.workspace)
+        self._given[document.key] = now
+        for key in self._given.keys() - {each.key for each in self.session.documents}:
+            del self._given[key]
+            editor.close_tab(key)
 
     def _new(self, what: str, now: object) -> bool:
         """Whether this differs from what was shown."""
@@ -133,9 +127,12 @@ class BehaviourPanel(PanelWidget):
         self._shown[what] = now
         return True
 
-    def _open_editor(self) -> None:
-        editor = self.editor = self._make_editor(self._place)
+    def _open_editor(self) -> Editor:
+        editor = self._make_editor(self._place)
         editor.changed.connect(self._edited)
+        editor.recovered.connect(
+            lambda: self.context.toast("The block editor was started again. Undo begins anew.")
+        )
         editor.history_changed.connect(self._history)
         editor.key_pressed.connect(self._key)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
@@ -145,6 +142,7 @@ class BehaviourPanel(PanelWidget):
             self.setFocusProxy(editor)
             if had_focus:
                 editor.setFocus(Qt.FocusReason.OtherFocusReason)
+        return editor
 
     def _program_changed(self) -> None:
         """The program is another one: its problems, the sensors it reads, its text."""
@@ -241,8 +239,10 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.show_block(block)
 
-    def _edited(self, _key: str, workspace: dict[str, object]) -> None:
-        self.session.document.edited(workspace)
+    def _edited(self, key: str, workspace: dict[str, object]) -> None:
+        document = self.session.documents.with_key(key)
+        if document is not None:
+            document.edited(workspace)
 
     def _history(self, can_undo: bool, can_redo: bool) -> None:
         self._bar.undo.setEnabled(can_undo)
@@ -260,6 +260,13 @@ class BehaviourPanel(PanelWidget):
 
     def shut(self) -> None:
         self._look_at(set())
+
+
+def tab_facts(document: Document, runs: Runs) -> TabFacts:
+    """What the tab of a behaviour shows."""
+    running = runs.active and runs.document is document
+    where = str(document.path) if document.path is not None else "Not saved in a file yet"
+    return TabFacts(document.key, document.name, document.dirty, running, f"{document.name}\n{where}")
 
 
 def _blocks(document: object) -> bool:

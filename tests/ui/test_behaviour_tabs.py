@@ -1,0 +1,151 @@
+"""The tabs of the open behaviours: what they show, and a person's mouse and keys on them."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from app.ui.behaviour_tab import TabFacts
+from app.ui.behaviour_tabs import BehaviourTabs
+from app.ui.theme import Theme
+from app.ui.widgets.menus import Menu
+
+A, B, C = (TabFacts(key, name) for key, name in (("a", "Greeting"), ("b", "Tour guide"), ("c", "Quiz")))
+
+
+@pytest.fixture
+def theme(qapp) -> Theme:
+    return Theme("light")
+
+
+@pytest.fixture
+def tabs(qtbot, theme) -> BehaviourTabs:
+    made = BehaviourTabs(theme)
+    qtbot.addWidget(made)
+    made.resize(700, 32)
+    made.show_tabs([A, B, C], "a")
+    made.show()
+    return made
+
+
+def heard(signal) -> list[tuple[object, ...]]:
+    found: list[tuple[object, ...]] = []
+    signal.connect(lambda *given: found.append(given))
+    return found
+
+
+def press(tab, place=None, button=Qt.MouseButton.LeftButton) -> None:
+    QTest.mouseClick(tab, button, pos=place if place is not None else QPoint(14, 14))
+
+
+def test_a_tab_says_its_name_that_it_is_not_saved_and_that_it_runs(tabs) -> None:
+    tabs.show_tabs([A, TabFacts("b", "Tour guide", dirty=True, runs=True)], "a")
+    assert [tab.accessibleName() for tab in tabs.tabs.values()] == [
+        "Greeting",
+        "Tour guide, not saved, runs",
+    ]
+    assert [tab.isChecked() for tab in tabs.tabs.values()] == [True, False]
+
+
+def test_the_mouse_chooses_and_closes(tabs) -> None:
+    chosen, closed = heard(tabs.chosen), heard(tabs.closed)
+    press(tabs.tabs["b"])
+    press(tabs.tabs["c"], button=Qt.MouseButton.MiddleButton)
+    press(tabs.tabs["b"], tabs.tabs["b"].close_rect().center().toPoint())
+    assert chosen == [("b",)]
+    assert closed == [("c",), ("b",)]
+
+
+def test_a_press_on_close_that_moves_away_does_nothing(tabs) -> None:
+    closed, chosen = heard(tabs.closed), heard(tabs.chosen)
+    tab = tabs.tabs["b"]
+    QTest.mousePress(tab, Qt.MouseButton.LeftButton, pos=tab.close_rect().center().toPoint())
+    QTest.mouseRelease(tab, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
+    assert (closed, chosen) == ([], [])
+
+
+def test_a_drag_past_the_middle_of_a_neighbour_changes_places(tabs) -> None:
+    moved = heard(tabs.moved)
+    tab, other = tabs.tabs["a"], tabs.tabs["b"]
+    QTest.mousePress(tab, Qt.MouseButton.LeftButton, pos=QPoint(14, 14))
+    QTest.mouseMove(tab, tab.mapFromParent(other.geometry().center() - QPoint(8, 0)))
+    assert moved == []
+    QTest.mouseMove(tab, tab.mapFromParent(other.geometry().center() + QPoint(8, 0)))
+    assert moved == [("a", 1)]
+    QTest.mouseRelease(tab, Qt.MouseButton.LeftButton)
+
+
+def test_keys_go_along_the_tabs_and_close(tabs) -> None:
+    chosen, closed = heard(tabs.chosen), heard(tabs.closed)
+    tab = tabs.tabs["a"]
+    for key in (Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Return, Qt.Key.Key_Delete):
+        QTest.keyClick(tab, key)
+    assert chosen == [("b",), ("c",), ("a",)]
+    assert closed == [("a",)]
+    policies = [tab.focusPolicy() for tab in tabs.tabs.values()]
+    assert policies.count(Qt.FocusPolicy.StrongFocus) == 1, "Tab stops once"
+
+
+def test_the_focus_follows_the_tab_that_shows(qtbot, tabs) -> None:
+    tabs.activateWindow()
+    tabs.tabs["a"].setFocus()
+    qtbot.waitUntil(lambda: tabs.tabs["a"].hasFocus(), timeout=2000)
+    tabs.show_tabs([A, B, C], "b")
+    assert tabs.tabs["b"].hasFocus()
+
+
+def test_a_closed_tab_goes_and_the_others_follow(tabs) -> None:
+    before = tabs.tabs["c"].x()
+    tabs.show_tabs([A, C], "a")
+    assert set(tabs.tabs) == {"a", "c"}
+    assert tabs.tabs["c"].x() < before
+
+
+def test_in_narrow_room_all_are_shorter_and_the_current_one_can_be_seen(tabs) -> None:
+    many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
+    tabs.show_tabs(many, "11")
+    room = tabs.add.x()
+    assert tabs.tabs["11"].geometry().right() <= room
+    assert tabs.tabs["0"].x() < 0
+    tabs.show_tabs(many, "0")
+    assert tabs.tabs["0"].x() == 0
+    assert all(tab.width() >= 76 for tab in tabs.tabs.values())
+
+
+def test_the_wheel_moves_the_tabs_along(tabs) -> None:
+    many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
+    tabs.show_tabs(many, "0")
+    wheel = QWheelEvent(
+        QPointF(5, 5), QPointF(5, 5), QPoint(), QPoint(0, -120), Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(tabs, wheel)
+    assert tabs.tabs["0"].x() == -60
+
+
+def test_nothing_is_cut_at_twice_the_size_of_text(tabs, theme) -> None:
+    theme.set_text_percent(200)
+    tabs.resize(1400, tabs.sizeHint().height())
+    for tab in tabs.tabs.values():
+        assert tab.width() >= tab.sizeHint().width()
+        assert tab.height() >= tab.fontMetrics().height()
+        assert tabs.height() >= tab.geometry().bottom()
+
+
+def test_the_menu_of_a_tab_names_what_can_be_done(qtbot, tabs) -> None:
+    asked = heard(tabs.asked)
+    QTest.mouseClick(tabs.tabs["b"], Qt.MouseButton.RightButton, pos=QPoint(14, 14))
+    from PySide6.QtGui import QContextMenuEvent
+
+    place = tabs.tabs["b"].geometry().center()
+    QApplication.sendEvent(
+        tabs, QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, tabs.mapToGlobal(place))
+    )
+    (menu,) = tabs.findChildren(Menu)
+    assert [action.text() for action in menu.actions()] == ["Save as", "Close", "Close the others"]
+    menu.actions()[1].trigger()
+    menu.close()
+    assert asked == [("tab.close", "b")]
