@@ -431,11 +431,10 @@ class Session:
                     "Add a time limit", "add_time_limit", icon="hourglass"),
         )  # fmt: skip
         now = time.time()
-        for ago, level, origin, text in LOG:
-            session.console._lines.append(
-                SimpleNamespace(stamp_s=now - ago, level=level, origin=origin, text=text)
-            )
-        session.console.revision = len(LOG)
+        stamps = iter([now - ago for ago, _, _, _ in LOG])
+        session.console = Console(lambda: next(stamps, now))
+        for _, level, origin, text in LOG:
+            session.console.add(level, origin, text)
         session.alerts.put(
             "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
             "1 204 messages could not be read.", button="Look at the raw bytes", action="topic.open:/faces",
