@@ -7,6 +7,7 @@ Studio is also its own child: ``--child`` runs a program, ``--module NAME`` a mo
 from __future__ import annotations
 
 import argparse
+import gc
 import runpy
 import sys
 from collections.abc import Sequence
@@ -59,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
     options = window_parser().parse_intermixed_args(given)
+    gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.garbage`)
     from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
     return run(

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass
 
 from app.core.alerts import Alerts
+from app.core.checks import Checked
 from app.core.fleet import Fleet
-from app.core.mailbox import Batch
 from app.core.robot_link import RobotLink
 from app.core.topics import Topics
-from nep.errors import NepError
-from nep.message import Message
 from nep.views import GraphView
 
 SILENT_S = 3.0
-DECODED_A_TICK = 200
-LARGE_BYTES = 1_000_000
+CURE_S = 1.0
+
+
+@dataclass(slots=True)
+class _Bad:
+    """A topic that sends what can't be read: how many, how many were not tried, when the last one came."""
+
+    count: int = 0
+    unchecked: int = 0
+    since: float = 0.0
+    is_well: bool = False
 
 
 class Health:
@@ -25,28 +33,39 @@ class Health:
         """Look at these; ``clock`` gives monotonic seconds."""
         self._topics, self._fleet, self._alerts, self._clock = topics, fleet, alerts, clock
         self._from_graph: set[str] = set()
-        self._bad: dict[str, int] = {}
+        self._bad: dict[str, _Bad] = {}
 
-    def look(self, batches: Mapping[str, Batch]) -> None:
-        """Count the messages that can't be decoded.
+    def look(self, found: Mapping[str, Checked]) -> None:
+        """Tell which topics send what can't be read: one alert each, with the exact count.
 
-        Pictures and large messages are decoded by who shows them.
+        `check` cures it when only good messages came for a second: a topic that mixes both is one alert.
         """
-        for topic, batch in batches.items():
-            if not batch.messages or batch.messages[-1].codec not in {"json", "string", "msgpack"}:
+        for topic, checked in found.items():
+            bad = self._bad.get(topic)
+            if bad is None and checked.bad:
+                bad = self._bad[topic] = _Bad()
+            if bad is None:
                 continue
-            bad, sentence = _undecodable(batch.messages)
-            last_good = not _is_bad(batch.messages[-1])
-            if bad:
-                # those that were dropped unread are not counted: nobody knows what they were
-                self._bad[topic] = self._bad.get(topic, 0) + bad
-                self._tell(topic, sentence, bad)
-            if last_good and self._alerts.has(f"message:{topic}"):
-                self._alerts.cure(f"message:{topic}")
-                self._bad.pop(topic, None)
+            bad.is_well = checked.last_good
+            bad.unchecked += checked.unchecked
+            if checked.bad:
+                bad.since = self._clock()
+                bad.count += checked.bad
+                self._tell(topic, bad, checked)
+
+    def forget(self, topic: str) -> None:
+        """Nobody looks at a topic any more, or it is well again."""
+        self._bad.pop(topic, None)
+        self._alerts.cure(f"message:{topic}")
 
     def check(self, used: Container[str] = ()) -> None:
-        """Once a second: which robots' pictures have stopped, and who of those in use (names) has gone."""
+        """Once a second: which topics are well again, which robots' pictures have stopped, who has gone.
+
+        ``used`` are the names of the robots that a program uses.
+        """
+        now = self._clock()
+        for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= CURE_S]:
+            self.forget(topic)
         for link in self._fleet.links:
             self._check_camera(link)
             if link.connected or link.name not in used:
@@ -87,17 +106,17 @@ class Health:
             self._alerts.cure(gone)
         self._from_graph = ids
 
-    def _tell(self, topic: str, sentence: str, count: int) -> None:
-        total = self._bad[topic]
-        messages = "1 message" if total == 1 else f"{total} messages"
+    def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
+        messages = "1 message" if bad.count == 1 else f"{bad.count} messages"
+        more = f" {bad.unchecked} more came too fast to be tried." if bad.unchecked else ""
         self._alerts.put(
             f"message:{topic}",
             "warn",
             f"{topic} sends what can't be read ({messages}).",
-            f"{sentence}. Look at the raw bytes in the Inspector.",
+            f"{checked.sentence}. Look at the raw bytes in the Inspector.{more}",
             button="Look at it",
             action=f"inspect:{topic}",
-            count=count,
+            count=checked.bad,
         )
 
     def _check_camera(self, link: RobotLink) -> None:
@@ -123,25 +142,3 @@ class Health:
             "What needs its picture waits.",
             count=0,
         )
-
-
-def _undecodable(messages: list[Message]) -> tuple[int, str]:
-    bad, sentence = 0, ""
-    for message in messages[-DECODED_A_TICK:]:
-        if message.size_bytes > LARGE_BYTES:
-            continue
-        try:
-            _ = message.payload
-        except NepError as error:
-            bad, sentence = bad + 1, str(error)
-    return bad, sentence
-
-
-def _is_bad(message: Message) -> bool:
-    if message.size_bytes > LARGE_BYTES:
-        return False
-    try:
-        _ = message.payload
-    except NepError:
-        return True
-    return False

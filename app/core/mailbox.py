@@ -71,21 +71,26 @@ class Mailbox:
         self._events: deque[object] = deque()
         self._lost_events = 0
 
-    def post(self, messages: Sequence[Message]) -> None:
-        """Hand over a batch; one lock for all of it."""
+    def post(self, topic: str, messages: Sequence[Message]) -> None:
+        """Hand over a batch of one topic, oldest first; one lock for all of it.
+
+        What a ring can't hold anyway is only counted: a batch of thousands costs no more than a full ring.
+        """
+        newest = messages[-self._messages_per_topic :]
+        size_bytes = sum(message.size_bytes for message in newest)
         with self._lock:
-            for message in messages:
-                ring = self._rings.get(message.topic)
-                if ring is None:
-                    ring = self._rings[message.topic] = _Ring()
-                ring.messages.append(message)
-                ring.size_bytes += message.size_bytes
-                # the newest message always stays, however large it is
-                while len(ring.messages) > 1 and (
-                    len(ring.messages) > self._messages_per_topic or ring.size_bytes > self._bytes_per_topic
-                ):
-                    ring.size_bytes -= ring.messages.popleft().size_bytes
-                    ring.dropped += 1
+            ring = self._rings.get(topic)
+            if ring is None:
+                ring = self._rings[topic] = _Ring()
+            ring.messages.extend(newest)
+            ring.size_bytes += size_bytes
+            ring.dropped += len(messages) - len(newest)
+            # the newest message always stays, however large it is
+            while len(ring.messages) > 1 and (
+                len(ring.messages) > self._messages_per_topic or ring.size_bytes > self._bytes_per_topic
+            ):
+                ring.size_bytes -= ring.messages.popleft().size_bytes
+                ring.dropped += 1
 
     def post_event(self, event: object) -> None:
         """Hand over one event.

@@ -5,8 +5,10 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import nep
@@ -20,7 +22,8 @@ from nep.views import GraphView
 POLL_S = 0.4
 NODE_NAME = "studio"
 
-Sink = Callable[[Sequence[Message]], None]
+Sink = Callable[[str, Sequence[Message]], None]
+"""Takes a batch of one topic, oldest first, in nep's thread."""
 Job = Callable[[Node], None]
 
 
@@ -80,6 +83,9 @@ class Source(Protocol):
     def submit(self, what: str, job: Job) -> None:
         """Do something with the node, in the source's thread; a failure is told as `JobFailed`."""
 
+    def missed(self) -> Mapping[str, int]:
+        """By watched topic, the messages that were sent since it is watched and did not arrive here."""
+
     def close(self) -> None:
         """End; returns when its thread has ended."""
 
@@ -113,6 +119,7 @@ class LiveSource:
         self._thread = threading.Thread(target=self._run, name="studio-source", daemon=True)
         self._node: Node | None = None
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
+        self._missed_before: Counter[str] = Counter()
         self._found: bool | None = None
         self._view: GraphView | None = None
 
@@ -124,6 +131,8 @@ class LiveSource:
         """See `Source.watch`."""
         with self._lock:
             self._wanted.add(topic)
+            held = self._subscribers.get(topic)
+            self._missed_before[topic] = -(held[1].lost or 0) if held is not None else 0
         self.submit("", _nothing)
 
     def unwatch(self, topic: str) -> None:
@@ -135,6 +144,13 @@ class LiveSource:
     def submit(self, what: str, job: Job) -> None:
         """See `Source.submit`; jobs keep their order and wait until a master is there."""
         self._jobs.put((what, job))
+
+    def missed(self) -> Mapping[str, int]:
+        """See `Source.missed`."""
+        with self._lock:
+            held = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
+            before = dict(self._missed_before)
+        return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in held.items()}
 
     def close(self) -> None:
         """See `Source.close`."""
@@ -214,7 +230,8 @@ class LiveSource:
         with self._lock:
             wanted = {*self._wanted, *self._always}
         for topic in [topic for topic in self._subscribers if topic not in wanted]:
-            self._subscribers.pop(topic)[1].close()
+            self._leave(topic)
+            self._missed_before.pop(topic, None)
         for topic in wanted:
             info = view.topics.get(topic)
             msg_type = self._always.get(topic) if info is None else info.msg_type
@@ -222,7 +239,7 @@ class LiveSource:
                 continue
             held = self._subscribers.get(topic)
             if held is not None and held[0] != msg_type:
-                held[1].close()
+                self._missed_before[topic] += self._leave(topic)
                 held = None
             if held is None:
                 self._subscribe(topic, msg_type)
@@ -231,15 +248,23 @@ class LiveSource:
         if self._node is None:
             return
         try:
-            subscriber = self._node.new_sub(topic, msg_type, sink=self._deliver)
+            subscriber = self._node.new_sub(topic, msg_type, sink=partial(self._deliver, topic))
         except NepError as error:
             self._post_event(WatchFailed(topic, str(error)))
             return
-        self._subscribers[topic] = (msg_type, subscriber)
+        with self._lock:
+            self._subscribers[topic] = (msg_type, subscriber)
 
-    def _deliver(self, messages: Sequence[Message]) -> None:
+    def _leave(self, topic: str) -> int:
+        """Unsubscribe; how many messages had not arrived."""
+        with self._lock:
+            _, subscriber = self._subscribers.pop(topic)
+        subscriber.close()
+        return subscriber.lost or 0
+
+    def _deliver(self, topic: str, messages: Sequence[Message]) -> None:
         for sink in self._sinks:
-            sink(messages)
+            sink(topic, messages)
 
 
 def _nothing(_node: Node) -> None:

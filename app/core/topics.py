@@ -24,7 +24,8 @@ class Topic:
     ``rate_hz`` messages a second and ``bandwidth_Bps`` bytes a second as the publishers tell, ``age_s``
     seconds since the newest message, ``lost`` messages and ``loss_ratio`` of those that a subscriber should
     have had. ``gone_s`` is None while it is there, else the seconds since it vanished. ``newest``,
-    ``previous`` and ``received`` are kept only while somebody looks.
+    ``previous`` are kept, and ``received``, ``dropped`` (of those, before a panel saw them) and ``missed``
+    (sent, but not received here) counted, only while somebody looks.
     """
 
     name: str
@@ -45,11 +46,17 @@ class Topic:
     previous: Message | None = None
     received: int = 0
     dropped: int = 0
+    missed: int = 0
     decode_error: str | None = None
     watched: bool = False
     gone_since: float | None = None
     last_stamp_ns: int | None = None
     last_received: float | None = None
+
+    @property
+    def shown_of(self) -> tuple[int, int]:
+        """How many messages were kept for the panels, of how many sent, since somebody looks."""
+        return self.received - self.dropped, self.received + self.missed
 
     def facts(self) -> tuple[object, ...]:
         """What changes seldom; a panel rebuilds its rows when one of these changes."""
@@ -178,7 +185,7 @@ class Topics:
         if topic is not None:
             topic.newest = topic.previous = None
             topic.decode_error = None
-            topic.received = topic.dropped = 0
+            topic.received = topic.dropped = topic.missed = 0
             topic.last_received = None
             topic.watched = False
 

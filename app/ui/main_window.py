@@ -16,6 +16,7 @@ from app.ui.arrangements import Arrangements
 from app.ui.banner import BannerPlace
 from app.ui.docks import Dock
 from app.ui.focus_ring import FocusRing
+from app.ui.garbage import Settling
 from app.ui.layouts import LAYOUTS, layout_named
 from app.ui.move_question import MoveQuestion
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext
@@ -65,6 +66,7 @@ class MainWindow(QMainWindow):
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
         self.timer.timeout.connect(self.tick)
+        self.settling = Settling(self)
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._focus_changed)
@@ -277,6 +279,8 @@ class MainWindow(QMainWindow):
         """Start the session and the tick."""
         self.session.start()
         self.timer.start()
+        self.settling.start()
+        self.bench_made.connect(self.settling.start)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self._shut:

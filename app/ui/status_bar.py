@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 from app.core.session import Session
 from app.ui.theme import Theme
 from app.ui.widgets import Line, StatusItem, paint
+from app.ui.words import grouped
 
 Fact = tuple[str, str, str | None]  # icon, words, status
 NOTHING: Fact = ("", "", None)
@@ -80,14 +81,21 @@ class Facts:
             return NOTHING
         live = sum(1 for topic in self._session.topics if topic.gone_s is None)
         words = f"{counted(len(graph.nodes), 'node', 'nodes')}, {counted(live, 'topic', 'topics')}"
-        if self._session.messages_per_s is not None:
-            words += f", {round(self._session.messages_per_s)} messages/s"
+        if self._session.traffic.messages_per_s is not None:
+            words += f", {grouped(round(self._session.traffic.messages_per_s))} messages/s"
         return "", words, None
 
     def lost(self) -> Fact:
         """How many messages were lost lately; nothing when none were."""
-        lost = self._session.lost_30s
-        return ("triangle-alert", f"{lost} lost in 30 s", "warn") if lost else NOTHING
+        lost = self._session.traffic.lost_30s
+        return ("triangle-alert", f"{grouped(lost)} lost in 30 s", "warn") if lost else NOTHING
+
+    def shown(self) -> Fact:
+        """How many messages of the topics that are looked at were shown; nothing when all were."""
+        traffic = self._session.traffic
+        if traffic.shown_30s >= traffic.sent_30s:
+            return NOTHING
+        return "", f"Shown {grouped(traffic.shown_30s)} of {grouped(traffic.sent_30s)} in 30 s", None
 
     def window(self) -> Fact:
         """How long the last refresh of the window took."""

@@ -15,7 +15,9 @@ def message(topic: str, number: int, size: int = 10) -> Message:
 
 def test_drain_gives_batches_by_topic_in_order() -> None:
     mailbox = Mailbox()
-    mailbox.post([message("a", 1), message("b", 1), message("a", 2)])
+    mailbox.post("a", [message("a", 1)])
+    mailbox.post("b", [message("b", 1)])
+    mailbox.post("a", [message("a", 2)])
     drained = mailbox.drain()
     assert [m.seq for m in drained.batches["a"].messages] == [1, 2]
     assert [m.seq for m in drained.batches["b"].messages] == [1]
@@ -24,16 +26,25 @@ def test_drain_gives_batches_by_topic_in_order() -> None:
 
 def test_a_full_ring_keeps_the_newest_and_counts_the_rest() -> None:
     mailbox = Mailbox(messages_per_topic=3)
-    mailbox.post([message("a", number) for number in range(10)])
+    mailbox.post("a", [message("a", number) for number in range(10)])
     batch = mailbox.drain().batches["a"]
     assert [m.seq for m in batch.messages] == [7, 8, 9]
     assert batch.dropped == 7
     assert batch.arrived == 10
 
 
+def test_batch_after_batch_keeps_the_newest_and_counts_exactly() -> None:
+    mailbox = Mailbox(messages_per_topic=4)
+    for first in range(0, 30, 3):
+        mailbox.post("a", [message("a", number) for number in range(first, first + 3)])
+    batch = mailbox.drain().batches["a"]
+    assert [m.seq for m in batch.messages] == [26, 27, 28, 29]
+    assert (batch.dropped, batch.arrived) == (26, 30)
+
+
 def test_a_ring_is_bounded_in_bytes_but_keeps_one_message_of_any_size() -> None:
     mailbox = Mailbox(bytes_per_topic=100)
-    mailbox.post([message("a", 1, 60), message("a", 2, 60), message("a", 3, 500)])
+    mailbox.post("a", [message("a", 1, 60), message("a", 2, 60), message("a", 3, 500)])
     batch = mailbox.drain().batches["a"]
     assert [m.seq for m in batch.messages] == [3]
     assert batch.dropped == 2
@@ -52,7 +63,7 @@ def test_events_keep_their_order_and_an_overflow_is_counted() -> None:
 def test_no_message_is_unaccounted_for_with_many_threads() -> None:
     mailbox = Mailbox(messages_per_topic=50)
     threads = [
-        threading.Thread(target=lambda: [mailbox.post([message("a", n)]) for n in range(2000)])
+        threading.Thread(target=lambda: [mailbox.post("a", [message("a", n)]) for n in range(2000)])
         for _ in range(4)
     ]
     arrived = 0

@@ -72,7 +72,7 @@ def test_topics_appear_with_their_figures_and_vanish(session: Session) -> None:
             return session.topics["/hello"].rate_hz
 
         tick_until(session, rate)
-        assert session.messages_per_s
+        assert session.traffic.messages_per_s
         assert session.topics["/hello"].publisher_nodes == ("talker",)
     tick_until(session, lambda: session.topics["/hello"].gone_s is not None)
 

@@ -54,9 +54,9 @@ def test_saving_is_said_with_its_time(session: fakes.Session) -> None:
 
 
 def test_traffic_counts_live_topics_only(session: fakes.Session) -> None:
-    session.messages_per_s = 268.6
+    session.traffic.messages_per_s = 268.6
     assert facts(session).traffic()[1] == "7 nodes, 12 topics, 269 messages/s"
-    session.messages_per_s = None
+    session.traffic.messages_per_s = None
     assert facts(session).traffic()[1] == "7 nodes, 12 topics"
     session.graph = None
     assert facts(session).traffic()[1] == ""
@@ -64,8 +64,15 @@ def test_traffic_counts_live_topics_only(session: fakes.Session) -> None:
 
 def test_losses_are_there_only_when_there_are_any(session: fakes.Session) -> None:
     assert facts(session).lost()[1] == ""
-    session.lost_30s = 12
+    session.traffic.lost_30s = 12
     assert facts(session).lost() == ("triangle-alert", "12 lost in 30 s", "warn")
+
+
+def test_what_came_faster_than_the_window_shows_is_told(session: fakes.Session) -> None:
+    session.traffic.shown_30s = session.traffic.sent_30s = 900
+    assert facts(session).shown()[1] == ""
+    session.traffic.sent_30s = 4900
+    assert facts(session).shown()[1] == "Shown 900 of 4\u2009900 in 30 s"
 
 
 @pytest.mark.parametrize(

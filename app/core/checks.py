@@ -1,0 +1,123 @@
+"""Whether messages can be read at all, found out where they arrive and not in the window.
+
+Every message of a watched topic is tried, with bounded work: at most a tenth of the time, and a second of
+work in advance for a burst. Half of that advance is kept for topics on which something bad was found, so that
+their count is exact when it matters. What comes faster is not tried but counted as such.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from nep.codecs import codec as codec_named
+from nep.errors import NepError
+from nep.message import Message
+
+READABLE = frozenset({"json", "string", "msgpack"})
+LARGE_BYTES = 300_000
+SHARE = 0.1
+ADVANCE_S = 1.0
+RESERVE_S = 0.5
+SUSPECT_S = 30.0
+
+
+@dataclass(slots=True)
+class Checked:
+    """What was found on one topic since it was asked last.
+
+    ``bad`` of the ``checked`` messages can't be read, ``unchecked`` came too fast to be tried. ``sentence``
+    says what is wrong with the newest bad one; ``last_good`` whether the newest message can be read.
+    """
+
+    checked: int = 0
+    bad: int = 0
+    unchecked: int = 0
+    sentence: str = ""
+    last_good: bool = True
+
+
+class Checks:
+    """Tries messages in the source's thread (`look`); the window's thread takes what was found (`take`)."""
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        """``clock`` gives seconds; it measures the work."""
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._found: dict[str, Checked] = {}
+        self._suspects: dict[str, float] = {}
+        self._advance_s = ADVANCE_S
+        self._refilled = clock()
+
+    def look(self, topic: str, messages: Sequence[Message]) -> None:
+        """Try the messages of one topic, oldest first. Pictures and bytes are taken as they are."""
+        if not messages or messages[-1].codec not in READABLE:
+            return
+        found = Checked()
+        self._refill()
+        self._try(topic, messages, found)
+        with self._lock:
+            old = self._found.get(topic)
+            if old is not None:
+                found.checked += old.checked
+                found.bad += old.bad
+                found.unchecked += old.unchecked
+                found.sentence = found.sentence or old.sentence
+            self._found[topic] = found
+
+    def take(self) -> dict[str, Checked]:
+        """What was found by topic since the last time."""
+        with self._lock:
+            found, self._found = self._found, {}
+        return found
+
+    def _refill(self) -> None:
+        now = self._clock()
+        self._advance_s = min(ADVANCE_S, self._advance_s + max(0.0, now - self._refilled) * SHARE)
+        self._refilled = now
+
+    def _try(self, topic: str, messages: Sequence[Message], found: Checked) -> None:
+        newest = messages[-1]
+        found.sentence = _problem(newest, keep=True)  # always, and it stays decoded: panels show this one
+        found.last_good = not found.sentence
+        found.checked, found.bad = 1, int(not found.last_good)
+        began = self._clock()
+        if found.bad:
+            self._suspects[topic] = began
+        left = self._advance_s - (0.0 if self._is_suspect(topic, began) else RESERVE_S)
+        for message in messages[:-1]:
+            if self._clock() - began >= left:
+                break
+            problem = _problem(message, keep=False)
+            found.checked += 1
+            if problem:
+                found.bad += 1
+                found.sentence = found.sentence or problem
+                if found.bad == 1:
+                    self._suspects[topic] = began
+                    left = self._advance_s
+        found.unchecked = len(messages) - found.checked
+        self._advance_s -= self._clock() - began
+
+    def _is_suspect(self, topic: str, now: float) -> bool:
+        seen = self._suspects.get(topic)
+        if seen is not None and now - seen > SUSPECT_S:
+            del self._suspects[topic]
+            return False
+        return seen is not None
+
+
+def _problem(message: Message, *, keep: bool) -> str:
+    """What is wrong with a message; nothing when it can be read. A large one is left to who shows it."""
+    if message.size_bytes > LARGE_BYTES:
+        return ""
+    try:
+        if keep:
+            _ = message.payload
+        else:
+            codec_named(message.codec).decode(message.data, message.extension)
+    except NepError as error:
+        return str(error)
+    return ""

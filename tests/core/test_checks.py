@@ -1,0 +1,130 @@
+"""Whether messages can be read: exact while there is time for it, and said when there is not."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from app.core import checks as module
+from app.core.checks import Checks
+from nep.message import Message
+
+BAD, GOOD = b"{not json", b'{"n": 1}'
+
+
+def messages(*data: bytes, codec: str = "json") -> list[Message]:
+    return [Message("/a", each, codec, codec, seq=n) for n, each in enumerate(data)]
+
+
+class Clock:
+    """A clock that goes on by so much whenever it is read."""
+
+    def __init__(self, step_s: float = 0.0) -> None:
+        self.now, self.step_s = 100.0, step_s
+
+    def __call__(self) -> float:
+        self.now += self.step_s
+        return self.now
+
+
+def test_every_message_is_tried_and_the_newest_bad_one_is_told() -> None:
+    checks = Checks(Clock())
+    checks.look("/a", messages(BAD, GOOD, BAD))
+    checks.look("/a", messages(GOOD))
+    checks.look("/b", messages(GOOD))
+    found = checks.take()
+    assert (found["/a"].checked, found["/a"].bad, found["/a"].unchecked) == (4, 2, 0)
+    assert "json" in found["/a"].sentence
+    assert found["/a"].last_good
+    assert (found["/b"].checked, found["/b"].bad, found["/b"].sentence) == (1, 0, "")
+    assert checks.take() == {}
+
+
+def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> None:
+    checks = Checks()  # the real clock: the promise is about real work
+    for _ in range(10):
+        checks.look("/a", messages(*[BAD] * 10_000))
+    found = checks.take()["/a"]
+    assert found.bad + found.unchecked == 100_000
+    assert not found.last_good
+    assert found.unchecked < 60_000  # a machine that is slow or busy may not get through all of them
+
+
+def test_a_topic_that_is_well_leaves_the_reserve_to_those_that_are_not() -> None:
+    clock = Clock(step_s=0.01)
+    checks = Checks(clock)
+    checks.look("/a", messages(*[GOOD] * 500))
+    well = checks.take()["/a"]
+    assert 0 < well.checked < 60
+    assert well.checked + well.unchecked == 500
+    checks.look("/b", messages(*[BAD] * 500))
+    bad = checks.take()["/b"]
+    assert bad.bad == bad.checked > 40
+    checks.look("/b", messages(*[BAD] * 500))
+    assert checks.take()["/b"].checked < 10  # the advance is spent, the newest is always tried
+    clock.now += 10.0
+    checks.look("/b", messages(*[BAD] * 500))
+    assert checks.take()["/b"].checked > 40
+
+
+def test_one_bad_message_makes_the_rest_of_its_batch_worth_the_reserve() -> None:
+    checks = Checks(Clock(step_s=0.01))
+    checks.look("/a", messages(BAD, *[GOOD] * 200))
+    found = checks.take()["/a"]
+    assert found.bad == 1
+    assert found.checked > module.RESERVE_S / 0.01
+
+
+def test_a_clock_that_jumps_back_takes_nothing_away() -> None:
+    clock = Clock()
+    checks = Checks(clock)
+    clock.now -= 50.0
+    checks.look("/a", messages(BAD, BAD))
+    assert checks.take()["/a"].bad == 2
+
+
+@pytest.mark.parametrize("codec", ["bytes", "image"])
+def test_what_is_not_to_be_read_is_not_tried(codec: str) -> None:
+    checks = Checks()
+    checks.look("/a", messages(BAD, codec=codec))
+    checks.look("/b", [])
+    assert checks.take() == {}
+
+
+def test_a_large_message_is_left_to_who_shows_it() -> None:
+    large = messages(b"[" * (module.LARGE_BYTES + 1))
+    checks = Checks()
+    checks.look("/a", large)
+    assert checks.take()["/a"].bad == 0
+
+
+def test_the_newest_message_stays_decoded_for_the_panels() -> None:
+    batch = messages(GOOD, GOOD)
+    Checks().look("/a", batch)
+    assert [message._payload == {"n": 1} for message in batch] == [False, True]
+
+
+def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
+    checks = Checks()
+    done = threading.Event()
+    counted = 0
+
+    def looks(topic: str) -> Callable[[], None]:
+        def run() -> None:
+            for _ in range(300):
+                checks.look(topic, messages(BAD, GOOD))
+
+        return run
+
+    threads = [threading.Thread(target=looks(topic)) for topic in ("/a", "/b")]
+    for thread in threads:
+        thread.start()
+    while not done.is_set():
+        if not any(thread.is_alive() for thread in threads):
+            done.set()
+        counted += sum(found.checked + found.unchecked for found in checks.take().values())
+    for thread in threads:
+        thread.join()
+    assert counted == 2 * 300 * 2

@@ -1,0 +1,94 @@
+"""Alerts about data that can't be read: one for each topic, with its exact count, cured by good messages."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from app.core.alerts import Alert, Alerts
+from app.core.checks import Checked
+from app.core.fleet import Fleet
+from app.core.health import CURE_S, Health
+from app.core.topics import Topics
+
+
+class Case:
+    """A health that looks at nothing but what the test gives it."""
+
+    def __init__(self) -> None:
+        self.now = 50.0
+        self.alerts = Alerts()
+        fleet = cast("Fleet", SimpleNamespace(links=[]))
+        self.health = Health(Topics(), fleet, self.alerts, lambda: self.now)
+
+    def look(self, bad: int, good: int = 0, *, unchecked: int = 0, last_good: bool = False) -> None:
+        checked = Checked(bad + good, bad, unchecked, "no json" if bad else "", last_good)
+        self.health.look({"/a": checked})
+
+    def alert(self) -> Alert | None:
+        return next(iter(self.alerts.active), None)
+
+
+@pytest.fixture
+def case() -> Case:
+    return Case()
+
+
+def test_bad_messages_are_one_alert_with_the_exact_count(case: Case) -> None:
+    for _ in range(30):
+        case.look(33)
+    (alert,) = case.alerts.active
+    assert (alert.id, alert.count, alert.action) == ("message:/a", 990, "inspect:/a")
+    assert "990 messages" in alert.title
+    assert "too fast" not in alert.detail
+
+
+def test_what_was_not_tried_is_said(case: Case) -> None:
+    case.look(100, unchecked=0)
+    case.look(1, unchecked=400)
+    alert = case.alert()
+    assert alert is not None
+    assert alert.count == 101
+    assert "400 more came too fast to be tried" in alert.detail
+
+
+def test_good_messages_for_a_second_cure_it_and_the_next_count_begins_anew(case: Case) -> None:
+    case.look(5)
+    case.look(0, 1, last_good=True)
+    case.health.check()
+    assert case.alert() is not None
+    case.now += CURE_S
+    case.health.check()
+    assert case.alert() is None
+    case.look(1)
+    alert = case.alert()
+    assert alert is not None
+    assert "1 message)" in alert.title
+
+
+def test_a_topic_that_mixes_good_and_bad_is_one_alert_that_stays(case: Case) -> None:
+    seen = []
+    for _ in range(20):
+        case.look(1, 4, last_good=True)
+        case.now += CURE_S / 2
+        case.health.check()
+        alert = case.alert()
+        seen.append(alert.since_s if alert is not None else None)
+    assert len(set(seen)) == 1
+    assert seen[0] is not None
+
+
+def test_a_topic_that_fell_silent_after_bad_messages_stays_told_until_nobody_looks(case: Case) -> None:
+    case.look(2)
+    case.now += 100
+    case.health.check()
+    assert case.alert() is not None
+    case.health.forget("/a")
+    assert case.alert() is None
+
+
+def test_good_messages_are_nothing_to_tell(case: Case) -> None:
+    case.look(0, 500, unchecked=7, last_good=True)
+    assert case.alert() is None
