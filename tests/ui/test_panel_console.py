@@ -1,11 +1,17 @@
 from __future__ import annotations
 
+import json
+
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy
 
 from app.core.console import Console
+from app.ui.console_list import first_line, tip_of
 from app.ui.panels.console import PANEL, ConsolePanel
+from nep.logs import LOG_TOPIC, LOG_TYPE
+from nep.message import Message
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 
@@ -46,7 +52,7 @@ def test_new_lines_are_inserted_not_reset(qtmodeltester, panel, window) -> None:
     assert inserted.count() == 1  # nothing new, nothing done
 
 
-def test_a_full_ring_is_shown_anew(qtbot, qapp) -> None:
+def test_what_leaves_the_ring_leaves_the_list(qtbot, qapp) -> None:
     session = Session()
     session.console = Console(capacity=3)
     window = Window(session)
@@ -58,6 +64,16 @@ def test_a_full_ring_is_shown_anew(qtbot, qapp) -> None:
         panel.refresh()
     assert isinstance(panel, ConsolePanel)
     assert lines(panel) == ["info x 4", "info x 3", "info x 2"]
+    reset, removed = QSignalSpy(panel.model.modelReset), QSignalSpy(panel.model.rowsRemoved)
+    session.console.add("info", "x", "5")
+    panel.refresh()
+    assert lines(panel) == ["info x 5", "info x 4", "info x 3"]
+    assert (reset.count(), removed.count()) == (0, 1)
+    session.console.take(
+        [Message(LOG_TOPIC, b'{"text": "%d"}' % number, "json", LOG_TYPE) for number in range(9)]
+    )
+    panel.refresh()  # everything that was shown has left the ring
+    assert [line.split()[-1] for line in lines(panel)] == ["8", "7", "6"]
 
 
 def test_levels_can_be_left_out_and_the_choice_comes_back(qtbot, panel, window) -> None:
@@ -96,3 +112,92 @@ def test_with_nothing_it_says_what_will_appear(qtbot, qapp) -> None:
     assert panel.list.isVisible()
     panel.set_level("error")
     assert panel.empty._title.text() == "No problem was told"
+
+
+def logged(window, level="info", text="hello", node="Pepper", name="app.robots.tasks", **more) -> None:
+    given = {"level": level, "text": text, "node": node, "name": name, "stamp_ns": 10**18, **more}
+    window.session.console.take([Message(LOG_TOPIC, json.dumps(given).encode(), "json", LOG_TYPE)])
+
+
+def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
+    logged(window, "warning", "its stop broke off", file="tasks.py", line=272)
+    logged(window, "debug", "a detail")
+    panel.refresh()
+    assert lines(panel)[0] == "warn Pepper [app.robots.tasks] its stop broke off"
+    record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
+    assert tip_of(record) == "its stop broke off\napp.robots.tasks  tasks.py:272"
+    panel.set_level("debug")
+    assert lines(panel)[0].startswith("debug Pepper")
+
+
+def test_nothing_is_decoded_while_nobody_looks(window) -> None:
+    class Unread(Message):
+        @property
+        def payload(self) -> object:
+            raise AssertionError("nobody asked for it")
+
+    window.session.console.take([Unread(LOG_TOPIC, b"{}", "json", LOG_TYPE)])
+    window.session.tick()
+
+
+def test_lines_of_one_node_and_with_some_words(qtbot, panel, window) -> None:
+    logged(window, text="walks 1 m")
+    logged(window, text="walks 2 m", node="Turtle")
+    panel.set_node("Turtle")
+    assert lines(panel) == ["info Turtle [app.robots.tasks] walks 2 m"]
+    assert panel.filter.accessibleName() == "Shown: Everything of Turtle"
+    panel.set_node("")
+    panel.focus_filter()
+    qtbot.keyClicks(panel.words, "PEPPER walks")
+    assert lines(panel) == ["info Pepper [app.robots.tasks] walks 1 m"]
+    qtbot.keyClicks(panel.words, " nowhere")
+    assert lines(panel) == []
+    assert panel.empty.isVisible()
+    panel.show_all()
+    assert len(lines(panel)) == 8
+    panel.focus_filter()
+    qtbot.keyClicks(panel.words, "x")
+    qtbot.keyClick(panel.words, Qt.Key.Key_Escape)
+    assert (panel.words.isVisible(), len(lines(panel))) == (False, 8)
+
+
+def test_who_reads_further_down_keeps_the_lines_he_reads(qtbot, panel, window) -> None:
+    for number in range(50):
+        logged(window, text=f"line {number}")
+    panel.refresh()
+    bar = panel.list.verticalScrollBar()
+    qtbot.waitUntil(lambda: bar.maximum() > 500)
+    bar.setValue(200)
+    read = panel.list.indexAt(panel.list.viewport().rect().center()).data()
+    for number in range(3):
+        logged(window, text=f"new {number}")
+    panel.refresh()
+    assert panel.list.indexAt(panel.list.viewport().rect().center()).data() == read
+    assert panel.newer.isVisible()
+    assert panel.newer.accessibleName() == "3 new"
+    qtbot.mouseClick(panel.newer, Qt.MouseButton.LeftButton)
+    assert bar.value() == 0
+    assert not panel.newer.isVisible()
+    logged(window, text="newest")
+    panel.refresh()
+    assert bar.value() == 0
+    assert lines(panel)[0].endswith("newest")
+
+
+def test_clear_and_copy_all(panel, window) -> None:
+    _find, copy_all, clear = panel.more_actions()
+    copy_all.trigger()
+    assert len(QGuiApplication.clipboard().text().splitlines()) == 6
+    clear.trigger()
+    assert lines(panel) == []
+    copy_all.trigger()  # nothing to copy is no error
+    assert window.toasts == ["Copied 6 lines"]
+    logged(window)
+    panel.refresh()
+    assert len(lines(panel)) == 1
+
+
+def test_a_traceback_takes_one_row_and_says_how_long_it_is() -> None:
+    assert first_line("it broke\nTraceback\nValueError") == "it broke (and 2 more lines)"
+    assert first_line("one\ntwo") == "one (and 1 more line)"
+    assert first_line("one") == "one"

@@ -1,219 +1,257 @@
-"""Console: what happened, line by line, the newest first."""
+"""Console: what happened, line by line, the newest first: Studio's own lines and what programs log."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
-from itertools import islice
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import (
-    QAbstractListModel,
-    QModelIndex,
-    QPersistentModelIndex,
-    QPoint,
-    QRect,
-    QRectF,
-    QSize,
-    Qt,
-)
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QListView,
-    QStackedWidget,
-    QStyle,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
-    QVBoxLayout,
-)
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
-from app.ui.icons import paint_icon
+from app.ui.console_list import (
+    LEVELS,
+    RECORD_ROLE,
+    ConsoleModel,
+    FindWords,
+    LineDelegate,
+    Lines,
+    Wanted,
+    line_of,
+)
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
-from app.ui.theme import Theme
-from app.ui.widgets import EmptyState, IconButton, paint
+from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
+from app.ui.words import grouped
 
 if TYPE_CHECKING:
     from app.core.console import LogRecord
 
-Index = QModelIndex | QPersistentModelIndex
-RECORD_ROLE = int(Qt.ItemDataRole.UserRole)
-LEVELS = {
-    "info": ("circle-check", "textTertiary"),
-    "warn": ("triangle-alert", "warn"),
-    "error": ("circle-x", "error"),
+FROM = {
+    "debug": "Everything, also details",
+    "all": "Everything",
+    "warn": "Warnings and errors",
+    "error": "Errors only",
 }
-SHOWN = {"all": ("info", "warn", "error"), "warn": ("warn", "error"), "error": ("error",)}
-WORDS = {"all": "Everything", "warn": "Warnings and errors", "error": "Errors only"}
-ROW = {"compact": 22, "comfortable": 30}
-_ROOT = QModelIndex()
-
-
-def line_of(record: LogRecord) -> str:
-    """A record as one line of text, for the clipboard."""
-    clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
-    return f"{clock} {record.level} {record.origin} {record.text}"
-
-
-class ConsoleModel(QAbstractListModel):
-    """The records of some levels, newest first; new ones are inserted above."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._records: list[LogRecord] = []  # oldest first: adding at the end is cheap
-
-    def rowCount(self, parent: Index = _ROOT) -> int:
-        return 0 if parent.isValid() else len(self._records)
-
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        if not index.isValid():
-            return None
-        record = self._records[-1 - index.row()]
-        if role == RECORD_ROLE:
-            return record
-        if role in {Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole}:
-            return line_of(record)
-        return record.text if role == Qt.ItemDataRole.ToolTipRole else None
-
-    def set_records(self, records: list[LogRecord]) -> None:
-        """Show exactly these, oldest first; cheap when only new ones came."""
-        known = len(self._records)
-        grown = len(records) >= known and all(
-            a is b for a, b in zip(islice(records, known), self._records, strict=False)
-        )
-        if not grown:
-            self.beginResetModel()
-            self._records = records
-            self.endResetModel()
-        elif len(records) > known:
-            self.beginInsertRows(_ROOT, 0, len(records) - known - 1)
-            self._records = records
-            self.endInsertRows()
-
-
-class LineDelegate(QStyledItemDelegate):
-    """Paints one record: time, level with icon and word, origin, text."""
-
-    def __init__(self, theme: Theme, panel: ConsolePanel) -> None:
-        super().__init__(panel)
-        self._theme, self._panel = theme, panel
-
-    def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
-        return QSize(100, round(self._theme.scaled(ROW[self._panel.density])))
-
-    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        record: LogRecord | None = index.data(RECORD_ROLE)
-        if record is None:
-            return
-        theme = self._theme
-        box = QRect(option.rect)
-        if option.state & QStyle.StateFlag.State_Selected:
-            painter.fillRect(box, theme.colour("selected"))
-        rect = QRectF(box).adjusted(10, 0, -8, 0)
-        font, small = self._panel.text_font(), theme.font("code")
-        clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
-        paint.words(painter, rect, clock, small, theme.colour("textTertiary"))
-        rect.setLeft(rect.left() + paint.width_of(small, "00:00:00") + 14)
-        icon, role = LEVELS.get(record.level, LEVELS["info"])
-        paint_icon(painter, QRectF(rect.left(), rect.center().y() - 7, 14, 14), icon, theme.colour(role))
-        rect.setLeft(rect.left() + 18)
-        paint.words(painter, rect, record.level, font, theme.colour(role))
-        rect.setLeft(rect.left() + max(38.0, paint.width_of(font, "error")) + 12)
-        origin = QRectF(rect)
-        origin.setWidth(min(paint.width_of(font, record.origin) + 1, rect.width() * 0.4))
-        paint.words(painter, origin, record.origin, font, theme.colour("textTertiary"))
-        rect.setLeft(origin.right() + 7)
-        paint.words(painter, rect, record.text, font, theme.colour("text"))
+SHOWN = {
+    "debug": frozenset(LEVELS),
+    "all": frozenset(LEVELS) - {"debug"},
+    "warn": frozenset({"warn", "error", "critical"}),
+    "error": frozenset({"error", "critical"}),
+}
+MOST_NODES = 20
 
 
 class ConsolePanel(PanelWidget):
-    """The lines, and which levels are shown."""
+    """The lines, and which of them are shown: by level, by node, by words."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Console")
-        self._seen = (-1, "")
+        self._seen = -1
+        self._choice: tuple[object, ...] = ()
+        self._unseen = 0
         self.level = "all"
+        self.node = ""
         self.filter = IconButton(self.theme, "filter", "Choose what is shown", size=26)
         self.filter.clicked.connect(self._show_menu)
         self.header = [self.filter]
+        self.words = FindWords(self.theme)
+        self.words.textChanged.connect(self.refresh)
+        self.words.left.connect(self._to_lines)
+        self.words.hide()
         self.model = ConsoleModel()
-        self.list = QListView()
-        self.list.setAccessibleName("What happened, newest first")
-        self.list.setModel(self.model)
-        self.list.setItemDelegate(LineDelegate(self.theme, self))
-        self.list.setUniformItemSizes(True)
-        self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-        self.list.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.list.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        copy = QAction("Copy", self.list)
-        copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
-        copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        copy.triggered.connect(self.copy)
-        self.list.addAction(copy)
-        self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.list.customContextMenuRequested.connect(self._show_actions)
-        self.empty = EmptyState(
-            self.theme, "terminal", "Nothing happened yet", "What programs and robots say appears here."
-        )
+        self.list = self._make_list()
+        self.empty = EmptyState(self.theme, "terminal", "Nothing happened yet", "")
+        self.newer = Button(self.theme, "", "arrow-up", size="small")
+        self.newer.setParent(self.list)
+        self.newer.hide()
+        self.newer.clicked.connect(self.list.scrollToTop)
+        self.list.verticalScrollBar().valueChanged.connect(self._scrolled)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(self.list)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 4, 0, 4)
+        column.setSpacing(4)
+        column.addWidget(self.words)
         column.addWidget(self.pages)
 
+    def _make_list(self) -> Lines:
+        made = Lines()
+        made.setModel(self.model)
+        self._delegate = LineDelegate(self.theme, lambda: self.density, self.text_font)
+        made.setItemDelegate(self._delegate)
+        made.find_wanted.connect(self.focus_filter)
+        made.resized.connect(self._place_newer)
+        self._copy = QAction("Copy", made)
+        self._copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
+        self._copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        self._copy.triggered.connect(self.copy)
+        made.addAction(self._copy)
+        made.customContextMenuRequested.connect(self._show_actions)
+        self._copy_all = QAction("Copy all lines", self)
+        self._copy_all.triggered.connect(self._copy_everything)
+        self._clear = QAction("Clear", self)
+        self._clear.triggered.connect(self.clear)
+        self._find = QAction("Find words", self)
+        self._find.triggered.connect(self.focus_filter)
+        return made
+
+    # ---- showing
+
     def refresh(self) -> None:
-        now = (self.session.console.revision, self.level)
-        if now == self._seen:
+        console = self.session.console
+        choice = (self.level, self.node, self.words.text())
+        if (console.revision, choice) == (self._seen, self._choice):
             return
-        self._seen = now
-        wanted = SHOWN[self.level]
-        self.model.set_records([record for record in self.session.console.records if record.level in wanted])
-        at_top = self.list.verticalScrollBar().value() == 0
+        records, wanted = console.records, self._wanted()
+        if choice != self._choice:
+            self.model.show_all(records, wanted)
+            self.list.scrollToTop()
+        else:
+            self._follow(records)
+        self._seen, self._choice = console.revision, choice
         self.pages.setCurrentIndex(1 if self.model.rowCount() else 0)
         self._say_nothing()
-        if at_top:
+
+    def _follow(self, records: Sequence[LogRecord]) -> None:
+        """New lines come above; who reads further down keeps the lines that he reads."""
+        bar = self.list.verticalScrollBar()
+        before = bar.value()
+        came = self.model.follow(records, self._wanted())
+        if before > 0 and came:
+            self.list.doItemsLayout()
+            bar.setValue(before + came * self._delegate.row_height())
+            self._unseen += came
+            self._say_newer()
+        elif came:
             self.list.scrollToTop()
 
+    def _wanted(self) -> Wanted:
+        return Wanted(SHOWN[self.level], self.node, self.words.text())
+
+    def _scrolled(self, value: int) -> None:
+        if value == 0:
+            self._unseen = 0
+        self._say_newer()
+
+    def _say_newer(self) -> None:
+        """The way back to the newest line, with how many came meanwhile."""
+        away = self.list.verticalScrollBar().value() > 0
+        if self._unseen:
+            self.newer.set_word(f"{grouped(self._unseen)} new", "arrow-up")
+        else:
+            self.newer.set_word("To the newest", "arrow-up")
+        self.newer.setVisible(away)
+        self.newer.adjustSize()
+        self._place_newer()
+
+    def _place_newer(self) -> None:
+        """Keep the way back at the top right of the list."""
+        port = self.list.viewport()
+        self.newer.move(port.width() - self.newer.width() - 12, 8)
+
     def _say_nothing(self) -> None:
-        if self.level == "all":
+        chosen = self.level in {"warn", "error"} or self.node or self.words.text()
+        if not chosen:
             self.empty.say("Nothing happened yet", "What programs and robots say appears here.")
+            self.empty.set_actions([])
+        elif self.node or self.words.text():
+            self.empty.say("No line fits", "Show all lines again, or wait for one that fits.")
+            self.empty.set_actions([EmptyAction("Show all lines", self.show_all, "x")])
         else:
             self.empty.say("No problem was told", "Choose “Everything” to see all lines.")
+            self.empty.set_actions([])
+
+    # ---- what a person chooses
 
     def set_level(self, level: str) -> None:
-        """Show everything ("all"), from warnings on ("warn"), or errors ("error")."""
+        """Show everything ("all", with details "debug"), from warnings on ("warn"), or errors ("error")."""
         if level in SHOWN:
             self.level = level
-            self.filter.set_name(f"Shown: {WORDS[level]}")
-            self.refresh()
+            self._name_filter()
+
+    def set_node(self, node: str) -> None:
+        """Show the lines of one node; of all when it is empty."""
+        self.node = node
+        self._name_filter()
+
+    def show_all(self) -> None:
+        """Take all filters away."""
+        self.words.clear()
+        self.words.hide()
+        self.set_node("")
+        self.set_level("all")
+
+    def clear(self) -> None:
+        """Forget all lines."""
+        self.session.console.clear()
+        self.refresh()
+
+    def _name_filter(self) -> None:
+        whose = f" of {self.node}" if self.node else ""
+        self.filter.set_name(f"Shown: {FROM[self.level]}{whose}")
+        self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
+        self.refresh()
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
-        for level, words in WORDS.items():
-            action = menu.addAction(words)
-            action.setCheckable(True)
-            action.setChecked(level == self.level)
-            action.triggered.connect(lambda _on=False, level=level: self.set_level(level))
+        for level, words in FROM.items():
+            self._offer(menu, words, level == self.level, partial(self.set_level, level))
+        nodes = sorted({record.origin for record in self.session.console.records} | {self.node} - {""})
+        if nodes:
+            menu.addSeparator()
+            self._offer(menu, "Of everybody", not self.node, partial(self.set_node, ""))
+        for node in nodes[:MOST_NODES]:
+            if node:
+                self._offer(menu, node, node == self.node, partial(self.set_node, node))
+        menu.addSeparator()
+        menu.addAction(self._find)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.filter)
 
+    @staticmethod
+    def _offer(menu: Menu, words: str, is_chosen: bool, choose: partial[None]) -> None:
+        action = menu.addAction(words.replace("&", "&&"))
+        action.setCheckable(True)
+        action.setChecked(is_chosen)
+        action.triggered.connect(lambda _on=False: choose())
+
     def _show_actions(self, at: QPoint) -> None:
         menu = Menu(self.theme, self)
-        menu.addActions(self.list.actions())
+        menu.addActions([self._copy, self._copy_all, self._find, self._clear])
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.list.viewport().mapToGlobal(at))
 
+    def more_actions(self) -> Sequence[QAction]:
+        return (self._find, self._copy_all, self._clear)
+
+    def focus_filter(self) -> bool:
+        self.words.show()
+        self.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.words.selectAll()
+        return True
+
+    def _to_lines(self) -> None:
+        self.list.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    # ---- copying
+
     def copy(self) -> None:
         """Put the chosen lines on the clipboard, oldest first."""
-        chosen = sorted(self.list.selectedIndexes(), key=lambda index: -index.row())
-        if chosen:
-            QGuiApplication.clipboard().setText(
-                "\n".join(line_of(index.data(RECORD_ROLE)) for index in chosen)
-            )
-            self.context.toast(f"Copied {len(chosen)} line{'' if len(chosen) == 1 else 's'}")
+        self._copy_rows(sorted((index.row() for index in self.list.selectedIndexes()), reverse=True))
+
+    def _copy_everything(self) -> None:
+        self._copy_rows(range(self.model.rowCount() - 1, -1, -1))
+
+    def _copy_rows(self, rows: Sequence[int]) -> None:
+        if rows:
+            records = [self.model.index(row, 0).data(RECORD_ROLE) for row in rows]
+            QGuiApplication.clipboard().setText("\n".join(line_of(record) for record in records))
+            self.context.toast(f"Copied {grouped(len(rows))} line{'' if len(rows) == 1 else 's'}")
+
+    # ---- how it looks, and what is kept
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)
