@@ -39,7 +39,7 @@ class Codec:
     name: str
     number: int
     encode: Callable[[object], Encoded]
-    decode: Callable[[memoryview, Mapping[str, object]], object]
+    decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
     empty: Callable[[], object]
 
 
@@ -63,7 +63,7 @@ def _encode_json(payload: object) -> Encoded:
         raise EncodeError("json", type(payload).__name__, reason) from error
 
 
-def _decode_json(data: memoryview, _extension: Mapping[str, object]) -> object:
+def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
     try:
         return orjson.loads(data)
     except orjson.JSONDecodeError as first:
@@ -71,7 +71,7 @@ def _decode_json(data: memoryview, _extension: Mapping[str, object]) -> object:
         try:
             return json.loads(bytes(data))
         except (ValueError, RecursionError):
-            raise DecodeError("json", data.nbytes, str(first)) from first
+            raise DecodeError("json", len(data), str(first)) from first
 
 
 def _encode_string(payload: object) -> Encoded:
@@ -83,11 +83,11 @@ def _encode_string(payload: object) -> Encoded:
         raise EncodeError("string", "str", "it holds half of a surrogate pair") from error
 
 
-def _decode_string(data: memoryview, _extension: Mapping[str, object]) -> object:
+def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
     try:
         return str(data, "utf-8")
     except UnicodeDecodeError as error:
-        raise DecodeError("string", data.nbytes, f"byte {error.start} is no UTF-8") from error
+        raise DecodeError("string", len(data), f"byte {error.start} is no UTF-8") from error
 
 
 def _encode_bytes(payload: object) -> Encoded:
@@ -98,8 +98,8 @@ def _encode_bytes(payload: object) -> Encoded:
     raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")
 
 
-def _decode_bytes(data: memoryview, _extension: Mapping[str, object]) -> object:
-    return bytes(data)
+def _decode_bytes(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+    return data if isinstance(data, bytes) else bytes(data)
 
 
 def _encode_msgpack(payload: object) -> Encoded:
@@ -109,11 +109,15 @@ def _encode_msgpack(payload: object) -> Encoded:
         raise EncodeError("msgpack", type(payload).__name__, str(error)) from error
 
 
-def _decode_msgpack(data: memoryview, _extension: Mapping[str, object]) -> object:
+def _decode_msgpack(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
     try:
         return unpack(data)
     except ValueError as error:
-        raise DecodeError("msgpack", data.nbytes, str(error)) from error
+        raise DecodeError("msgpack", len(data), str(error)) from error
+
+
+def _decode_image(data: bytes | memoryview, extension: Mapping[str, object]) -> object:
+    return images.decode(memoryview(data), extension)
 
 
 def _none() -> object:
@@ -124,7 +128,7 @@ JSON = Codec("json", 1, _encode_json, _decode_json, dict)
 STRING = Codec("string", 2, _encode_string, _decode_string, str)
 BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes)
 MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict)
-IMAGE = Codec("image", 5, images.encode, images.decode, _none)
+IMAGE = Codec("image", 5, images.encode, _decode_image, _none)
 
 CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}
 _NUMBERED = {each.number: each for each in CODECS.values()}

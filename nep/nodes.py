@@ -221,9 +221,13 @@ class Node:
         """One message for each callback that has one; whether there was any."""
         worked = False
         for subscriber, inlet, callback in self._callbacks:
-            message = None if inlet.is_closed else inlet.poll()
-            if message is None:
-                continue
+            try:
+                message = inlet.ready.popleft()
+            except IndexError:
+                found = None if inlet.is_closed else inlet.poll()
+                if found is None:
+                    continue
+                message = found
             worked = True
             try:
                 payload = subscriber.decoded(message)

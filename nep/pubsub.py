@@ -68,22 +68,23 @@ class Publisher:
 
         With no subscriber nothing is encoded, unless it is latched. Raises `EncodeError`, `ClosedError`.
         """
-        if self._is_wanted():
+        if self._is_closed or not (self._outlet.subscribers or self._spec.is_latched):
+            self._skip()
+        else:
             self._outlet.send(payload if isinstance(payload, Encoded) else self._encode(payload))
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send bytes that are encoded already. Raises `ClosedError`."""
-        if self._is_wanted():
+        if self._is_closed or not (self._outlet.subscribers or self._spec.is_latched):
+            self._skip()
+        else:
             self._outlet.send(Encoded(data, extension))
 
-    def _is_wanted(self) -> bool:
-        """Whether to send. A message that nobody wants is counted."""
+    def _skip(self) -> None:
+        """Count a message that nobody wants."""
         if self._is_closed:
             raise ClosedError(f"publisher '{self.topic}'")
-        if self._outlet.subscribers or self._spec.is_latched:
-            return True
         self._outlet.skip()
-        return False
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
@@ -107,6 +108,7 @@ class Subscriber:
     def __init__(self, inlet: Inlet, spec: SubscriberSpec) -> None:
         self._inlet = inlet
         self._spec = spec
+        self._ready = inlet.ready
         self._empty = codec_for(spec.msg_type).empty
         self._problem = ""
 
@@ -146,6 +148,12 @@ class Subscriber:
         Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
         decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
         """
+        ready = self._ready
+        while ready:  # read already
+            try:
+                return True, self.decoded(ready.popleft())
+            except (DecodeError, IndexError):  # another thread took the last one
+                continue
         limit = None if block_mode and timeout_s is None else max(0.0, timeout_s or 0.0)
         deadline = time.monotonic() + limit if limit else None
         while True:
@@ -163,6 +171,10 @@ class Subscriber:
 
         Raises `ClosedError`.
         """
+        try:
+            return self._ready.popleft()  # read already
+        except IndexError:
+            pass
         if timeout_s == 0.0 or self._inlet.is_closed:
             return self._poll()
         deadline = None if timeout_s is None else time.monotonic() + timeout_s

@@ -9,7 +9,7 @@ here"), *bye* (the same with the flag BYE: "nothing comes after this") and the l
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from nep.errors import BadTopicError, WireError
@@ -20,18 +20,21 @@ __all__ = [
     "EXTENSION",
     "HEADER_BYTES",
     "LATCHED",
+    "SIZE_MAX",
     "VERSION",
     "Header",
+    "check_size",
     "check_topic",
     "extension_part",
+    "form_of",
     "hello_part",
     "join",
-    "pack_header",
+    "pack_quickly",
     "parse_hello",
     "read_extension",
     "read_header",
     "topic_part",
-    "unpack_header",
+    "unpack_quickly",
 ]
 
 VERSION = 1
@@ -48,32 +51,40 @@ BYE = 4
 HELLO = b"\xffhello/"
 """How a hello filter starts. 0xff sorts behind all of UTF-8, so it is installed after the topic filter."""
 
-_HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, reserved, seq, stamp_ns, publisher
-_U64_MAX = 2**64 - 1
+_HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
+_QUICKLY = struct.Struct("<IIQQQ")  # the first three in one
+SIZE_MAX = 2**32 - 1
 
 
 class Header(NamedTuple):
-    """The second part. `stamp_ns` is the publisher's clock, `publisher` its id; `seq` counts from 1."""
+    """The second part. `stamp_ns` is the publisher's clock, `publisher` its id; `seq` counts from 1.
+
+    `size` is that of the payload in bytes, 0 when it is not told.
+    """
 
     codec: int
     flags: int
     seq: int
     stamp_ns: int
     publisher: int
+    size: int = 0
 
     def pack(self) -> bytes:
         """The 32 bytes, little-endian."""
-        return pack_header(*self)
+        return _HEADER.pack(
+            VERSION, self.codec, self.flags, self.size, self.seq, self.stamp_ns, self.publisher
+        )
 
 
-def pack_header(codec: int, flags: int, seq: int, stamp_ns: int, publisher: int) -> bytes:
-    """The 32 bytes of a `Header` of these, little-endian; for whoever sends many."""
-    return _HEADER.pack(VERSION, codec, flags, 0, seq, stamp_ns, publisher)
+def form_of(codec: int, flags: int) -> int:
+    """The first four bytes of a header of this version, as a number: what many messages have in common."""
+    return VERSION | codec << 8 | flags << 16
 
 
-def unpack_header(part: bytes) -> tuple[int, int, int, int, int, int, int]:
-    """(version, codec, flags, reserved, seq, stamp_ns, publisher), unchecked. Raises `struct.error`."""
-    return _HEADER.unpack(part)
+pack_quickly: Callable[[int, int, int, int, int], bytes] = _QUICKLY.pack
+"""The 32 bytes of (form, size, seq, stamp_ns, publisher). A size beyond `SIZE_MAX` is told as 0."""
+unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _QUICKLY.unpack
+"""(form, size, seq, stamp_ns, publisher) of a header, unchecked. Raises `struct.error`."""
 
 
 def check_topic(topic: str) -> str:
@@ -122,10 +133,16 @@ def read_header(part: bytes) -> Header:
     """The header in a second part. Raises `WireError`; an unknown version is named in it."""
     if len(part) != HEADER_BYTES:
         raise WireError(f"a header has {HEADER_BYTES} bytes, this one has {len(part)}", len(part))
-    version, codec, flags, _reserved, seq, stamp_ns, publisher = _HEADER.unpack(part)
+    version, codec, flags, size, seq, stamp_ns, publisher = _HEADER.unpack(part)
     if version != VERSION:
         raise WireError(f"its version is {version}, this nep reads version {VERSION}; update nep", len(part))
-    return Header(codec, flags, seq, stamp_ns, publisher)
+    return Header(codec, flags, seq, stamp_ns, publisher, size)
+
+
+def check_size(header: Header, size: int) -> None:
+    """Raises `WireError` when a payload of `size` bytes is not the one that `header` announced."""
+    if header.size and header.size != size:
+        raise WireError(f"its header tells of {header.size} bytes, its payload has {size}", size)
 
 
 def extension_part(extension: Mapping[str, object]) -> bytes:
@@ -178,6 +195,7 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
     wanted = 4 if header.flags & EXTENSION else 3
     if len(parts) != wanted:
         raise WireError(f"its flags ask for {wanted} parts, there are {len(parts)}")
+    check_size(header, len(parts[2]))
     try:
         topic = name[:-1].decode("utf-8")
         if name[-1:] != b"\0":

@@ -7,6 +7,7 @@ message published, whether somebody listens or not.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -92,6 +93,10 @@ class Outlet(Protocol):
 
 class Inlet(Protocol):
     """What a subscriber receives through."""
+
+    ready: deque[Message]
+    """Messages that come next and were read already; whoever reads may take them from its left. May be empty
+    while others wait elsewhere."""
 
     @property
     def received(self) -> int:

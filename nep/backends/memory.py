@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Sequence
 
 from nep import requests
@@ -18,7 +19,7 @@ from nep.errors import NepError, RequestRefusedError
 from nep.graph import Graph, GraphView
 from nep.inbox import Inbox
 from nep.load import CpuLoad
-from nep.message import Message
+from nep.message import Message, arrived, kind_of
 from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
 
 __all__ = ["BACKEND"]
@@ -79,6 +80,7 @@ class MemoryOutlet:
         self.spec = spec
         self.count = 0
         self.bytes = 0
+        self._kind = kind_of(spec.topic, spec.codec.name, spec.msg_type, is_latched=spec.is_latched)
         self.last_stamp_ns: int | None = None
         self.latched: Message | None = None
         self.missing: tuple[str, ...] = ()
@@ -101,17 +103,9 @@ class MemoryOutlet:
         with self.hub.lock:
             self.skip()
             self.bytes += len(data)
-            message = Message(
-                self.spec.topic,
-                data,
-                self.spec.codec.name,
-                self.spec.msg_type,
-                stamp_ns=self.last_stamp_ns,
-                seq=self.count,
-                publisher=self.spec.id,
-                extension=encoded.extension or {},
+            message = arrived(
+                self._kind, data, self.last_stamp_ns, self.count, self.spec.id, encoded.extension or {}
             )
-            message.is_latched = self.spec.is_latched
             if self.spec.is_latched:
                 self.latched = message
             for inlet in self.hub.inlets.get(self.spec.topic, ()):
@@ -133,6 +127,7 @@ class MemoryInlet:
         self._carrier = carrier
         self.hub = hub
         self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
+        self.ready: deque[Message] = deque()
         self.spec = spec
         self.received = 0
         self.lost = 0

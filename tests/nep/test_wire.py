@@ -19,7 +19,7 @@ U64 = st.integers(0, 2**64 - 1)
 TOPICS = st.text(
     st.characters(exclude_categories=["C", "Z"], exclude_characters="{"), min_size=1, max_size=40
 ).filter(lambda topic: len(topic.encode()) <= 200 and not any(letter.isspace() for letter in topic))
-HEADERS = st.builds(wire.Header, st.integers(0, 255), st.sampled_from([0, 1]), U64, U64, U64)
+HEADERS = st.builds(wire.Header, st.integers(0, 255), st.sampled_from([0, 1]), U64, U64, U64, st.just(0))
 EXTENSIONS = st.dictionaries(
     st.text(max_size=8), st.integers() | st.text(max_size=8) | st.binary(max_size=8)
 ).map(
@@ -39,6 +39,23 @@ def test_what_is_joined_is_split_again(
     back = wire.split(parts)
     assert (back.topic, back.payload, back.extension) == (topic, payload, extension)
     assert back.header._replace(flags=header.flags) == header
+
+
+@given(st.binary(max_size=60), st.integers(1, 2**32 - 1))
+def test_a_payload_of_another_size_than_told_is_refused(payload: bytes, told: int) -> None:
+    parts = wire.join("t", wire.Header(3, 0, 1, 2, 3, told), payload)
+    if told == len(payload):
+        assert wire.split(parts).payload == payload
+    else:
+        with pytest.raises(WireError, match=f"tells of {told} bytes, its payload has {len(payload)}"):
+            wire.split(parts)
+
+
+def test_the_quick_ways_read_and_write_the_same_header() -> None:
+    head = wire.pack_quickly(wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
+    assert head == wire.Header(3, wire.LATCHED, 5, 6, 7, 17).pack()
+    assert wire.read_header(head) == wire.Header(3, wire.LATCHED, 5, 6, 7, 17)
+    assert wire.unpack_quickly(head) == (wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
 
 
 @given(st.lists(st.binary(max_size=60), max_size=5))

@@ -11,7 +11,9 @@ import zmq
 from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.native.framing import from_frame, to_frame
 from nep.backends.native.io import Rest
+from nep.backends.native.readable import Into
 from nep.backends.native.reading import SocketInlet
+from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import (
     SendMark,
     Socket,
@@ -130,7 +132,7 @@ class OriginalSub:
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
-        self.problem = ""
+        self.refusals = Refusals()
         self.received = 0
         self.lost: int | None = None
         self._socket = socket
@@ -153,17 +155,28 @@ class OriginalSub:
             except zmq.Again:
                 return None
             if len(parts) != 1:
-                self.problem = f"a message of the original NEP has one part, this one has {len(parts)}"
+                self.refusals.add(f"a message of the original NEP has one part, this one has {len(parts)}")
                 continue
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec.name, parts[0])
             except WireError as error:
-                self.problem = error.reason
+                self.refusals.add(error.reason)
                 continue
             if data is not None:
-                self.problem = ""
                 self.received += 1
                 return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
+
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
+        count = 0
+        while count < most and room > 0:
+            message = self.read(may_wait=may_wait and not count)
+            if message is None:
+                break
+            into.append(message)
+            count += 1
+            room -= message.size_bytes
+        return count
 
     def dropped(self, count: int) -> None:
         """Dropped here for lack of room: the only losses that can be known."""

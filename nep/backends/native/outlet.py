@@ -19,7 +19,17 @@ from nep.backends.native.sockets import SendMark, Socket, wait_until
 from nep.encoded import Encoded
 from nep.errors import ClosedError
 from nep.records import Expected, PublisherCount
-from nep.wire import BYE, LATCHED, extension_part, hello_part, pack_header, parse_hello, topic_part
+from nep.wire import (
+    BYE,
+    LATCHED,
+    SIZE_MAX,
+    extension_part,
+    form_of,
+    hello_part,
+    pack_quickly,
+    parse_hello,
+    topic_part,
+)
 from nep.wire import EXTENSION as EXTENSION_FLAG
 
 __all__ = ["NativeOutlet"]
@@ -52,6 +62,8 @@ class NativeOutlet:
     ) -> None:
         self.spec = spec
         self.count = 0
+        self.subscribers = 0
+        """How many said hello and have not gone."""
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
@@ -66,9 +78,11 @@ class NativeOutlet:
         self._looked_ns = 0
         self._io_comes = False
         self._served = 0
+        self._id = spec.id
         self._topic = topic_part(spec.topic)
         self._codec = spec.codec.number
         self._flags = LATCHED if spec.is_latched else 0
+        self._form = form_of(self._codec, self._flags)
         self._mark = SendMark(socket)
         # `with` is three times faster on the lock itself than on the condition over it.
         self._lock = threading.Lock()
@@ -77,11 +91,6 @@ class NativeOutlet:
         self.fd = int(socket.getsockopt(zmq.FD))
 
     # ---- who listens
-
-    @property
-    def subscribers(self) -> int:
-        """How many subscribers said hello and have not gone."""
-        return len(self._seen)
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -127,7 +136,6 @@ class NativeOutlet:
         if isinstance(data, memoryview):
             data = _sendable(data)
         extension = extension_part(encoded.extension) if encoded.extension else None
-        flags = self._flags | (EXTENSION_FLAG if extension else 0)
         size = len(data)
         with self._lock:
             if self._is_closed:
@@ -135,19 +143,20 @@ class NativeOutlet:
             self.count = seq = self.count + 1
             self._bytes += size
             self._last_stamp_ns = stamp_ns = time.time_ns()
-            header = pack_header(self._codec, flags, seq, stamp_ns, self.spec.id)
+            form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
+            header = pack_quickly(form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id)
             if not self._mark.is_set:
                 self._mark.sending(size)
-            if extension is not None or flags:
-                tail = (header, data) if extension is None else (header, data, extension)
-                if self.spec.is_latched:
-                    self._latched = tail
-                self._send_parts(self._topic, tail)
-            else:
+            if extension is None and not self._flags:
                 send = self._send
                 send(self._topic, _SNDMORE)
                 send(header, _SNDMORE)
                 send(data, 0, size < _NO_COPY_BYTES)
+            else:
+                tail = (header, data) if extension is None else (header, data, extension)
+                if self.spec.is_latched:
+                    self._latched = tail
+                self._send_parts(self._topic, tail)
             if not 0 <= stamp_ns - self._looked_ns < _LOOK_NS:
                 self._looked_ns = stamp_ns
                 self._read_subscriptions()
@@ -186,6 +195,7 @@ class NativeOutlet:
                 self._greet(hello[0])
             else:
                 self._seen.pop(hello[0], None)
+                self.subscribers = len(self._seen)
             self._changed.notify_all()
 
     def _greet(self, subscriber: int) -> None:
@@ -193,13 +203,14 @@ class NativeOutlet:
         own = hello_part(subscriber, self.spec.topic)
         # First: whoever gets the echo may rely on being counted.
         self._seen[subscriber] = self.count
+        self.subscribers = len(self._seen)
         self._mark.greeted()
         if self._latched is not None:
             self._send_parts(own, self._latched)
         self._send_parts(own, (self._notice(0),))
 
     def _notice(self, flags: int) -> bytes:
-        return pack_header(self._codec, flags, self.count, time.time_ns(), self.spec.id)
+        return pack_quickly(form_of(self._codec, flags), 0, self.count, time.time_ns(), self._id)
 
     # ---- closing
 
@@ -228,6 +239,7 @@ class NativeOutlet:
                     most,
                 )
                 self._seen.clear()
+                self.subscribers = 0
 
     def release(self) -> None:
         """Close the socket; the node's thread has let go of it."""

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nep.message import Kind, kind_of
 from nep.records import RemotePublisher
 
 __all__ = ["Source", "Sources"]
 
 FAREWELL_S = 3.0
 """So long after a publisher has unregistered its last messages may still come."""
+_UNKNOWN = kind_of("", "", "")
 
 
 @dataclass
 class Source:
-    """One publisher. `last` is the newest message heard of it, None before the first."""
+    """One publisher. `last` is the newest message heard of it, None before the first.
 
+    `form` is that of the header of its last message, and `kind` goes with it; 0 when there was none.
+    """
+
+    form: int = 0
+    kind: Kind = _UNKNOWN
     remote: RemotePublisher | None = None
     endpoint: str = ""
     last: int | None = None
@@ -33,35 +40,27 @@ class Sources:
     def __init__(self) -> None:
         self.received = 0
         self.lost = 0
-        self._all: dict[int, Source] = {}
+        self.by_id: dict[int, Source] = {}
+        """All of them. Only to be looked at."""
 
     def get(self, publisher: int) -> Source:
         """The source of this id, made when it is new."""
-        source = self._all.get(publisher)
+        source = self.by_id.get(publisher)
         if source is None:
-            source = self._all[publisher] = Source()
+            source = self.by_id[publisher] = Source()
         return source
 
     def find(self, publisher: int) -> Source | None:
         """The source of this id, if there is one."""
-        return self._all.get(publisher)
+        return self.by_id.get(publisher)
 
     def pop(self, publisher: int) -> Source | None:
         """Forget a source."""
-        return self._all.pop(publisher, None)
+        return self.by_id.pop(publisher, None)
 
     def items(self) -> list[tuple[int, Source]]:
         """All of them, by id."""
-        return list(self._all.items())
-
-    def next_of(self, publisher: int, seq: int) -> Source | None:
-        """The source of a message that is just the next one, which is counted; else None, and nothing is."""
-        source = self._all.get(publisher)
-        if source is None or source.last is None or seq != source.last + 1:
-            return None
-        source.last = seq
-        self.received += 1
-        return source
+        return list(self.by_id.items())
 
     def arrived(self, publisher: int, seq: int, *, is_resent: bool) -> bool:
         """A message arrived; False when it is one that was heard already and only sent again (latched)."""
@@ -93,7 +92,7 @@ class Sources:
         What was promised one renewal ago and has not come since is lost. Should it come after all, it is
         taken off again.
         """
-        source = self._all.get(publisher)
+        source = self.by_id.get(publisher)
         if source is None or source.last is None or not source.has_echoed:
             return
         if source.promised > source.last:
@@ -110,22 +109,21 @@ class Sources:
 
     def closing(self, publisher: int, final: int, now: float) -> None:
         """A publisher has unregistered; its last message was `final`."""
-        source = self._all.get(publisher)
+        source = self.by_id.get(publisher)
         if source is not None and source.ends_at is None:
             source.ends_at = now + FAREWELL_S
             source.final = final
 
     def ended(self, now: float) -> list[int]:
         """Publishers that unregistered long ago and whose bye has not come."""
-        return [
-            each for each, source in self._all.items() if source.ends_at is not None and now >= source.ends_at
-        ]
+        all_ = self.by_id.items()
+        return [each for each, source in all_ if source.ends_at is not None and now >= source.ends_at]
 
     def replaced_by(self, remote: RemotePublisher) -> list[int]:
         """Silent publishers whose program has been started again, as `remote`."""
         return [
             each
-            for each, source in self._all.items()
+            for each, source in self.by_id.items()
             if source.is_lapsed
             and source.remote is not None
             and each != remote.publisher.id

@@ -6,28 +6,33 @@ It has no lock: it lives under its inlet's.
 from __future__ import annotations
 
 import errno
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import zmq
 
 from nep.backends.base import SubscriberSpec
+from nep.backends.native.readable import Into
+from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import Socket, receive_mark, wait_shortly
-from nep.backends.native.sources import Source, Sources
+from nep.backends.native.sources import Sources
 from nep.codecs import codec_for, codec_numbered
 from nep.errors import WireError
-from nep.message import Message
+from nep.message import NOTHING, UNDECODED, Message, arrived, kind_of, new_message
 from nep.records import RemotePublisher
 from nep.wire import (
     BYE,
     EXTENSION,
     HEADER_BYTES,
     LATCHED,
-    VERSION,
     Header,
+    check_size,
+    form_of,
     hello_part,
     read_extension,
     read_header,
     topic_part,
-    unpack_header,
+    unpack_quickly,
 )
 
 __all__ = ["SubSocket"]
@@ -35,7 +40,11 @@ __all__ = ["SubSocket"]
 _NO_COPY_BYTES = 65_536
 _DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
 _EVENTS = int(zmq.EVENTS)
+_RCVMORE = int(zmq.RCVMORE)
 _POLLIN = int(zmq.POLLIN)
+
+
+_Part = bytes | memoryview
 
 
 class SubSocket:
@@ -43,17 +52,18 @@ class SubSocket:
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.sources = Sources()
-        self.problem = ""
+        self.refusals = Refusals()
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
-        self._recv = socket.recv
+        self._recv: Callable[..., Any] = socket.recv
         self._topic_name = spec.topic
         self._msg_type = spec.msg_type
-        self._codec = codec_for(spec.msg_type)
         self._topic = topic_part(spec.topic)
         self._hello = hello_part(spec.id, spec.topic)
+        # Nothing is told of the size, or what is as long may be the first part of the next message.
+        self._doubtful = frozenset({0, len(self._topic), len(self._hello)})
         wait_shortly(socket)
-        socket.setsockopt(zmq.RCVHWM, receive_mark(self._codec.name))
+        socket.setsockopt(zmq.RCVHWM, receive_mark(codec_for(spec.msg_type).name))
         socket.setsockopt(zmq.SNDHWM, 0)  # libzmq silently drops filters beyond 1000 otherwise
         socket.setsockopt(zmq.SUBSCRIBE, self._topic)
         socket.setsockopt(zmq.SUBSCRIBE, self._hello)
@@ -79,6 +89,7 @@ class SubSocket:
             self.leave(old)
         source = self.sources.get(remote.publisher.id)
         source.remote = remote
+        source.form = 0  # its next message is looked at: the type may be another one
         source.is_lapsed = False
         source.ends_at = None
         if not source.endpoint and remote.publisher.endpoints:
@@ -95,44 +106,81 @@ class SubSocket:
                 if error.errno != errno.ENOENT:  # it was not connected any more
                     raise
 
-    def read(self, *, may_wait: bool = False) -> Message | None:
-        """The next message; None when there is nothing more. Notices are dealt with on the way."""
-        recv = self._recv
-        flags = 0 if may_wait else _DONTWAIT
-        while True:
-            try:
-                frame = recv(flags, False)
-            except zmq.Again:
-                return None
-            first = frame.bytes
-            rest: list[zmq.Frame] = []
-            if frame.more:  # all parts of a message are there when its first is
-                head = recv(_DONTWAIT, False)
-                if not head.more:
-                    rest = [head]
-                else:
-                    body = recv(_DONTWAIT, False)
-                    if not body.more and first == self._topic:
-                        message = self._usual(head.bytes, body)
-                        if message is not None:
-                            return message
-                    rest = self._read_rest(head, body)
-            is_resent = first == self._hello
-            if not is_resent and first != self._topic:
-                continue  # whoever had this port before, or a topic that begins with this one's bytes
-            try:
-                message = self._understand(rest, is_resent=is_resent)
-            except WireError as error:
-                self.problem = error.reason
-                continue
-            if message is not None:
-                return message
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
 
-    def _read_rest(self, head: zmq.Frame, body: zmq.Frame) -> list[zmq.Frame]:
-        rest = [head, body]
-        while rest[-1].more:
-            rest.append(self._recv(_DONTWAIT, False))
-        return rest
+        With `may_wait` the first is waited for. Notices are dealt with on the way. Nearly every message is
+        just the next one of its publisher and has the form of the one before: that is read here. Telling
+        whether a part is the last takes pyzmq longer than receiving it, so nobody asks: see `_carefully`.
+        """
+        recv, topic, find, doubtful = self._recv, self._topic, self.sources.by_id.get, self._doubtful
+        append = into.append
+        count, counted, flags, first = 0, 0, 0 if may_wait else _DONTWAIT, None
+        try:
+            while count < most and room > 0:
+                if first is None:
+                    first = recv(flags)
+                    flags = _DONTWAIT  # all parts of a message are there when its first is
+                head = data = None
+                if first == topic:
+                    head = recv(_DONTWAIT)
+                    if len(head) == HEADER_BYTES:
+                        form, size, seq, stamp_ns, publisher = unpack_quickly(head)
+                        source = find(publisher)
+                        if source and source.form == form and source.last == seq - 1 and size not in doubtful:
+                            data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
+                            if len(data) == size:
+                                message = new_message(Message)
+                                message.kind = source.kind
+                                message.raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
+                                message.stamp_ns = stamp_ns
+                                message.seq = source.last = seq
+                                message.publisher, message.extension = publisher, NOTHING
+                                message.decoded = UNDECODED
+                                append(message)
+                                count += 1
+                                room -= size
+                                first = None
+                                continue
+                first, other = self._carefully(first, head, data)
+                if other is not None:
+                    append(other)
+                    count += 1
+                    counted += 1
+                    room -= other.size_bytes
+        except zmq.Again:
+            if first is not None:
+                self.refusals.add("a message has 3 or 4 parts, this one ends earlier")
+        self.sources.received += count - counted
+        return count
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message, waited for with `may_wait`; None when there is nothing more."""
+        one: list[Message] = []
+        return one[0] if self.read_into(one, 1, 1, may_wait=may_wait) else None
+
+    def _carefully(self, first: bytes, *got: bytes | zmq.Frame | None) -> tuple[bytes | None, Message | None]:
+        """What the parts mean that begin with `first` and go on with `got`, and perhaps with more.
+
+        What was taken for the second or third part may be the next message's first, when somebody sends
+        less than three: it then begins as no header does, with the topic or the hello. That is returned.
+        """
+        read = [each for each in got if each is not None]
+        rest: list[_Part] = [each.buffer if isinstance(each, zmq.Frame) else each for each in read]
+        if rest and bytes(rest[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
+            following = bytes(rest.pop())
+            self.refusals.add(f"a message has 3 or 4 parts, this one has {len(rest) + 1}")
+            return following, None
+        more = bool(self._socket.getsockopt(_RCVMORE))
+        while more:
+            frame = self._recv(_DONTWAIT, False)
+            rest.append(frame.buffer)
+            more = frame.more
+        try:
+            return None, self._understand(first, rest)
+        except WireError as error:
+            self.refusals.add(error.reason)
+            return None, None
 
     def dropped(self, count: int) -> None:
         """So many messages that had been received were dropped for lack of room."""
@@ -142,29 +190,19 @@ class SubSocket:
         """Close the socket."""
         self._socket.close(0)
 
-    def _usual(self, head: bytes, body: zmq.Frame) -> Message | None:
-        """The message in most parts that come, which is just the next one, quickly; None for all others."""
-        if len(head) != HEADER_BYTES:
-            return None
-        version, codec, flags, _reserved, seq, stamp_ns, publisher = unpack_header(head)
-        if version != VERSION or flags or codec != self._codec.number:
-            return None
-        source = self.sources.next_of(publisher, seq)
-        if source is None:
-            return None
-        message = self._make(source, body, self._codec.name)
-        message.stamp_ns, message.seq, message.publisher = stamp_ns, seq, publisher
-        return message
-
-    def _understand(self, rest: list[zmq.Frame], *, is_resent: bool) -> Message | None:
+    def _understand(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
+        is_resent = first == self._hello
+        if not is_resent and first != self._topic:
+            raise WireError("a message begins with something else than its topic")
         if not rest:
             raise WireError("a message has 3 or 4 parts, this one has 1")
-        header = read_header(rest[0].bytes)
+        header = read_header(bytes(rest[0]))
         if is_resent and len(rest) == 1:
             self._notice(header)
             return None
         if len(rest) != (3 if header.flags & EXTENSION else 2):
             raise WireError(f"a message has 3 or 4 parts, this one has {len(rest) + 1}")
+        check_size(header, len(rest[1]))
         return self._message(header, rest, is_resent=is_resent)
 
     def _notice(self, header: Header) -> None:
@@ -175,31 +213,21 @@ class SubSocket:
         else:
             self.sources.get(header.publisher).has_echoed = True
 
-    def _message(self, header: Header, rest: list[zmq.Frame], *, is_resent: bool) -> Message | None:
+    def _message(self, header: Header, rest: Sequence[_Part], *, is_resent: bool) -> Message | None:
         codec = codec_numbered(header.codec)
         if codec is None:
             raise WireError(
                 f"its codec has the number {header.codec}, which this nep does not know; update nep"
             )
-        extension = read_extension(rest[2].buffer) if header.flags & EXTENSION else None
+        extension = read_extension(rest[2]) if header.flags & EXTENSION else {}
         if not self.sources.arrived(header.publisher, header.seq, is_resent=is_resent):
             return None
         source = self.sources.get(header.publisher)
-        self._codec = codec  # the next one probably has it too
-        message = self._make(source, rest[1], codec.name)
-        message.stamp_ns, message.seq, message.publisher = header.stamp_ns, header.seq, header.publisher
-        message.is_latched = bool(header.flags & LATCHED)
-        if extension:
-            message.extension = extension
-        return message
-
-    def _make(self, source: Source, payload: zmq.Frame, codec: str) -> Message:
-        self.problem = ""
-        remote = source.remote
-        return Message(
-            self._topic_name,
-            # A small view must not keep a large receive buffer alive.
-            payload.buffer if len(payload) >= _NO_COPY_BYTES else payload.bytes,
-            codec,
-            self._msg_type if remote is None else remote.publisher.msg_type,
-        )
+        msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
+        source.kind = kind_of(self._topic_name, codec.name, msg_type, is_latched=bool(header.flags & LATCHED))
+        source.form = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags)
+        payload = rest[1]
+        # A small view must not keep a large receive buffer alive.
+        is_large = isinstance(payload, memoryview) and len(payload) >= _NO_COPY_BYTES
+        data = memoryview(payload).toreadonly() if is_large else bytes(payload)
+        return arrived(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)
