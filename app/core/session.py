@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from app.core.images import Images
 from app.core.journal import Journal
 from app.core.kept_tabs import KeptTabs
 from app.core.mailbox import Drained, Mailbox
+from app.core.master_state import Learning, MasterState
 from app.core.moving import Moving
 from app.core.nodes import Nodes
 from app.core.runner import RunnerEvent
@@ -52,17 +52,6 @@ from nep.nodes import Node
 from nep.views import GraphView
 
 CHECK_S = 1.0
-LEARNING_S = 1.5
-"""How long a master that has just started may not know everybody yet (it learns for one second)."""
-
-
-@dataclass(frozen=True, slots=True)
-class MasterState:
-    """Whether a master is there: ``searching``, ``connected`` or ``none``, its address, and a sentence."""
-
-    kind: str
-    address: str
-    sentence: str = ""
 
 
 class Session:
@@ -116,7 +105,7 @@ class Session:
         self._reachable: tuple[Robot, ...] = ()
         self._topics_seen = -1
         self._next_check = 0.0
-        self._new_epoch = (0, 0.0)
+        self._learning = Learning()
 
     def _live_network(self) -> LiveSource:
         sinks = [self._checks.look, self._mailbox.post, self._offer]
@@ -249,7 +238,7 @@ class Session:
                 pass
 
     def _on_graph(self, view: GraphView, now: float) -> None:
-        if self._still_learns(view, now):
+        if self._learning.still(self.graph, view, now):
             return
         if self.graph is not None:
             for line in arrivals(self.graph, view):
@@ -273,14 +262,6 @@ class Session:
                 "Programs that are connected go on; new ones can't join until it is back.",
             )
             self.topics.values_revision += 1
-
-    def _still_learns(self, view: GraphView, now: float) -> bool:
-        """Whether another master has just come: whom it does not know yet has not gone."""
-        if self.graph is None or view.epoch == self.graph.epoch:
-            return False
-        if self._new_epoch[0] != view.epoch:
-            self._new_epoch = (view.epoch, now)
-        return now - self._new_epoch[1] < LEARNING_S
 
     def _follow_robots(self) -> None:
         if self.fleet.revision != self._robots_seen:

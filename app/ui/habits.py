@@ -64,9 +64,9 @@ class Habits:
             "layout.keep": self._keep_layout,
             "layout.rename": self._rename_layout,
             "layout.delete": self._delete_layout,
-            "panel.next": lambda: window.next_panel(1),
-            "panel.previous": lambda: window.next_panel(-1),
-            **{f"panel.{n}": lambda n=n: window.panel_number(n) for n in PANEL_KEYS},  # type: ignore[misc]
+            "panel.next": lambda: window.panel_focus.next(1),
+            "panel.previous": lambda: window.panel_focus.next(-1),
+            **{f"panel.{n}": lambda n=n: window.panel_focus.number(n) for n in PANEL_KEYS},  # type: ignore[misc]
             "theme.light": lambda: self._theme("light"),
             "theme.dark": lambda: self._theme("dark"),
             "theme.system": lambda: self._theme("system"),

@@ -19,6 +19,7 @@ from app.ui.focus_ring import FocusRing
 from app.ui.garbage import Settling
 from app.ui.layouts import LAYOUTS, layout_named
 from app.ui.move_question import MoveQuestion
+from app.ui.panel_focus import PanelFocus
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext
 from app.ui.robots_chip import robots_chip
 from app.ui.run_bar import RunBar, ToolBar
@@ -67,9 +68,7 @@ class MainWindow(QMainWindow):
         self.timer.setInterval(TICK_MS)
         self.timer.timeout.connect(self.tick)
         self.settling = Settling(self)
-        application = QApplication.instance()
-        if isinstance(application, QApplication):
-            application.focusChanged.connect(self._focus_changed)
+        self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
         self.show_start()
 
     def _build(self, examples: Sequence[Example]) -> None:
@@ -239,39 +238,6 @@ class MainWindow(QMainWindow):
 
     def _panel_failed(self, name: str, sentence: str) -> None:
         self.session.console.add("error", f"panel {name}", sentence)
-
-    # -- the keyboard -----------------------------------------------------------------------------
-
-    def next_panel(self, step: int) -> None:
-        """Give the keyboard to the next panel that can be seen, or the one before."""
-        if self.bench is None:
-            return
-        docks = [dock for dock in self.bench.docks.values() if dock.shown()]
-        if not docks:
-            return
-        current = self.focused_dock()
-        place = docks.index(current) if current in docks else (-1 if step > 0 else 0)
-        self.bench.focus_panel(docks[(place + step) % len(docks)])
-
-    def panel_number(self, number: int) -> None:
-        """Give the keyboard to the n-th open panel, from 1."""
-        if self.bench is not None:
-            names = self.bench.open_names()
-            if 0 < number <= len(names):
-                self.bench.focus_panel(self.bench.docks[names[number - 1]])
-
-    def focused_dock(self) -> Dock | None:
-        """The panel that has the keyboard."""
-        focus = QApplication.focusWidget()
-        if self.bench is None or focus is None:
-            return None
-        return next((d for d in self.bench.docks.values() if d is focus or d.isAncestorOf(focus)), None)
-
-    def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
-        if new is None or self._shut or self.bench is None:
-            return
-        for dock in self.bench.docks.values():
-            dock.title.set_active(dock is new or dock.isAncestorOf(new))
 
     # -- beginning and end ------------------------------------------------------------------------
 

@@ -167,12 +167,12 @@ def test_f6_and_numbers_go_through_the_panels(qtbot, window: MainWindow, command
     seen = []
     for _ in range(4):
         QTest.keyClick(window, Qt.Key.Key_F6)
-        dock = window.focused_dock()
+        dock = window.panel_focus.dock()
         assert dock is not None
         seen.append(dock.description.name)
     assert sorted(seen) == ["console", "image", "inspector", "topics"]
     QTest.keyClick(window, Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
-    found = window.focused_dock()
+    found = window.panel_focus.dock()
     assert found is not None
     assert found.description.name == window.bench.open_names()[1]
     assert found.title.name.property("role") == "text"
