@@ -6,15 +6,16 @@ Found by their description, watched by their sensors, tried out by their actions
 from __future__ import annotations
 
 import time
-import uuid
 from collections.abc import Callable, Mapping, Sequence
 
 from app.core.heartbeat import Heartbeat
 from app.core.mailbox import Batch
+from app.core.moving import MayNotMoveError, Moving
 from app.core.rize_names import RizeNames
-from app.core.robot_link import FINAL_STATES, Invocation, Payload, RobotLink
+from app.core.robot_link import SENDER, Invocation, Payload, RobotLink
+from app.core.tries import Tries
 from app.core.watches import Watch, Watches
-from app.errors import DescriptionError, RobotInputError, RobotUnknownError
+from app.errors import AppError, DescriptionError, RobotInputError, RobotUnknownError
 from app.robots import rize
 from app.robots.description import Robot, parse
 from nep.errors import NepError
@@ -23,7 +24,6 @@ from nep.views import GraphView
 
 DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
-SENDER = "studio"
 
 
 class Fleet:
@@ -34,8 +34,12 @@ class Fleet:
         watches: Watches,
         submit: Callable[[str, Callable[[Node], None]], None],
         clock: Callable[[], float] = time.monotonic,
+        moving: Moving | None = None,
     ) -> None:
-        """``watches`` subscribes topics, ``submit`` does something with the node in the source's thread."""
+        """``watches`` subscribes topics, ``submit`` does something with the node in the source's thread.
+
+        ``moving`` knows which robots may move; without it, none but virtual ones until a person was asked.
+        """
         self._watches = watches
         self._submit = submit
         self._clock = clock
@@ -45,6 +49,8 @@ class Fleet:
         self._rize = RizeNames()
         self._rize_events: Watch | None = None
         self._alive = Heartbeat(SENDER)
+        self.moving = moving if moving is not None else Moving()
+        self._tries = Tries(self._send, self._alive.rest, clock)
         self.revision = 0
 
     @property
@@ -73,7 +79,8 @@ class Fleet:
     def invoke(self, name: str, action: str, input: Payload) -> Invocation:
         """Try an action.
 
-        Raises RobotUnknownError, or RobotInputError with a sentence for each wrong value.
+        Raises RobotUnknownError, RobotInputError with a sentence for each wrong value, or MayNotMoveError
+        when a person is to be asked first: it is tried then when the answer is yes.
         """
         link = self._get(name)
         described = link.robot.action(action)
@@ -82,21 +89,23 @@ class Fleet:
         wrong = described.check(input)
         if wrong:
             raise RobotInputError(tuple(wrong))
-        invocation = Invocation(uuid.uuid4().hex, action, started_s=self._clock(), clock=self._clock)
-        if not self._send(link, _command(link.robot, invocation, input)):
-            invocation.state, invocation.error = "failed", f"{name} can't be reached; check that it is on"
-            invocation.ended_s = self._clock()
-        elif link.publisher is not None and link.robot.dialect == "native":
+        if not self.moving.permits([(link.robot, [action])], lambda: self._try_again(name, action, input)):
+            raise MayNotMoveError([name])
+        invocation = self._tries.begin(link, described, input)
+        if invocation.running and link.publisher is not None and link.robot.dialect == "native":
             self._alive.beat(name, link.publisher)
-        link.invocations[action] = invocation
         return invocation
+
+    def _try_again(self, name: str, action: str, input: Payload) -> None:
+        """Do what was asked before a person said that the robot may move."""
+        try:
+            self.invoke(name, action, input)
+        except AppError:
+            return  # it has changed or gone meanwhile, which its panel says
 
     def cancel(self, name: str, action: str) -> None:
         """Cancel the action that was tried last; nothing happens when it has ended."""
-        link = self._get(name)
-        invocation = link.invocations.get(action)
-        if invocation is not None and invocation.running and link.robot.dialect == "native":
-            self._send(link, {"id": invocation.id, "op": "cancel", "from": SENDER, "action": action})
+        self._tries.cancel(self._get(name), action)
 
     def world(self, name: str, change: Payload) -> None:
         """Change the world of a virtual robot: touch its head, move the ball, say a word."""
@@ -111,9 +120,7 @@ class Fleet:
             if link is None:
                 continue
             link.last_stop = said
-            for invocation in link.invocations.values():
-                if invocation.running:
-                    invocation.state, invocation.ended_s = "canceled", self._clock()
+            self._tries.end_all(link, "canceled")
             self._alive.rest(name)
 
     # -- what the session tells ------------------------------------------------------------------------------
@@ -146,6 +153,7 @@ class Fleet:
                 self._rize.tell(name)
         for link in self._links.values():
             self._read(link, batches)
+        self._tries.look(self._links.values())
 
     def close(self) -> None:
         """End the heartbeat and the command publishers."""
@@ -216,10 +224,8 @@ class Fleet:
         if link.watch is not None:
             link.watch.close()
             link.watch = None
-        for invocation in link.invocations.values():
-            if invocation.running:
-                invocation.state, invocation.ended_s = "failed", self._clock()
-                invocation.error = f"{link.name} has gone; check that it is on"
+        link.mute = False
+        self._tries.end_all(link, "failed", f"{link.name} has gone; check that it is on")
         self.revision += 1
 
     def _send(self, link: RobotLink, command: Payload) -> bool:
@@ -238,7 +244,7 @@ class Fleet:
             if answer is not None and link.robot.dialect == "rize":
                 answer = rize.from_answer(answer)
             if answer is not None:
-                self._answer(link, answer)
+                self._tries.answer(link, answer)
         for sensor in link.robot.sensors:
             batch = batches.get(sensor.topic)
             if batch is not None and batch.messages and not sensor.is_image:
@@ -248,32 +254,6 @@ class Fleet:
         state = batches.get(link.robot.topics.state or "")
         if state is not None and state.messages:
             link.drawing = _mapping(state.messages[-1]) or link.drawing
-
-    def _answer(self, link: RobotLink, answer: Payload) -> None:
-        for invocation in link.invocations.values():
-            if invocation.id != answer.get("id") or not invocation.running or answer.get("op") == "cancel":
-                continue
-            invocation.state = str(answer.get("state", invocation.state))
-            invocation.feedback = _object(answer.get("feedback")) or invocation.feedback
-            invocation.output = _object(answer.get("output")) or invocation.output
-            error = answer.get("error")
-            invocation.error = str(error) if error else None
-            if invocation.state in FINAL_STATES:
-                invocation.ended_s = self._clock()
-        if not any(invocation.running for invocation in link.invocations.values()):
-            self._alive.rest(link.name)
-
-
-def _command(robot: Robot, invocation: Invocation, input: Payload) -> Payload:
-    if robot.dialect == "rize":
-        return rize.to_command(robot, invocation.action, input, invocation.id)
-    return {
-        "id": invocation.id,
-        "op": "invoke",
-        "from": SENDER,
-        "action": invocation.action,
-        "input": dict(input),
-    }
 
 
 def _sensor_topics(robot: Robot) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -10,6 +11,9 @@ from app.core.watches import Watch
 from app.robots.description import Robot
 from nep.pubsub import Publisher
 
+SENDER = "studio"
+"""Who the commands of try-outs are from."""
+TRIES_KEPT = 40
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 
 Payload = Mapping[str, object]
@@ -17,7 +21,11 @@ Payload = Mapping[str, object]
 
 @dataclass(slots=True, eq=False)
 class Invocation:
-    """One action that a person tried: its state is a robot's answer (``sent`` until the first one)."""
+    """One action that a person tried: its state is a robot's answer (``sent`` until the first one).
+
+    While it is ``accepted`` it may wait for the actions ``waits_for``; it ended those of ``replaces``.
+    ``timeout_s`` counts from the moment in which the robot began. ``at_s`` is the time of day (epoch).
+    """
 
     id: str
     action: str
@@ -28,6 +36,19 @@ class Invocation:
     started_s: float = 0.0
     ended_s: float | None = None
     clock: Callable[[], float] = time.monotonic
+    given: Payload = field(default_factory=dict)
+    timeout_s: float | None = None
+    begun_s: float | None = None
+    waits_for: tuple[str, ...] = ()
+    replaces: tuple[str, ...] = ()
+    at_s: float = 0.0
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds until it takes too long; None when it has no limit or has not begun."""
+        if self.timeout_s is None or self.begun_s is None:
+            return None
+        return self.begun_s + self.timeout_s - self.clock()
 
     @property
     def running(self) -> bool:
@@ -44,7 +65,9 @@ class Invocation:
 class RobotLink:
     """One robot as Studio sees it now.
 
-    ``values`` has the newest value of each sensor while somebody looks.
+    ``values`` has the newest value of each sensor while somebody looks. ``tried`` are the last tries, the
+    newest at the end. ``mute`` says that it did not answer a command; ``heard_s`` is when it last answered
+    anything.
     """
 
     name: str
@@ -54,6 +77,9 @@ class RobotLink:
     values: dict[str, object] = field(default_factory=dict)
     drawing: Payload | None = None
     invocations: dict[str, Invocation] = field(default_factory=dict)
+    tried: deque[Invocation] = field(default_factory=lambda: deque(maxlen=TRIES_KEPT))
+    mute: bool = False
+    heard_s: float = 0.0
     last_stop: str | None = None
     publisher: Publisher | None = None
     world: Publisher | None = None
@@ -74,12 +100,19 @@ class RobotLink:
         """``away``, ``silent``, ``busy`` or ``ready``."""
         if not self.connected:
             return "away"
-        if self.silent is not None:
+        if self.silent is not None or self.mute:
             return "silent"
-        return "busy" if any(invocation.running for invocation in self.invocations.values()) else "ready"
+        return "busy" if self.running else "ready"
+
+    @property
+    def running(self) -> tuple[Invocation, ...]:
+        """The tries that have not ended."""
+        return tuple(made for made in self.invocations.values() if made.running)
 
     @property
     def chip(self) -> str:
         """The words of its chip: ``virtual, ready``."""
-        words = self.silent if self.silent is not None and self.connected else self.state
+        words = self.state
+        if self.connected and words == "silent":
+            words = "does not answer" if self.mute else self.silent or words
         return f"virtual, {words}" if self.virtual else words

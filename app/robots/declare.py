@@ -15,6 +15,7 @@ from typing import Literal, TypeAlias, TypeVar
 from app.errors import DescriptionError
 from app.robots.calls import Link
 from app.robots.profile import validate
+from app.robots.tasks import BEAT_S
 from app.robots.typed import Schema, fields_schema, input_schema, schema_of
 
 Function = TypeVar("Function", bound=Callable[..., object])
@@ -235,6 +236,7 @@ class Kind:
             "rb:profile": 1,
             "rb:robot": about,
             "rb:resources": list(dict.fromkeys(used)),
+            "rb:beat": BEAT_S,
             "rb:safeStop": {
                 "action": stop,
                 "watchdog": timing.watchdog_s,

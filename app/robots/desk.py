@@ -48,6 +48,10 @@ class Desk:
             error = f"there is no “{operation}”; a command is invoke, cancel, stop or alive"
             self._answering(wanted, str(operation), "")(Answer("failed", error=error))
 
+    def beat(self) -> None:
+        """Tell that the robot lives while it does something: programs notice when it no longer does."""
+        self._publish({"op": "alive", "id": "", "action": "", "state": "running"})
+
     def task(
         self, wanted: str, action: Action, given: Mapping[str, object], answer: Callable[[Answer], None]
     ) -> Task:
@@ -67,6 +71,7 @@ class Desk:
             on_busy=action.on_busy,
             timeout_s=action.timeout_s,
             cancellable=action.cancellable,
+            title=action.title,
         )
 
     def unknown(self, name: str) -> str:
@@ -104,17 +109,13 @@ class Desk:
         def answer(given: Answer) -> None:
             if given.is_final and operation == "invoke":
                 self._open.discard(wanted)
-            self._publish(
-                {
-                    "id": wanted,
-                    "op": operation,
-                    "action": name,
-                    "state": given.state,
-                    "output": dict(given.output),
-                    "feedback": dict(given.feedback),
-                    "error": given.error,
-                }
-            )
+            told: dict[str, object] = {"id": wanted, "op": operation, "action": name, "state": given.state}
+            told |= {"output": dict(given.output), "feedback": dict(given.feedback), "error": given.error}
+            if given.waits_for:
+                told["waits_for"] = list(given.waits_for)
+            if given.replaces:
+                told["replaces"] = list(given.replaces)
+            self._publish(told)
 
         return answer
 

@@ -84,10 +84,20 @@ class Driver:
     def _take_commands(self, body: object) -> None:
         stop, timing = self.kind.stop
         stop_body: Callable[[], None] = getattr(body, stop)
+        answer = partial(self._publish, self.robot.topics.answer)
+
+        def beat() -> None:
+            desk.beat()  # which is made with the tasks, below
+
         self._tasks = tasks = Tasks(
-            self.name, stop_body, self.clock, within_s=timing.within_s, watchdog_s=timing.watchdog_s
+            self.name,
+            stop_body,
+            self.clock,
+            within_s=timing.within_s,
+            watchdog_s=timing.watchdog_s,
+            beat=beat,
         )
-        desk = Desk(self.robot, body, tasks, partial(self._publish, self.robot.topics.answer))
+        desk = Desk(self.robot, body, tasks, answer)
         dialect = Dialect(self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS))
         tasks.start()
         self._listen(self.robot.topics.command, "robot/command", desk.receive)

@@ -30,7 +30,8 @@ class Parameter:
     """One input of an action, or one datum of an event.
 
     ``kind`` is text, number, integer, choice, colour, boolean, angle (a number in degrees), image or list.
-    ``step`` is a hint for editors, never a reason to refuse. ``advanced`` ones are folded in forms.
+    ``step`` is a hint for editors, never a reason to refuse. ``advanced`` ones are folded in forms. ``bare``
+    is for an image that is sent as base64 text without ``data:`` before it.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Parameter:
     min_length: int = 0
     max_length: int | None = None
     widget: str | None = None
+    bare: bool = False
 
 
 def pretty_unit(unit: str | None) -> str | None:
@@ -85,6 +87,7 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
         min_length=int(number(data.get("minLength")) or 0),
         max_length=None if longest is None else int(longest),
         widget=text(data.get("rb:widget")),
+        bare=data.get("contentEncoding") == "base64" and "format" not in data,
     )
 
 
@@ -95,7 +98,7 @@ def kind_of(data: Mapping[str, object]) -> str:
         return "choice"
     if widget == "colour" or "pattern" in data:
         return "colour"
-    if widget == "image":
+    if widget == "image" or str(data.get("contentMediaType", "")).startswith("image/"):
         return "image"
     if kind in {"number", "integer"}:
         return "angle" if widget == "angle" else str(kind)

@@ -122,7 +122,10 @@ class Topics:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot as its description tells it; ``source`` is that document, unchanged."""
+    """A robot as its description tells it; ``source`` is that document, unchanged.
+
+    ``beat_s`` is how often it says on its answer topic that it lives while it does something; None: never.
+    """
 
     name: str
     model: str
@@ -136,6 +139,7 @@ class Robot:
     resources: tuple[str, ...]
     topics: Topics
     source: Mapping[str, object] = field(compare=False, repr=False)
+    beat_s: float | None = None
 
     def action(self, name: str) -> Action | None:
         """The action of that name, or None."""

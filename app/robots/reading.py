@@ -39,6 +39,7 @@ def read(document: Mapping[str, object], topics: Topics) -> Robot:
         resources=names(document.get("rb:resources")),
         topics=topics,
         source=document,
+        beat_s=number(document.get("rb:beat")),
     )
 
 

@@ -17,6 +17,8 @@ from typing import Literal, TypeAlias
 from app.robots.calls import Call, Canceled, Clock, Failed
 
 State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "canceled"]
+BEAT_S = 0.5
+"""While something runs or waits, the robot says at least so often that it lives."""
 _LONGEST_QUEUE = 50
 _GRACE_S = 1.0
 _JOIN_S = 2.0
@@ -25,12 +27,17 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Answer:
-    """How a task stands; `error` is a sentence for people."""
+    """How a task stands; `error` is a sentence for people.
+
+    An accepted one may wait for other actions (`waits_for`) or have ended them (`replaces`).
+    """
 
     state: State
     output: Mapping[str, object] = field(default_factory=dict)
     feedback: Mapping[str, object] = field(default_factory=dict)
     error: str | None = None
+    waits_for: tuple[str, ...] = ()
+    replaces: tuple[str, ...] = ()
 
     @property
     def is_final(self) -> bool:
@@ -50,6 +57,7 @@ class Task:
     on_busy: str = "queue"
     timeout_s: float | None = None
     cancellable: bool = True
+    title: str = ""
     call: Call | None = None
     thread: threading.Thread | None = None
     due_s: float | None = None
@@ -73,9 +81,18 @@ class Tasks:
     """The tasks of one robot. Methods without another word are for the deciding thread only."""
 
     def __init__(
-        self, name: str, stop: Callable[[], None], clock: Clock, *, within_s: float, watchdog_s: float | None
+        self,
+        name: str,
+        stop: Callable[[], None],
+        clock: Clock,
+        *,
+        within_s: float,
+        watchdog_s: float | None,
+        beat: Callable[[], None] | None = None,
     ) -> None:
-        self._name, self._stop_body, self._clock = name, stop, clock
+        """`beat` is called in the deciding thread twice a second while anything runs or waits."""
+        self._name, self._stop_body, self._clock, self._beat = name, stop, clock, beat
+        self._next_beat_s = 0.0
         self._patience_s = max(1.0, 5 * within_s)
         self._watchdog_s = watchdog_s
         self._inbox: deque[Callable[[], None]] = deque()
@@ -122,20 +139,23 @@ class Tasks:
             return
         clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
         if clashing and task.on_busy == "reject":
-            busy = f"{task.action}: {self._name} is busy with {clashing[0].action}"
+            busy = f"{task.action}: {self._name} is busy with {clashing[0].title or clashing[0].action}"
             task.finish(Answer("failed", error=busy))
             return
         if len(self._queue) >= _LONGEST_QUEUE:
             full = f"{task.action}: {_LONGEST_QUEUE} other actions are waiting already"
             task.finish(Answer("failed", error=full))
             return
-        task.answer(Answer("accepted"))
+        ended = []
         if task.on_busy == "replace":
-            replaced = Answer("canceled", error=f"{task.action} took its place")
-            self._drop([other for other in clashing if other in self._queue], replaced)
-            for other in clashing:
-                if other.cancellable:
-                    self._end(other, replaced)
+            ended = [other for other in clashing if other.cancellable or other in self._queue]
+        waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in ended))
+        replaces = tuple(dict.fromkeys(other.action for other in ended))
+        task.answer(Answer("accepted", waits_for=waits_for, replaces=replaces))
+        replaced = Answer("canceled", error=f"{task.title or task.action} took its place")
+        self._drop([other for other in ended if other in self._queue], replaced)
+        for other in ended:
+            self._end(other, replaced)
         self._queue.append(task)
         self._start_ready()
 
@@ -185,9 +205,18 @@ class Tasks:
         due += [limit for limit, _ in self._stop_answers]
         if self._watchdog_s is not None:
             due += [seen + self._watchdog_s for seen in self._alive.values()]
+        if self._beat is not None and self._is_busy:
+            due.append(self._next_beat_s)
         return max(0.0, min(due) - self._clock.now()) if due else None
 
+    @property
+    def _is_busy(self) -> bool:
+        return bool(self._running or self._queue)
+
     def _look_at_clock(self, now: float) -> None:
+        if self._beat is not None and self._is_busy and now >= self._next_beat_s:
+            self._next_beat_s = now + BEAT_S
+            self._beat()
         for task in self._running:
             if task.due_s is not None and now >= task.due_s:
                 self._overdue(task)

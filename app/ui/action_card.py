@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.robots.description import Action
+from app.ui.controls import Pictures
 from app.ui.forms import ActionForm
 from app.ui.icons import paint_icon
-from app.ui.sensor_words import number_words
 from app.ui.theme import Theme
-from app.ui.widgets import Bar, Button, Card, Chip, IconButton, label, paint
-from app.ui.words import seconds_words
+from app.ui.try_list import TryList
+from app.ui.try_words import end_words, field_words, left_words, now_words, progress_of
+from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, paint, set_role
 
 if TYPE_CHECKING:
     from app.core.robot_link import Invocation
 
 TILE = 28
-TO_GO = "to_go"
 RISKS = {"moves": "moves the robot", "locomotes": "moves the robot"}
 
 
@@ -43,39 +43,6 @@ class Tile(QWidget):
         painter.end()
 
 
-def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
-    """What the robot says meanwhile: "0.3 m to go"; the fields that its description names."""
-    parts = []
-    for field in action.feedback:
-        value = feedback.get(field.name)
-        if value is None or field.name == "progress":
-            continue
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
-            words = number_words(float(round(value, 2)), field.unit)
-            parts.append(f"{words} {field.title}" if field.name == TO_GO else f"{field.title} {words}")
-        else:
-            parts.append(f"“{value}”")
-    return ", ".join(parts)
-
-
-def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
-    """How much is done, 0 to 1: what the robot calls progress, or what is left to go of what was asked."""
-    share = _number(feedback.get("progress"))
-    if share is not None:
-        return share
-    left = _number(feedback.get(TO_GO))
-    unit = next((field.unit for field in action.feedback if field.name == TO_GO), None)
-    asked = next(
-        (_number(given.get(one.name)) for one in action.parameters if unit and one.unit == unit), None
-    )
-    return 1.0 - abs(left / asked) if left is not None and asked else None
-
-
-def _number(value: object) -> float | None:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return float(value) if good else None  # type: ignore[arg-type]
-
-
 class ActionCard(Card):
     """`tried` with the form's input, `cancelled` when a person ends it early."""
 
@@ -83,28 +50,45 @@ class ActionCard(Card):
     cancelled = Signal()
 
     def __init__(
-        self, theme: Theme, action: Action, options: Callable[[str], Sequence[str]], *, folded: bool = False
+        self,
+        theme: Theme,
+        action: Action,
+        options: Callable[[str], Sequence[str]],
+        *,
+        folded: bool = False,
+        pictures: Pictures | None = None,
+        title_of: Callable[[str], str] = str,
     ) -> None:
+        """``title_of`` gives the words for the name of another action of the robot."""
         super().__init__(theme)
         self.action = action
+        self._title_of = title_of
         self._running = False
         self._given: Mapping[str, object] = {}
         self._folded = False
-        self.form = ActionForm(theme, action, options)
+        self.form = ActionForm(theme, action, options, pictures)
         self.form.changed.connect(self._say_summary)
         self.title = label(action.title[:1].upper() + action.title[1:], "card")
-        self.summary = label("", "bodyLarge", role="textSecondary")
+        self.summary = Elided("bodyLarge", "textSecondary")
         self.risk = Chip(theme, RISKS.get(action.risk or "", ""), "warn")
-        self.words = label("", "body", role="textSecondary")
+        self.words = Elided("body", "textSecondary", 60)
+        self.left = label("", "body", role="textTertiary")
         self.result = Chip(theme)
         self.try_button = Button(theme, "Try", "play")
         self.try_button.setAccessibleName(f"Try {action.title}")
         self.try_button.clicked.connect(self._press)
+        self.past = IconButton(theme, "history", f"Last tries of {action.title}", size=30)
+        self.past.setCheckable(True)
+        self.past.toggled.connect(self._show_past)
+        self.past.hide()
         self.fold = IconButton(theme, "chevron-down", "Show its values", size=30)
         self.fold.clicked.connect(lambda: self.set_folded(not self._folded))
         self.fold.setVisible(folded and bool(action.parameters))
         self.error = label("", "small", role="error", wrap=True)
         self.progress = Bar(theme)
+        self.tries = TryList(theme, action)
+        self.tries.chosen.connect(self._take_back)
+        self.tries.hide()
         self._lay_out(theme)
         self.set_folded(folded)
         self.show_invocation(None)
@@ -112,12 +96,14 @@ class ActionCard(Card):
     def _lay_out(self, theme: Theme) -> None:
         head = QHBoxLayout()
         head.setSpacing(10)
-        before: tuple[QWidget, ...] = (Tile(theme, self.action.icon), self.title, self.risk, self.summary)
-        after: tuple[QWidget, ...] = (self.words, self.result, self.try_button, self.fold)
-        below: tuple[QWidget, ...] = (self.form, self.error, self.progress)
+        before: tuple[QWidget, ...] = (Tile(theme, self.action.icon), self.title, self.risk)
+        after: tuple[QWidget, ...] = (self.left, self.result, self.past, self.try_button, self.fold)
+        below: tuple[QWidget, ...] = (self.form, self.error, self.progress, self.tries)
         for widget in before:
             head.addWidget(widget)
+        head.addWidget(self.summary)
         head.addStretch(1)
+        head.addWidget(self.words)
         for widget in after:
             head.addWidget(widget)
         column = QVBoxLayout(self)
@@ -137,6 +123,7 @@ class ActionCard(Card):
 
     def _say_summary(self) -> None:
         self.summary.setText(self.form.summary() if self._folded else "")
+        self.summary.setVisible(self._folded)
 
     def set_first(self, first: bool) -> None:
         """Whether this card has the focus: its border, and its Try is the filled one."""
@@ -154,42 +141,60 @@ class ActionCard(Card):
             self._given = self.form.input()
             self.tried.emit(dict(self._given))
 
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and held and not self._running:
+            self._press()
+        else:
+            super().keyPressEvent(event)
+
+    def _show_past(self, on: bool) -> None:
+        self.tries.setVisible(on)
+
+    def _take_back(self, given: Mapping[str, object]) -> None:
+        """Put the values of an earlier try into the form."""
+        self.set_folded(False)
+        self.form.set_input(given)
+        self.form.show_problems(())
+
     def show_problems(self, sentences: Sequence[str]) -> None:
         """The input was refused."""
         if sentences and self._folded:
             self.set_folded(False)
         self.form.show_problems(sentences)
 
+    def show_tries(self, tries: Sequence[Invocation]) -> None:
+        """The robot's last tries; those of this action are listed behind the button with the clock."""
+        self.tries.show_tries(tries)
+        self.past.setVisible(bool(self.tries.rows))
+
     def show_invocation(self, invocation: Invocation | None) -> None:
         """What became of the newest try."""
         self._running = invocation is not None and invocation.running
-        can_cancel = self._running and self.action.cancellable
+        can_cancel = self._running and (
+            self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))
+        )
         self.try_button.set_word("Cancel" if can_cancel else "Try", "x" if can_cancel else "play")
         self.try_button.setAccessibleName(f"{self.try_button.text()} {self.action.title}")
         self.try_button.setEnabled(can_cancel or not self._running)
         self.set_first(self.border == "accent")
-        share = None
+        share, words, left = None, "", ""
         if invocation is not None and self._running:
-            share = progress_of(self.action, self._given, invocation.feedback)
+            share = progress_of(self.action, self._given or invocation.given, invocation.feedback)
+            words = now_words(self.action, invocation, self._title_of)
+            left = left_words(invocation)
         self.progress.setVisible(share is not None)
         self.progress.set_fraction(share)
-        words = ""
-        if invocation is not None and self._running:
-            told = feedback_words(self.action, invocation.feedback)
-            words = told or f"for {seconds_words(invocation.elapsed_s)}"
         self.words.setText(words)
+        self.left.setText(left)
+        self.left.setVisible(bool(left))
         self._say_end(None if self._running else invocation)
 
     def _say_end(self, invocation: Invocation | None) -> None:
-        error = ""
-        if invocation is None:
-            self.result.set("")
-        elif invocation.state == "succeeded":
-            self.result.set(f"done in {seconds_words(invocation.elapsed_s)}", "ok")
-        elif invocation.state == "canceled":
-            self.result.set(f"stopped after {seconds_words(invocation.elapsed_s)}", "off")
-        else:
-            self.result.set("not done", "error")
-            error = invocation.error or "The robot did not say why"
-        self.error.setText(f"{error[:1].upper()}{error[1:]}{'' if error.endswith('.') or not error else '.'}")
-        self.error.setVisible(bool(error))
+        said, status, sentence = end_words(invocation) if invocation is not None else ("", "ok", "")
+        self.result.set(said, status)
+        if invocation is not None and invocation.state == "succeeded":
+            self.words.setText(field_words(self.action.output, invocation.output))
+        set_role(self.error, "textSecondary" if status == "off" else "error")
+        self.error.setText(sentence)
+        self.error.setVisible(bool(sentence))

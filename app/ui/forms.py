@@ -8,13 +8,15 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from app.robots.description import Action, Parameter
-from app.ui.controls import NUMBERS, ROW_HEIGHT, Control, control_for, sentence_case
+from app.robots.inputs import wrong_value
+from app.ui.controls import ROW_HEIGHT, Control, Pictures, control_for, sentence_case
+from app.ui.input_words import input_words
+from app.ui.long_text import LongText
 from app.ui.theme import Theme
 from app.ui.widgets import Button, label
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
-UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
 
 
 class ActionForm(QWidget):
@@ -23,15 +25,19 @@ class ActionForm(QWidget):
     changed = Signal()
 
     def __init__(
-        self, theme: Theme, action: Action, options: Callable[[str], Sequence[str]] = lambda _property: ()
+        self,
+        theme: Theme,
+        action: Action,
+        options: Callable[[str], Sequence[str]] = lambda _property: (),
+        pictures: Pictures | None = None,
     ) -> None:
-        """``options`` gives the words that a property of the robot offers now."""
+        """``options`` gives the words that a property of the robot offers now, ``pictures`` cameras."""
         super().__init__()
         self.action = action
         self.controls: dict[str, Control] = {}
         self._sentences: dict[str, QLabel] = {}
         self._rows: dict[str, tuple[QWidget, QWidget]] = {}
-        self._theme = theme
+        self._theme, self._pictures = theme, pictures
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(10)
@@ -52,13 +58,12 @@ class ActionForm(QWidget):
         column.addWidget(self.problem)
         for parameter in sorted(action.parameters, key=lambda one: one.advanced):
             self._add(parameter, options(parameter.options_from) if parameter.options_from else ())
-        advanced = any(parameter.advanced for parameter in action.parameters)
-        self.more.setVisible(advanced)
+        self.more.setVisible(any(parameter.advanced for parameter in action.parameters))
         self._show_advanced(False)
 
     def _add(self, parameter: Parameter, options: Sequence[str]) -> None:
         row = self._grid.rowCount()
-        control = control_for(self._theme, parameter, options)
+        control = control_for(self._theme, parameter, options, self._pictures)
         name = label(sentence_case(parameter.title), "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
         wrong = label("", "small", role="error", wrap=True)
@@ -73,12 +78,11 @@ class ActionForm(QWidget):
             widget.setMinimumHeight(ROW_HEIGHT)
         self._grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
         self._grid.addWidget(cell, row, 1)
-        if parameter.choices and parameter.default is not None:
-            control.show_value(parameter.default)
         self.controls[parameter.name] = control
         self._sentences[parameter.name] = wrong
         self._rows[parameter.name] = (name, cell)
         control.changed(self._told)
+        control.finished(lambda: self._left(parameter))
 
     def _fit(self) -> None:
         self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
@@ -86,6 +90,13 @@ class ActionForm(QWidget):
     def _told(self) -> None:
         self.show_problems(())
         self.changed.emit()
+
+    def _left(self, parameter: Parameter) -> None:
+        """A person has left a field: what is wrong with it stands below it, before anything is tried."""
+        value = self.controls[parameter.name].value()
+        wrong = None if value is None else wrong_value(parameter, value)
+        said = [] if wrong is None else [f"{parameter.title} {wrong}"]
+        self._judge(parameter, said)
 
     def _show_advanced(self, on: bool) -> None:
         self.more.set_word("Fewer" if on else "More", "chevron-up" if on else "chevron-down")
@@ -111,32 +122,36 @@ class ActionForm(QWidget):
         for parameter in self.action.parameters:
             mine = [one for one in left if one.startswith(f"{self.action.name}: {parameter.title} ")]
             left = [one for one in left if one not in mine]
-            self._say(self._sentences[parameter.name], [one.split(": ", 1)[1] for one in mine])
-            self._mark(self.controls[parameter.name].widget, wrong=bool(mine))
+            self._judge(parameter, [one.split(": ", 1)[1] for one in mine])
         self._say(self.problem, left)
+
+    def _judge(self, parameter: Parameter, said: Sequence[str]) -> None:
+        control = self.controls[parameter.name]
+        self._say(self._sentences[parameter.name], () if control.sentence else said)
+        self._mark(control.widget, wrong=bool(said or control.sentence))
+        if said and parameter.advanced:
+            self.more.setChecked(True)
 
     def _say(self, place: QLabel, sentences: Sequence[str]) -> None:
         place.setText(" ".join(f"{sentence_case(one)}." for one in sentences))
         place.setVisible(bool(sentences))
 
     def _mark(self, widget: QWidget, *, wrong: bool) -> None:
+        if isinstance(widget, LongText):
+            widget.mark(wrong=wrong)
+            return
         for field in [widget, *widget.findChildren(QLineEdit)]:
-            if isinstance(field, QLineEdit):
+            if isinstance(field, QLineEdit) and (field.property("wrong") == "true") != wrong:
                 field.setProperty("wrong", "true" if wrong else "false")
                 field.style().unpolish(field)
                 field.style().polish(field)
 
     def summary(self) -> str:
         """The values in a few words: "happy, for 2 s"."""
-        parts = []
-        for parameter in self.action.parameters:
-            value = self.controls[parameter.name].value()
-            title = next((c.title for c in parameter.choices if c.value == value), None)
-            if title is not None:
-                parts.append(title)
-            elif parameter.kind in NUMBERS and value is not None:
-                number = f"{value:g}" if isinstance(value, float) else str(value)
-                title = "for" if UNITS.get(parameter.unit or "") == parameter.title else parameter.title
-                words = f"{title} {number}"
-                parts.append(f"{words}{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}")
-        return ", ".join(parts)
+        given = {name: control.value() for name, control in self.controls.items()}
+        return input_words(self.action, given, texts=False)
+
+    def shut(self) -> None:
+        """The form goes: its controls look at nothing any more."""
+        for control in self.controls.values():
+            control.close()

@@ -8,7 +8,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
 from app.robots.parts import Field
-from app.ui.action_card import feedback_words, progress_of
+from app.ui.try_words import feedback_words, progress_of
+from app.ui.long_text import LongText
 from app.ui.panels.robots import PANEL, RobotsPanel
 from tests.ui.fakes import ACTIONS, Invocation, RobotLink, Session, pepper
 from tests.ui.panel_case import Window, button, press
@@ -45,12 +46,12 @@ def test_trying_sends_what_the_form_says(panel, window) -> None:
 
 def test_a_refused_input_stands_below_its_row(panel, window) -> None:
     card = panel.cards["say"]
-    field = card.findChild(QLineEdit)
+    field = card.findChild(LongText)
     assert field is not None
-    field.clear()
+    field.set_text("")
     press(card.try_button)
     assert "not be empty" in card.form._sentences["text"].text()
-    assert field.property("wrong") == "true"
+    assert field.wrong
     assert window.session.fleet.links[0].invocations == {}
 
 

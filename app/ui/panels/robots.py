@@ -17,11 +17,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.core.moving import MayNotMoveError
 from app.errors import AppError, RobotInputError
 from app.ui.action_card import ActionCard
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.robot_item import LIST_WIDTH, STATUS, RobotItem
-from app.ui.widgets import Button, Chip, Elided, EmptyAction, EmptyState, Line, SearchField, label
+from app.ui.robot_head import RobotHead
+from app.ui.robot_item import LIST_WIDTH, STATUS
+from app.ui.robot_list import RobotList
+from app.ui.session_pictures import SessionPictures
+from app.ui.widgets import EmptyAction, EmptyState, Line, label
 from app.ui.words import plural
 
 if TYPE_CHECKING:
@@ -42,7 +46,8 @@ class RobotsPanel(PanelWidget):
         self._revision = -1
         self._watch: Watch | None = None
         self.cards: dict[str, ActionCard] = {}
-        self.items: dict[str, RobotItem] = {}
+        self._cards_of = ""
+        self._pictures = SessionPictures(self.session)
         self._seen: dict[str, tuple[object, ...]] = {}
         self._lay_out()
         application = QApplication.instance()
@@ -64,16 +69,18 @@ class RobotsPanel(PanelWidget):
                 )
             ],
         )
-        self.list = QWidget()
-        self.list.setFixedWidth(LIST_WIDTH)
-        self._list_column = QVBoxLayout(self.list)
-        self._list_column.setContentsMargins(8, 8, 8, 8)
-        self._list_column.setSpacing(2)
-        self._list_column.addStretch(1)
+        self.list = RobotList(theme, self.context.run)
+        self.list.chosen.connect(self.choose)
+        self.items = self.list.items
         self._list_line = Line(theme, upright=True)
         right = QVBoxLayout()
         right.setSpacing(0)
-        right.addWidget(self._make_head())
+        self.head = head = RobotHead(theme)
+        self.name, self.chip, self.about, self.health = head.name, head.chip, head.about, head.health
+        self.finder, self.stop = head.finder, head.stop
+        self.finder.textChanged.connect(self._filter)
+        self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
+        right.addWidget(head)
         right.addWidget(Line(theme))
         right.addWidget(self._make_cards(), 1)
         whole = QWidget()
@@ -89,36 +96,6 @@ class RobotsPanel(PanelWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.pages)
-
-    def _make_head(self) -> QWidget:
-        theme = self.theme
-        self.name = label("", "heading")
-        self.chip = Chip(theme)
-        self.about = Elided("body", "textSecondary")
-        self.health = Elided("small", "textTertiary")
-        self.health.hide()
-        about = QVBoxLayout()
-        about.setSpacing(0)
-        about.addWidget(self.about)
-        about.addWidget(self.health)
-        self.finder = SearchField(theme, "Find an action")
-        self.finder.setFixedWidth(180)
-        self.finder.setMinimumHeight(theme.size("control", "form"))
-        self.finder.textChanged.connect(self._filter)
-        self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
-        self.stop.fill_icon = True
-        self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
-        head = QWidget()
-        row = QHBoxLayout(head)
-        row.setContentsMargins(16, 7, 16, 8)
-        row.setSpacing(10)
-        row.addWidget(self.name)
-        row.addWidget(self.chip)
-        row.addLayout(about)
-        row.addStretch(1)
-        row.addWidget(self.finder)
-        row.addWidget(self.stop)
-        return head
 
     def _make_cards(self) -> QWidget:
         inside = QWidget()
@@ -158,12 +135,7 @@ class RobotsPanel(PanelWidget):
 
     def _show_robots(self, links: Sequence[RobotLink]) -> None:
         self.pages.setCurrentIndex(1 if links else 0)
-        for link in links:
-            if link.name not in self.items:
-                item = RobotItem(self.theme, link)
-                item.clicked.connect(lambda _on=False, name=link.name: self.choose(name))
-                self.items[link.name] = item
-                self._list_column.insertWidget(self._list_column.count() - 1, item)
+        self.list.show_links(links)
         if links and self._robot not in {link.name for link in links}:
             first = next((link for link in links if link.state != "away"), links[0])
             self.choose(first.name)
@@ -182,19 +154,27 @@ class RobotsPanel(PanelWidget):
 
     def _make_forms(self) -> None:
         link = self.session.fleet.link(self._robot)
-        if link is None or not self._new("cards", link.name, link.robot):
+        if link is None or not self._new("cards", link.name, link.robot, self._offered(link)):
             return
-        for card in self.cards.values():
-            self._card_column.removeWidget(card)
-            card.deleteLater()
+        kept = {name: card.form.input() for name, card in self.cards.items()} if self._made_for(link) else {}
+        self._drop_cards()
         actions = [action for action in link.robot.actions if action.name != link.robot.safe_stop.action]
-        self.cards = {}
+        titles = {action.name: action.title for action in link.robot.actions}
         for place, action in enumerate(actions):
-            card = ActionCard(self.theme, action, self._options, folded=place >= UNFOLDED)
+            card = ActionCard(
+                self.theme,
+                action,
+                self._options,
+                folded=place >= UNFOLDED,
+                pictures=self._pictures,
+                title_of=lambda name: titles.get(name, name.replace("_", " ")),
+            )
+            card.form.set_input(kept.get(action.name, {}))
             card.tried.connect(lambda given, name=action.name: self.attempt(name, given))
             card.cancelled.connect(lambda name=action.name: self.session.fleet.cancel(self._robot, name))
             self.cards[action.name] = card
             self._card_column.insertWidget(place, card)
+        self._cards_of = link.name
         self._set_first(next(iter(self.cards.values()), None))
         self.name.setText(link.name)
         self.stop.set_word(f"Stop {link.name}")
@@ -202,9 +182,27 @@ class RobotsPanel(PanelWidget):
         self.about.setText(f"{kind}{plural(len(actions), 'action')}")
         self._filter()
 
+    def _made_for(self, link: RobotLink) -> bool:
+        """Whether the cards are this robot's: what was typed into them is kept then."""
+        return self._cards_of == link.name
+
+    def _drop_cards(self) -> None:
+        for card in self.cards.values():
+            card.form.shut()
+            self._card_column.removeWidget(card)
+            card.deleteLater()
+        self.cards = {}
+        self._seen = {what: seen for what, seen in self._seen.items() if not what.startswith("card ")}
+
+    def _offered(self, link: RobotLink) -> tuple[object, ...]:
+        """What the robot's properties offer to choose from now: another offer makes other forms."""
+        named = {one.options_from for action in link.robot.actions for one in action.parameters}
+        return tuple((name, tuple(self._options(name))) for name in sorted(filter(None, named)))
+
     def _show_link(self, link: RobotLink) -> None:
-        if self._new("head", link.state):
-            self.chip.set(link.state, STATUS.get(link.state, "ok"))
+        self._make_forms()
+        if self._new("head", link.state, link.chip):
+            self.chip.set(link.chip.removeprefix("virtual, "), STATUS.get(link.state, "ok"))
         if self._new("health", link.name, link.last_stop):
             self.health.setText(f"Stop {link.last_stop}" if link.last_stop else "")
             self.health.setVisible(bool(link.last_stop))
@@ -213,6 +211,7 @@ class RobotsPanel(PanelWidget):
             now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()
             if self._new(f"card {name}", *now):
                 card.show_invocation(made)
+                card.show_tries(tuple(link.tried))
 
     def _options(self, name: str) -> Sequence[str]:
         """What a property of the robot offers to choose from now."""
@@ -239,6 +238,8 @@ class RobotsPanel(PanelWidget):
             self.session.fleet.invoke(self._robot, action, given)
         except RobotInputError as error:
             card.show_problems(error.sentences)
+        except MayNotMoveError:
+            card.show_problems(())  # the question stands over the window
         except AppError as error:
             card.show_problems((str(error),))
         else:
@@ -280,6 +281,8 @@ class RobotsPanel(PanelWidget):
         if self._watch is not None:
             self._watch.close()
             self._watch = None
+        for card in self.cards.values():
+            card.form.shut()
 
 
 PANEL = Panel("robots", "Robots", "bot", (), RobotsPanel)

@@ -1,0 +1,314 @@
+"""A picture for a robot: a file, the newest picture of a topic, or an address; its thumbnail beside it.
+
+It is sent as NEP's pictures in JSON are: ``data:image/jpeg;base64,…``, or the bare base64 text where the
+description asks for that (``contentEncoding`` and no ``format``). An address that was typed is sent as it is.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QRectF, QSize, Qt, QTimer, QUrl, Signal
+from PySide6.QtGui import (
+    QDragEnterEvent,
+    QDropEvent,
+    QImage,
+    QImageReader,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+)
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from app.robots.description import Parameter
+from app.ui.control import Control, connect, line_field
+from app.ui.icons import paint_icon
+from app.ui.theme import Theme
+from app.ui.widgets import Button, label, paint
+from app.ui.widgets.menus import Menu, drop_below
+
+if TYPE_CHECKING:
+    from app.core.images import ImageStream
+
+FILES = "Pictures (*.png *.jpg *.jpeg *.gif *.bmp *.webp)"
+THUMBNAIL = QSize(72, 54)
+LOOK_MS = 200
+LONGEST_SIDE, QUALITY = 1280, 85
+MOST_PIXELS = 60_000_000
+MOST_FILE_BYTES = 40_000_000
+
+
+class Pictures(Protocol):
+    """Where pictures come from: the topics of the session."""
+
+    def topics(self) -> Sequence[str]:
+        """The picture topics that there are now."""
+
+    def stream(self, topic: str) -> ImageStream:
+        """Look at one until it is closed."""
+
+
+class NoPictures:
+    """No session, no topics."""
+
+    def topics(self) -> Sequence[str]:
+        """None."""
+        return ()
+
+    def stream(self, topic: str) -> ImageStream:
+        """There is none to look at: KeyError."""
+        raise KeyError(topic)
+
+
+def read_picture(path: Path) -> tuple[QImage | None, str]:
+    """A picture file, turned as its camera says, or the sentence that says why it can't be used."""
+    try:
+        too_big = path.stat().st_size > MOST_FILE_BYTES
+    except OSError as error:
+        return None, f"“{path.name}” can't be read: {(error.strerror or 'unknown').lower()}."
+    reader = QImageReader(str(path))
+    reader.setAutoTransform(True)
+    size = reader.size()
+    if too_big or size.width() * size.height() > MOST_PIXELS:
+        return None, f"“{path.name}” is too large; use one below {MOST_FILE_BYTES // 1_000_000} MB."
+    image = reader.read()
+    if image.isNull():
+        return None, f"“{path.name}” is no picture that can be read."
+    return image, ""
+
+
+def encoded(image: QImage, *, bare: bool = False) -> str:
+    """A picture as JPEG in text, at most 1280 pixels at its longer side."""
+    if max(image.width(), image.height()) > LONGEST_SIDE:
+        keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+        image = image.scaled(LONGEST_SIDE, LONGEST_SIDE, keep, smooth)
+    held = QByteArray()
+    buffer = QBuffer(held)
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    image.convertToFormat(QImage.Format.Format_RGB32).save(buffer, "JPG", QUALITY)  # type: ignore[call-overload]
+    text = base64.b64encode(held.data()).decode("ascii")
+    return text if bare else f"data:image/jpeg;base64,{text}"
+
+
+class Thumbnail(QWidget):
+    """A small picture, or an icon while there is none."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._image: QImage | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("The chosen picture")
+
+    @property
+    def image(self) -> QImage | None:
+        """What it shows."""
+        return self._image
+
+    def show_image(self, image: QImage | None) -> None:
+        """Show another picture, or none."""
+        self._image = image
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        return THUMBNAIL
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect, radius = QRectF(self.rect()), self._theme.radius("small")
+        paint.box(painter, rect, radius, theme.colour("sunken"), theme.colour("border"))
+        if self._image is None:
+            square = QRectF(rect.center().x() - 10, rect.center().y() - 10, 20, 20)
+            paint_icon(painter, square, "image", theme.colour("textTertiary"))
+        else:
+            inner = rect.adjusted(1, 1, -1, -1)
+            shape = QPainterPath()
+            shape.addRoundedRect(inner, radius - 1, radius - 1)
+            painter.setClipPath(shape)
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+            size = self._image.size().scaled(
+                inner.size().toSize(), Qt.AspectRatioMode.KeepAspectRatioByExpanding
+            )
+            place = QRectF(0, 0, size.width(), size.height())
+            place.moveCenter(inner.center())
+            painter.drawImage(place, self._image)
+        painter.end()
+
+
+class PictureChoice(QWidget):
+    """Thumbnail, name or address, and the buttons for a file and for a camera; files can be dropped on it."""
+
+    changed = Signal()
+
+    def __init__(self, theme: Theme, parameter: Parameter, pictures: Pictures) -> None:
+        super().__init__()
+        self._theme, self._parameter, self._pictures = theme, parameter, pictures
+        self._stream: ImageStream | None = None
+        self._seen: object = None
+        self._file: Path | None = None
+        self._image: QImage | None = None
+        self.sentence = ""
+        self.setAccessibleName(parameter.title)
+        self.setAcceptDrops(True)
+        self.thumbnail = Thumbnail(theme)
+        self.field = line_field(theme, parameter)
+        self.field.setPlaceholderText("A file, a camera, or an address")
+        self.choose = Button(theme, "File", "folder-open", size="form")
+        self.choose.setAccessibleName(f"Choose a file for {parameter.title}")
+        self.camera = Button(theme, "Camera", "camera", size="form")
+        self.camera.setAccessibleName(f"Take {parameter.title} from a camera")
+        self._wrong = label("", "small", role="error", wrap=True)
+        self._wrong.hide()
+        self._lay_out()
+        self._timer = QTimer(self)
+        self._timer.setInterval(LOOK_MS)
+        self._timer.timeout.connect(self._look)
+        self.field.textEdited.connect(self._typed)
+        self.choose.clicked.connect(self._ask)
+        self.camera.clicked.connect(self._offer)
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(10)
+        row.addWidget(self.thumbnail)
+        row.addWidget(self.field, 1)
+        row.addWidget(self.choose)
+        row.addWidget(self.camera)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(row)
+        column.addWidget(self._wrong)
+
+    # -- what it gives ------------------------------------------------------------------------------------
+
+    def value(self) -> str | None:
+        """The picture as the robot wants it, or the address that was typed; None while there is none."""
+        if self._stream is not None:
+            self._look()
+        if self._image is not None:
+            return encoded(self._image, bare=self._parameter.bare)
+        return None if self._stream is not None else self.field.text().strip() or None
+
+    def set_value(self, value: object) -> None:
+        """Show an address or a file."""
+        self.close_stream()
+        self._show_none()
+        text = "" if value is None else str(value)
+        if text.startswith("data:"):
+            image = QImage.fromData(base64.b64decode(text.partition(",")[2]))
+            self._image = None if image.isNull() else image
+            self.thumbnail.show_image(self._image)
+            self.field.setText("the picture of that time" if self._image is not None else "")
+        else:
+            self._typed(text)
+            self.field.setText(text)
+
+    # -- a file -------------------------------------------------------------------------------------------
+
+    def _ask(self) -> None:
+        path, _ = QFileDialog.getOpenFileName(self, "Choose a picture", "", FILES)
+        if path:
+            self.use_file(Path(path))
+
+    def use_file(self, path: Path) -> None:
+        """Take a picture file; one that can't be read is named and says why."""
+        self.close_stream()
+        self._image, said = read_picture(path)
+        self.thumbnail.show_image(self._image)
+        self.field.setText(path.name if self._image is not None else str(path))
+        self.field.setToolTip(str(path))
+        self._judge(said)
+        self.changed.emit()
+
+    def _typed(self, text: str) -> None:
+        self.close_stream()
+        self._show_none()
+        url = QUrl(text.strip())
+        path = Path(url.toLocalFile() if url.isLocalFile() else text.strip())
+        if text.strip() and path.suffix and path.is_file():
+            self._image, said = read_picture(path)
+            self.thumbnail.show_image(self._image)
+            self._judge(said)
+        self.changed.emit()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if any(url.isLocalFile() for url in event.mimeData().urls()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        files = [url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile()]
+        if files:
+            self.use_file(Path(files[0]))
+            event.acceptProposedAction()
+
+    # -- a camera -----------------------------------------------------------------------------------------
+
+    def _offer(self) -> None:
+        menu = Menu(self._theme, self)
+        topics = list(self._pictures.topics())
+        for topic in topics:
+            menu.addAction(topic).triggered.connect(lambda _on=False, topic=topic: self.use_topic(topic))
+        if not topics:
+            menu.addAction("No camera sends pictures now").setEnabled(False)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        drop_below(menu, self.camera)
+
+    def use_topic(self, topic: str) -> None:
+        """Show a topic's pictures; the newest one at the moment of Try is sent."""
+        self.close_stream()
+        self._show_none()
+        self._stream = self._pictures.stream(topic)
+        self.field.setText(f"newest picture of {topic}")
+        self._timer.start()
+        self.changed.emit()
+
+    def _look(self) -> None:
+        stream = self._stream
+        if stream is None:
+            return
+        picture = stream.picture
+        if picture is not None and picture is not self._seen:
+            self._seen = picture
+            data = picture.bgra.data
+            held = QImage(data, picture.width, picture.height, QImage.Format.Format_RGB32)
+            self._image = held.copy()
+            self.thumbnail.show_image(self._image)
+        self._judge(f"{stream.error}." if stream.error else "")
+
+    def close_stream(self) -> None:
+        """Look at no topic any more."""
+        self._timer.stop()
+        if self._stream is not None:
+            self._stream.close()
+        self._stream, self._seen = None, None
+
+    def _show_none(self) -> None:
+        self._image = None
+        self.thumbnail.show_image(None)
+        self.field.setToolTip("")
+        self._judge("")
+
+    def _judge(self, sentence: str) -> None:
+        self.sentence = sentence
+        self._wrong.setText(sentence)
+        self._wrong.setVisible(bool(sentence))
+
+
+def picture_control(theme: Theme, parameter: Parameter, pictures: Pictures) -> Control:
+    """The control of a picture."""
+    choice = PictureChoice(theme, parameter, pictures)
+    show: Callable[[object], None] = choice.set_value
+    show(parameter.default)
+    return Control(
+        choice,
+        choice.value,
+        show,
+        lambda tell: connect(choice.changed, tell),
+        sentence=lambda: choice.sentence,
+        close=choice.close_stream,
+    )

@@ -1,0 +1,71 @@
+"""Texts and lists of words."""
+
+from __future__ import annotations
+
+from app.robots.description import Parameter
+from app.ui.control import Control, connect, line_field
+from app.ui.long_text import LongText
+from app.ui.theme import Theme
+
+LONG_FROM = 200
+"""A text that may have as many characters gets several lines."""
+
+
+def text_control(theme: Theme, parameter: Parameter) -> Control:
+    """One line, or several for a text that may be long; a list is words with commas between them."""
+    if parameter.kind == "list":
+        return _list(theme, parameter)
+    if (parameter.max_length or 0) >= LONG_FROM or parameter.widget == "multiline":
+        return _long(theme, parameter)
+    field = line_field(theme, parameter)
+    made = Control(
+        field,
+        lambda: _given(parameter, field.text()),
+        lambda given: field.setText(_words(given)),
+        lambda tell: connect(field.textChanged, tell),
+        finished=lambda tell: connect(field.editingFinished, tell),
+    )
+    made.show_value(parameter.default)
+    return made
+
+
+def _long(theme: Theme, parameter: Parameter) -> Control:
+    field = LongText(theme, parameter.title)
+    made = Control(
+        field,
+        lambda: _given(parameter, field.text()),
+        lambda given: field.set_text(_words(given)),
+        lambda tell: connect(field.changed, tell),
+        finished=lambda tell: connect(field.finished, tell),
+    )
+    made.show_value(parameter.default)
+    return made
+
+
+def _list(theme: Theme, parameter: Parameter) -> Control:
+    field = line_field(theme, parameter)
+    field.setPlaceholderText("Words with commas between them")
+
+    def value() -> object:
+        return [part.strip() for part in field.text().split(",") if part.strip()]
+
+    made = Control(
+        field,
+        value,
+        lambda given: field.setText(_words(given)),
+        lambda tell: connect(field.textChanged, tell),
+        finished=lambda tell: connect(field.editingFinished, tell),
+    )
+    made.show_value(parameter.default)
+    return made
+
+
+def _given(parameter: Parameter, text: str) -> str | None:
+    """What is left empty is left out, unless the robot must have it: then the check says so."""
+    return text if text or parameter.required else None
+
+
+def _words(given: object) -> str:
+    if isinstance(given, (list, tuple)):
+        return ", ".join(str(part) for part in given)
+    return "" if given is None else str(given)

@@ -1,0 +1,37 @@
+"""An action's input in a few words: "happy, for 2 s", "“Hello”"."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.robots.description import Action, Parameter
+from app.ui.controls import NUMBERS
+
+UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
+LONGEST_TEXT = 32
+
+
+def input_words(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
+    """The values that say most, in the order of the action's parameters; `texts` also quotes texts."""
+    found = (_words(parameter, given.get(parameter.name), texts=texts) for parameter in action.parameters)
+    return ", ".join(words for words in found if words)
+
+
+def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
+    title = next((choice.title for choice in parameter.choices if choice.value == value), None)
+    if title is not None:
+        return title
+    if parameter.kind in NUMBERS and isinstance(value, (int, float)):
+        name = "for" if UNITS.get(parameter.unit or "") == parameter.title else parameter.title
+        number = f"{value:g}" if isinstance(value, float) else str(value)
+        return f"{name} {number}{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}"
+    if not texts:
+        return ""
+    if parameter.kind == "image" and value:
+        return "a picture"
+    if parameter.kind == "text" and isinstance(value, str) and value:
+        text = " ".join(value.split())
+        return f"“{text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + '…'}”"
+    if parameter.kind == "list" and isinstance(value, list):
+        return ", ".join(str(item) for item in value)
+    return str(value) if parameter.kind == "colour" and value else ""

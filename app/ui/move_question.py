@@ -1,0 +1,152 @@
+"""May this robot move? A card over the window, asked once for each real robot; Stop stays free and bright."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
+
+from app.core.moving import Moving
+from app.errors import SettingsError
+from app.ui.icons import paint_icon
+from app.ui.theme import Theme
+from app.ui.widgets import Button, Switch, label, paint
+
+WIDE = 480
+TOP = 112
+TILE = 40
+
+
+class _Tile(QWidget):
+    """The sign of something that moves."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setFixedSize(TILE, TILE)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, theme.radius("panel"), theme.colour("warnTint"), theme.colour("warnBorder"))
+        inset = TILE * 0.24
+        paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), "footprints", theme.colour("warn"))
+        painter.end()
+
+
+class MoveQuestion(QWidget):
+    """Shows the question of `Moving` while it stands; Escape is "Not now".
+
+    The keyboard is on "Not now" first: an Enter that was meant for something else moves nothing.
+    """
+
+    def __init__(self, theme: Theme, window: QWidget, moving: Moving) -> None:
+        super().__init__(window)
+        self._theme, self._moving = theme, moving
+        self._seen = moving.revision
+        self._before: QWidget | None = None
+        self.complaint = ""
+        self.title = label("", "heading", wrap=True)
+        self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
+        self.always = Switch(theme, "")
+        self.let = Button(theme, "Let it move", "footprints", kind="primary", size="form")
+        self.not_now = Button(theme, "Not now", size="form")
+        self.let.clicked.connect(lambda: self._answer(let=True))
+        self.not_now.clicked.connect(lambda: self._answer(let=False))
+        self._lay_out(theme)
+        shadow = QGraphicsDropShadowEffect(self)
+        shadow.setBlurRadius(32)
+        shadow.setOffset(0, 8)
+        shadow.setColor(theme.colour("shadow"))
+        theme.changed.connect(lambda: shadow.setColor(theme.colour("shadow")))
+        self.setGraphicsEffect(shadow)
+        window.installEventFilter(self)
+        self.hide()
+
+    def _lay_out(self, theme: Theme) -> None:
+        words = QVBoxLayout()
+        words.setSpacing(4)
+        words.addWidget(self.title)
+        words.addWidget(self.sentence)
+        top = QHBoxLayout()
+        top.setSpacing(14)
+        top.addWidget(_Tile(theme), 0, Qt.AlignmentFlag.AlignTop)
+        top.addLayout(words, 1)
+        foot = QHBoxLayout()
+        foot.setSpacing(10)
+        foot.addWidget(self.always)
+        foot.addStretch(1)
+        foot.addWidget(self.not_now)
+        foot.addWidget(self.let)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(20, 18, 20, 16)
+        column.setSpacing(16)
+        column.addLayout(top)
+        column.addLayout(foot)
+
+    def refresh(self) -> None:
+        """Show the question that stands now, or nothing."""
+        if self._moving.revision == self._seen:
+            return
+        self._seen = self._moving.revision
+        question = self._moving.question
+        if question is None:
+            self._put_away()
+            return
+        names = list(question.moves)
+        self.title.setText(question.title)
+        self.sentence.setText(question.sentence)
+        self.always.setText(f"Always for {names[0]}" if len(names) == 1 else "Always for these")
+        self.always.setChecked(False)
+        self.always.updateGeometry()
+        self.let.set_word("Let it move" if len(names) == 1 else "Let them move")
+        self.setAccessibleName(question.title)
+        self.setAccessibleDescription(question.sentence)
+        if not self.isVisible():
+            self._before = self.window().focusWidget()
+        self._place()
+        self.show()
+        self.raise_()
+        self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
+
+    def _put_away(self) -> None:
+        had_focus = self.isAncestorOf(self.window().focusWidget() or self.window())
+        self.hide()
+        if had_focus and self._before is not None:
+            self._before.setFocus(Qt.FocusReason.PopupFocusReason)
+        self._before = None
+
+    def _answer(self, *, let: bool) -> None:
+        try:
+            self._moving.answer(let=let, always=let and self.always.isChecked())
+        except SettingsError as error:
+            self.complaint = error.sentence
+        self.refresh()
+
+    def _place(self) -> None:
+        window = self.parentWidget()
+        if window is None:
+            return
+        wide = min(round(self._theme.scaled(WIDE)), window.width() - 32)
+        self.setFixedWidth(wide)
+        layout = self.layout()
+        high = layout.heightForWidth(wide) if layout is not None else -1
+        self.resize(wide, max(high, self.minimumSizeHint().height()))
+        self.move((window.width() - wide) // 2, TOP)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._place()
+        return False
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self._answer(let=False)
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        edge = theme.colour("warnBorder")
+        paint.box(painter, QRectF(self.rect()), theme.radius("card"), theme.colour("raised"), edge)
+        painter.end()

@@ -1,0 +1,40 @@
+"""The head of the chosen robot: its name, how it is, what it did with the last stop, and its own Stop."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.ui.theme import Theme
+from app.ui.widgets import Button, Chip, Elided, SearchField, label
+
+FINDER_WIDTH = 180
+
+
+class RobotHead(QWidget):
+    """Widgets in a row; the panel fills them."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.name = label("", "heading")
+        self.chip = Chip(theme)
+        self.about = Elided("body", "textSecondary")
+        self.health = Elided("small", "textTertiary")
+        self.health.hide()
+        self.finder = SearchField(theme, "Find an action")
+        self.finder.setFixedWidth(FINDER_WIDTH)
+        self.finder.setMinimumHeight(theme.size("control", "form"))
+        self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
+        self.stop.fill_icon = True
+        about = QVBoxLayout()
+        about.setSpacing(0)
+        about.addWidget(self.about)
+        about.addWidget(self.health)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(16, 7, 16, 8)
+        row.setSpacing(10)
+        row.addWidget(self.name)
+        row.addWidget(self.chip)
+        row.addLayout(about)
+        row.addStretch(1)
+        row.addWidget(self.finder)
+        row.addWidget(self.stop)

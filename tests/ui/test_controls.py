@@ -1,0 +1,326 @@
+"""Controls of typed values: what was typed is kept and judged, keys and wheel, pictures, colours, angles."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QImage, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
+
+from app.robots.inputs import Choice as Option
+from app.robots.inputs import Parameter, parameter_of
+from app.robots.parts import Action
+from app.ui.angle_dial import AngleDial
+from app.ui.control_colour import ColourChoice, HueStrip
+from app.ui.control_picture import MOST_FILE_BYTES, PictureChoice, encoded, read_picture
+from app.ui.forms import ActionForm
+from app.ui.long_text import LEAST_HEIGHT, LongText
+from app.ui.theme import Theme
+from app.ui.widgets import SliderWithUnit
+from tests.ui import fakes
+
+KEEP = Option(0, "keep"), Option(1, "turn")
+
+
+@pytest.fixture
+def theme(qapp) -> Theme:
+    return Theme("light")
+
+
+def form_of(qtbot, theme: Theme, *parameters: Parameter, pictures: object = None) -> ActionForm:
+    action = Action("do", "do it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
+    made = ActionForm(theme, action, pictures=pictures)  # type: ignore[arg-type]
+    qtbot.addWidget(made)
+    made.resize(560, 300)
+    made.show()
+    qtbot.waitExposed(made)
+    return made
+
+
+def child(form: ActionForm, kind: type) -> object:
+    found = form.findChild(kind)
+    assert found is not None
+    return found
+
+
+def wheel(widget: QWidget, notches: int = 1) -> None:
+    at = QPointF(widget.rect().center())
+    none = QPoint()
+    turned = QPoint(0, 120 * notches)
+    keys, buttons = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.NoButton
+    phase = Qt.ScrollPhase.NoScrollPhase
+    event = QWheelEvent(at, widget.mapToGlobal(at), none, turned, buttons, keys, phase, False)
+    QApplication.sendEvent(widget, event)
+
+
+# ---- what was typed is kept ------------------------------------------------------------------------
+
+
+def test_a_number_out_of_its_limits_is_what_the_form_gives_so_that_it_is_never_tried_unseen(
+    qtbot, theme
+) -> None:
+    form = form_of(qtbot, theme, Parameter("d", "distance", "number", -1, 1, 0.05, "m", 0.5))
+    slider = child(form, SliderWithUnit)
+    slider.field.setFocus()
+    slider.field.selectAll()
+    QTest.keyClicks(slider.field, "12")
+    assert form.input() == {"d": 12.0}  # also before the field is left
+    assert form.action.check(form.input()) == ("do: distance must be between -1 and 1 m",)
+    QTest.keyClick(slider.field, Qt.Key.Key_Return)
+    assert slider.field.text() == "12"
+    form.show_problems(form.action.check(form.input()))
+    shown = [text for text in (slider._sentence.text(), form._sentences["d"].text()) if text]
+    assert shown == ["The most is 1 m."]  # said once
+    assert slider.field.property("wrong") == "true"
+
+
+@pytest.mark.parametrize(("typed", "given"), [("two", "two"), ("2,5", 2.5), ("", None)])
+def test_a_field_gives_numbers_and_what_is_none_as_it_was_typed(qtbot, theme, typed, given) -> None:
+    form = form_of(qtbot, theme, Parameter("x", "x", "number", minimum=0))
+    field = child(form, QLineEdit)
+    QTest.keyClicks(field, typed)
+    assert form.input() == ({} if given is None else {"x": given})
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert field.text() == (typed if given != 2.5 else field.text())
+
+
+def test_a_whole_number_says_so_about_a_fraction(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("n", "count", "integer", 0, 9, default=2))
+    slider = child(form, SliderWithUnit)
+    slider.field.setText("2.5")
+    assert form.action.check(form.input()) == ("do: count must be a whole number",)
+
+
+def test_arrow_keys_step_a_number_without_limits(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("n", "count", "integer", minimum=0, default=2))
+    field = child(form, QLineEdit)
+    for key in (Qt.Key.Key_Up, Qt.Key.Key_Up, Qt.Key.Key_PageUp, Qt.Key.Key_Down):
+        QTest.keyClick(field, key)
+    assert form.input() == {"n": 13}
+    for _ in range(3):
+        QTest.keyClick(field, Qt.Key.Key_PageDown)
+    assert form.input() == {"n": 0}  # not below its least
+
+
+def test_a_text_that_is_too_long_is_kept_and_the_sentence_stands_below_when_it_is_done(qtbot, theme) -> None:
+    form = form_of(
+        qtbot,
+        theme,
+        Parameter("t", "text", "text", max_length=5, required=True),
+        Parameter("o", "other", "text"),
+    )
+    first, second = form.findChildren(QLineEdit)
+    assert second.placeholderText() == "May stay empty"
+    QTest.keyClicks(first, "too long")
+    QTest.keyClick(first, Qt.Key.Key_Return)
+    assert form._sentences["t"].isVisible()
+    assert form._sentences["t"].text() == "Text must be at most 5 characters long."
+    assert first.text() == "too long"
+    QTest.keyClick(first, Qt.Key.Key_Backspace)
+    assert not form._sentences["t"].isVisible()
+
+
+def test_zero_is_a_choice_and_a_wrong_advanced_value_unfolds_its_row(qtbot, theme) -> None:
+    form = form_of(
+        qtbot,
+        theme,
+        Parameter("how", "how", "choice", choices=KEEP, default=0),
+        Parameter("s", "speed", "number", 0, 1, default=0.5, advanced=True),
+    )
+    assert form.input() == {"how": 0, "s": 0.5}
+    slider = child(form, SliderWithUnit)
+    slider.field.setText("7")
+    assert not slider.isVisible()
+    form.show_problems(form.action.check(form.input()))
+    assert slider.isVisible()
+
+
+# ---- long texts ------------------------------------------------------------------------------------
+
+
+def test_a_long_text_grows_with_its_lines_to_five(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("t", "text", "text", max_length=500, required=True))
+    field = child(form, LongText)
+    one = field.height()
+    assert one >= LEAST_HEIGHT
+    field.set_text("a\nb\nc")
+    three = field.height()
+    field.set_text("\n".join("abcdefgh"))
+    five = field.height()
+    assert one < three < five < 2 * three
+    field.set_text("word " * 60)  # wraps
+    assert field.height() > one
+    assert form.input() == {"t": "word " * 60}
+
+
+# ---- keys, wheel, double click ---------------------------------------------------------------------
+
+
+def test_home_end_and_a_double_click_on_a_slider(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("v", "volume", "integer", 0, 100, 5, "%", 60))
+    track = child(form, SliderWithUnit).track
+    for key, expected in [(Qt.Key.Key_End, 100), (Qt.Key.Key_Home, 0), (Qt.Key.Key_Right, 5)]:
+        QTest.keyClick(track, key)
+        assert form.input() == {"v": expected}
+    QTest.keyClick(track, Qt.Key.Key_PageUp)
+    assert form.input() == {"v": 55}
+    QTest.mouseDClick(track, Qt.MouseButton.LeftButton, pos=track.rect().center())
+    assert form.input() == {"v": 60}
+
+
+def test_an_angle_is_turned_by_keys_by_its_drawing_and_by_the_wheel_with_the_focus_only(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("a", "angle", "angle", -360, 360, 5, "°", 90))
+    dial, slider = child(form, AngleDial), child(form, SliderWithUnit)
+    wheel(dial)
+    assert form.input() == {"a": 90.0}
+    dial.setFocus()
+    qtbot.waitUntil(dial.hasFocus)
+    wheel(dial)
+    assert form.input() == {"a": 95.0}
+    for key, expected in [
+        (Qt.Key.Key_Home, -360.0), (Qt.Key.Key_End, 360.0), (Qt.Key.Key_Right, 355.0),
+        (Qt.Key.Key_Left, 360.0), (Qt.Key.Key_PageDown, 310.0),
+    ]:  # fmt: skip
+        QTest.keyClick(dial, key)
+        assert (form.input(), slider.value, dial.value) == ({"a": expected}, expected, expected)
+    QTest.mouseDClick(dial, Qt.MouseButton.LeftButton)
+    assert form.input() == {"a": 90.0}
+    slider.track.setFocus()
+    QTest.keyClick(slider.track, Qt.Key.Key_Home)
+    assert dial.value == -360.0  # and the drawing follows the slider
+
+
+def test_dragging_an_angle_around_adds_whole_turns_up_to_its_limit(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("a", "angle", "angle", -360, 360, 5, "°", 0))
+    dial = child(form, AngleDial)
+    middle, reach = dial.rect().center(), dial.width() // 2 - 3
+
+    def at(angle_deg: float) -> QPoint:
+        away = dial.direction(angle_deg) * reach
+        return middle + QPoint(round(away.x()), round(away.y()))
+
+    QTest.mousePress(dial, Qt.MouseButton.LeftButton, pos=at(0))
+    for angle in range(30, 421, 30):
+        QTest.mouseMove(dial, at(angle))
+        QApplication.processEvents()
+    assert form.input() == {"a": 360.0}
+    QTest.mouseRelease(dial, Qt.MouseButton.LeftButton, pos=at(420))
+    assert dial.direction(90).x() == pytest.approx(-1)  # left of the robot is left in the drawing
+
+
+def test_an_angle_of_nodding_is_seen_from_the_side(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("pitch", "down", "angle", -40, 36, 2, "°", 8))
+    assert child(form, AngleDial).direction(30).y() > 0.4  # down on the screen
+
+
+# ---- colours ---------------------------------------------------------------------------------------
+
+
+def test_another_colour_comes_from_the_strip_or_by_its_number(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("c", "colour", "colour", default="#35c26b"))
+    choice, strip = child(form, ColourChoice), child(form, HueStrip)
+    assert not strip.isVisible()
+    QTest.mouseClick(choice.other, Qt.MouseButton.LeftButton)
+    assert strip.isVisible()
+    QTest.mouseClick(strip, Qt.MouseButton.LeftButton, pos=QPoint(2, strip.height() // 2))
+    red, green, blue = (int(form.input()["c"][at : at + 2], 16) for at in (1, 3, 5))
+    assert red > 150 > max(green, blue)
+    choice.field.selectAll()
+    QTest.keyClicks(choice.field, "#00ff")
+    assert form.input() == {"c": "#00ff"}  # as it was typed
+    assert form.action.check(form.input())
+    QTest.keyClick(choice.field, Qt.Key.Key_Return)
+    assert "#33aaff" in choice._wrong.text()
+    QTest.keyClicks(choice.field, "80")
+    assert form.input() == {"c": "#00ff80"}
+    assert not choice._wrong.isVisible()
+
+
+# ---- pictures --------------------------------------------------------------------------------------
+
+
+class Cameras:
+    def __init__(self) -> None:
+        self.images = fakes.Images()
+        self.made = fakes.ImageStream("/Pepper/camera")
+
+    def topics(self) -> Sequence[str]:
+        return ["/Pepper/camera"]
+
+    def stream(self, topic: str) -> fakes.ImageStream:
+        assert topic == "/Pepper/camera"
+        return self.made
+
+
+def decoded(value: object) -> QImage:
+    assert isinstance(value, str)
+    head, _, body = value.partition(",")
+    assert head == "data:image/jpeg;base64"
+    return QImage.fromData(base64.b64decode(body))
+
+
+def drawn(path: Path, width: int, height: int) -> Path:
+    image = QImage(width, height, QImage.Format.Format_RGB32)
+    image.fill(Qt.GlobalColor.red)
+    assert image.save(str(path))
+    return path
+
+
+def test_a_picture_file_is_shown_and_sent_as_text_at_most_1280_pixels_wide(qtbot, theme, tmp_path) -> None:
+    form = form_of(qtbot, theme, Parameter("p", "picture", "image", required=True))
+    assert form.input() == {}
+    assert form.action.check(form.input()) == ("do: picture is missing",)
+    choice = child(form, PictureChoice)
+    choice.use_file(drawn(tmp_path / "red.png", 2560, 640))
+    sent = decoded(form.input()["p"])
+    assert (sent.width(), sent.height()) == (1280, 320)
+    assert sent.pixelColor(5, 5).red() > 240
+    assert choice.thumbnail.image is not None
+    assert choice.field.text() == "red.png"
+
+
+def test_a_file_that_is_no_picture_says_so_and_is_not_sent(qtbot, theme, tmp_path) -> None:
+    form = form_of(qtbot, theme, Parameter("p", "picture", "image"))
+    choice = child(form, PictureChoice)
+    (tmp_path / "not.png").write_text("hello")
+    choice.use_file(tmp_path / "not.png")
+    assert choice.sentence == "“not.png” is no picture that can be read."
+    assert choice.thumbnail.image is None
+    assert read_picture(tmp_path / "none.png")[1] == "“none.png” can't be read: no such file or directory."
+    with (tmp_path / "big.png").open("wb") as big:
+        big.truncate(MOST_FILE_BYTES + 1)
+    assert "too large" in read_picture(tmp_path / "big.png")[1]
+
+
+def test_the_newest_picture_of_a_topic_at_the_moment_of_try_is_sent(qtbot, theme) -> None:
+    cameras = Cameras()
+    form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=cameras)
+    choice = child(form, PictureChoice)
+    choice.use_topic("/Pepper/camera")
+    assert form.input() == {}  # none has come yet
+    cameras.made.picture = fakes.picture(320, 240)
+    qtbot.waitUntil(lambda: choice.thumbnail.image is not None, timeout=2000)
+    cameras.made.picture = fakes.picture(160, 120)
+    sent = decoded(form.input()["p"])
+    assert (sent.width(), sent.height()) == (160, 120)
+    form.shut()
+    assert not choice._timer.isActive()
+
+
+def test_an_address_is_sent_as_it_is_and_bare_base64_where_the_robot_wants_it(qtbot, theme, tmp_path) -> None:
+    form = form_of(qtbot, theme, Parameter("p", "picture", "image"))
+    choice = child(form, PictureChoice)
+    QTest.keyClicks(choice.field, "http://robot/cat.png")
+    assert form.input() == {"p": "http://robot/cat.png"}
+    schema = {"type": "string", "contentEncoding": "base64", "contentMediaType": "image/jpeg"}
+    bare = parameter_of("p", schema)
+    assert (bare.kind, bare.bare) == ("image", True)
+    image = QImage(str(drawn(tmp_path / "red.png", 32, 24)))
+    assert QImage.fromData(base64.b64decode(encoded(image, bare=True))).width() == 32
+    linked = parameter_of("p", {"type": "string", "format": "uri-reference", "rb:widget": "image"})
+    assert (linked.kind, linked.bare) == ("image", False)
