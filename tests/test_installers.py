@@ -1,0 +1,67 @@
+"""The pieces that make a double click on a .nepb file open Studio are well formed and agree."""
+
+from __future__ import annotations
+
+import configparser
+import plistlib
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from app.core.behaviour_file import SUFFIX
+
+FOLDER = Path(__file__).parents[1] / "installers"
+TYPE = "application/x-nep-behaviour"
+DESKTOP = FOLDER / "linux" / "nep-studio.desktop"
+MIME = "{http://www.freedesktop.org/standards/shared-mime-info}"
+
+
+def test_the_desktop_file_takes_several_files_of_our_type() -> None:
+    parser = configparser.ConfigParser(interpolation=None)
+    parser.optionxform = str  # type: ignore[assignment,method-assign]
+    parser.read(DESKTOP, "utf-8")
+    entry = parser["Desktop Entry"]
+    assert entry["Type"] == "Application"
+    assert entry["Exec"] == "nep-studio %F"
+    assert entry["MimeType"] == f"{TYPE};"
+    for action in entry["Actions"].split(";"):
+        assert not action or parser[f"Desktop Action {action}"]["Exec"] == "nep-studio --new-window"
+
+
+@pytest.mark.skipif(shutil.which("desktop-file-validate") is None, reason="needs desktop-file-utils")
+def test_the_desktop_file_is_valid() -> None:
+    done = subprocess.run(["desktop-file-validate", DESKTOP], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_linux_knows_the_type_by_its_suffix() -> None:
+    (kind,) = ET.parse(FOLDER / "linux" / "nep-studio-mime.xml").getroot().iter(f"{MIME}mime-type")
+    assert kind.get("type") == TYPE
+    assert [glob.get("pattern") for glob in kind.iter(f"{MIME}glob")] == [f"*{SUFFIX}"]
+
+
+def test_macos_knows_the_type_and_who_opens_it() -> None:
+    content = plistlib.loads((FOLDER / "macos" / "Info.plist").read_bytes())
+    (exported,) = content["UTExportedTypeDeclarations"]
+    (document,) = content["CFBundleDocumentTypes"]
+    assert document["LSItemContentTypes"] == [exported["UTTypeIdentifier"]]
+    tags = exported["UTTypeTagSpecification"]
+    assert tags == {"public.filename-extension": [SUFFIX.lstrip(".")], "public.mime-type": TYPE}
+
+
+def test_windows_opens_the_file_as_one_argument() -> None:
+    text = (FOLDER / "windows" / "nep-studio.reg").read_text("utf-8")
+    assert text.startswith("Windows Registry Editor Version 5.00\n\n")
+    keys = re.findall(r"^\[HKEY_CURRENT_USER\\Software\\Classes\\(.+)\]$", text, re.MULTILINE)
+    assert keys[0] == SUFFIX
+    values = [line for line in text.splitlines() if line and line[0] in '@"']
+    assert values
+    for line in values:
+        assert re.fullmatch(r'(@|"[^"]+")="((?:[^"\\]|\\["\\])*)"', line), line
+    command = text.partition(r"shell\open\command]")[2]
+    assert r"\"%1\"" in command
+    assert f'"Content Type"="{TYPE}"' in text
