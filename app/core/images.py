@@ -1,7 +1,7 @@
 """Picture streams: one thread decodes the newest picture of each topic that somebody looks at.
 
 Older pictures that wait are never decoded: at overload a picture is shown late by one decoding, not by a
-queue.
+queue. A picture is decoded no larger than it is shown (`ImageStream.want`).
 """
 
 from __future__ import annotations
@@ -11,32 +11,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from nep.errors import NepError
+from app.core.pictures import Picture, Size, decode
 from nep.message import Message
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 RATE_WINDOW_S = 2.0
 RATE_DELAY_S = 0.25
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Picture:
-    """One decoded picture.
-
-    ``bgra`` is a contiguous uint8 array (height, width, 4), as QImage.Format_RGB32 reads it.
-    """
-
-    bgra: NDArray[np.uint8]
-    width: int
-    height: int
-    seq: int | None
-    stamp_ns: int | None
-    received_s: float
 
 
 class Rate:
@@ -67,13 +47,18 @@ class Rate:
 
 @dataclass(eq=False)
 class ImageStream:
-    """The pictures of one topic, for one panel. Figures that are not known are None."""
+    """The pictures of one topic, for one panel. Figures that are not known are None.
+
+    While it is `held` the picture stays; what arrives is counted and not decoded.
+    """
 
     topic: str
     _images: Images
     _watch_closed: Callable[[], None]
     picture: Picture | None = None
     error: str | None = None
+    held: bool = False
+    _wish: Size | None = None
     _waiting: tuple[Message, float] | None = None
     _arriving: Rate = field(default_factory=Rate)
     _shown: Rate = field(default_factory=Rate)
@@ -94,6 +79,17 @@ class ImageStream:
         """Seconds since the last picture; None before the first."""
         picture = self.picture
         return self._images.clock() - picture.received_s if picture is not None else None
+
+    def want(self, size: Size | None) -> None:
+        """The picture is shown so large (pixels of the screen); None: every pixel is wanted.
+
+        The picture that is there is decoded again when it was decoded smaller.
+        """
+        self._images.want(self, size)
+
+    def hold(self, held: bool) -> None:
+        """Keep the picture as it is, or let the newest one come again."""
+        self._images.hold(self, held)
 
     def shown(self) -> None:
         """The panel painted `picture` (said once for each)."""
@@ -139,7 +135,8 @@ class Images:
             now = self.clock()
             for message in messages:
                 for stream in self._streams.get(message.topic, ()):
-                    stream._waiting = (message, now)  # noqa: SLF001  one module, one lock
+                    if not stream.held:
+                        stream._waiting = (message, now)  # noqa: SLF001  one module, one lock
                     stream._arriving.add(now)  # noqa: SLF001
             self._arrived.notify()
 
@@ -151,6 +148,26 @@ class Images:
                 self._streams[stream.topic] = left
             else:
                 self._streams.pop(stream.topic, None)
+
+    def want(self, stream: ImageStream, size: Size | None) -> None:
+        """See `ImageStream.want`."""
+        with self.lock:
+            if stream._wish == size:  # noqa: SLF001
+                return
+            stream._wish = size  # noqa: SLF001
+            picture = stream.picture
+            if picture is None or picture.whole or picture.message is None or stream._waiting is not None:  # noqa: SLF001
+                return
+            if _too_small(picture, size):
+                stream._waiting = (picture.message, picture.received_s)  # noqa: SLF001
+                self._arrived.notify()
+
+    def hold(self, stream: ImageStream, held: bool) -> None:
+        """See `ImageStream.hold`."""
+        with self.lock:
+            stream.held = held
+            if held:
+                stream._waiting = None  # noqa: SLF001
 
     def close(self) -> None:
         """End the thread."""
@@ -168,49 +185,51 @@ class Images:
                 if self._closing:
                     return
                 work = self._take_waiting()
-            for streams, message, arrived_s in work:
-                picture, error = decode(message, arrived_s)
-                for stream in streams:
-                    stream.error = error
-                    if picture is not None:
-                        stream.picture = picture
+            for streams, message, arrived_s, size in work:
+                picture, error = decode(message, arrived_s, size)
+                with self.lock:
+                    for stream in streams:
+                        _give(stream, message, picture, error)
 
     def _any_waiting(self) -> bool:
         every = (stream for streams in self._streams.values() for stream in streams)
         return any(stream._waiting is not None for stream in every)  # noqa: SLF001
 
-    def _take_waiting(self) -> list[tuple[list[ImageStream], Message, float]]:
+    def _take_waiting(self) -> list[tuple[list[ImageStream], Message, float, Size | None]]:
         work = []
         for streams in self._streams.values():
             waiting = [stream for stream in streams if stream._waiting is not None]  # noqa: SLF001
             if not waiting:
                 continue
-            newest = waiting[-1]._waiting  # noqa: SLF001
+            of_message: dict[int, list[ImageStream]] = {}
+            for stream in waiting:  # one held back decodes its own picture again
+                of_message.setdefault(id(stream._waiting[0]), []).append(stream)  # type: ignore[index]  # noqa: SLF001
+            for together in of_message.values():
+                message, arrived_s = together[0]._waiting  # type: ignore[misc]  # noqa: SLF001
+                work.append((together, message, arrived_s, _largest(together)))
             for stream in waiting:
                 stream._waiting = None  # noqa: SLF001
-            if newest is not None:
-                work.append((waiting, *newest))
         return work
 
 
-def decode(message: Message, received_s: float) -> tuple[Picture | None, str | None]:
-    """A message as a picture, or the sentence that says why it is none."""
-    import cv2  # noqa: PLC0415  150 MB: loaded when the first picture arrives, not at start
-    import numpy as np  # noqa: PLC0415
+def _give(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
+    before = stream.picture
+    if stream.held and before is not None and before.message is not message:
+        return  # decoded while a person froze the picture before
+    stream.error = error
+    if picture is not None:
+        stream.picture = picture
 
-    try:
-        frame = np.asarray(message.payload)
-    except NepError as error:
-        return None, str(error)
-    if frame.dtype != np.uint8 or frame.ndim not in {2, 3} or 0 in frame.shape:
-        return None, f"'{message.topic}' does not send pictures (shape {frame.shape}, {frame.dtype})"
-    codes = {1: cv2.COLOR_GRAY2BGRA, 3: cv2.COLOR_BGR2BGRA}
-    channels = 1 if frame.ndim == 2 else frame.shape[2]
-    if channels == 4:
-        bgra = np.ascontiguousarray(frame)
-    elif channels in codes:
-        bgra = cv2.cvtColor(frame, codes[channels])
-    else:
-        return None, f"'{message.topic}' has pictures of {channels} channels; 1, 3 or 4 can be shown"
-    height, width = bgra.shape[:2]
-    return Picture(bgra, width, height, message.seq, message.stamp_ns, received_s), None
+
+def _largest(streams: Sequence[ImageStream]) -> Size | None:
+    """How large a picture has to be for all of them; None: every pixel."""
+    wishes = [stream._wish for stream in streams]  # noqa: SLF001
+    known = [wish for wish in wishes if wish is not None]
+    if len(known) < len(wishes):
+        return None
+    return max(wish[0] for wish in known), max(wish[1] for wish in known)
+
+
+def _too_small(picture: Picture, size: Size | None) -> bool:
+    rows, columns = picture.bgra.shape[:2]
+    return size is None or columns < size[0] or rows < size[1]

@@ -115,7 +115,7 @@ def generation_cell(row: NodeRow) -> Cell:
         return Cell(f"{row.way} {rate}/s" if rate else row.way, role=_ink(row, "textTertiary"))
     if row.node.generation in UNSERVED:
         return Cell(generation_words(row.node), "triangle-alert", _ink(row, "warn"))
-    icon = "history" if row.node.is_original else None
+    icon = "plug" if row.node.is_original else None
     return Cell(generation_words(row.node), icon, _ink(row, "textSecondary"))
 
 

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from app.core.images import Images, Rate, decode
+from app.core.images import Images, Rate
+from app.core.pictures import decode
 from nep.message import Message
 
 
@@ -123,3 +124,73 @@ def test_a_picture_is_shown_once_it_was_painted_and_both_figures_speak_of_the_sa
         if number < 85:  # the newest wait for their turn
             shown.add(number / 30)
     assert arriving.per_second(3.0) == shown.per_second(3.0)
+
+
+def large(seq: int, value: int = 9) -> Message:
+    frame = np.full((480, 640, 3), value, np.uint8)
+    return Message(
+        "/camera", frame.tobytes(), "image", "image", seq=seq,
+        extension={"shape": [480, 640, 3], "encoding": "bgr8"},
+    )  # fmt: skip
+
+
+def test_a_picture_is_decoded_as_large_as_it_is_shown_and_again_when_more_is_wanted(images: Images) -> None:
+    stream = images.stream("/camera")
+    stream.want((160, 120))
+    images.offer([large(1)])
+    until(lambda: stream.picture is not None)
+    assert stream.picture is not None
+    assert stream.picture.bgra.shape == (120, 160, 4)
+    stream.want(None)
+    until(lambda: stream.picture is not None and stream.picture.whole)
+    assert stream.picture.seq == 1
+    stream.want((100, 80))  # the next one is smaller; this one is good enough
+    assert stream.picture.whole
+    images.offer([large(2)])
+    until(lambda: stream.picture is not None and stream.picture.seq == 2)
+    assert not stream.picture.whole
+
+
+def test_of_two_panels_the_one_that_wants_more_decides(images: Images) -> None:
+    small, whole = images.stream("/camera"), images.stream("/camera")
+    small.want((160, 120))
+    images.offer([large(1)])
+    until(lambda: small.picture is not None and whole.picture is not None)
+    assert small.picture is whole.picture
+    assert small.picture is not None
+    assert small.picture.whole
+
+
+def test_a_held_picture_stays_is_decoded_whole_on_demand_and_arrivals_are_counted(images: Images) -> None:
+    stream, other = images.stream("/camera"), images.stream("/camera")
+    for each in (stream, other):
+        each.want((160, 120))
+    images.offer([large(1)])
+    until(lambda: stream.picture is not None)
+    stream.hold(True)
+    images.offer([large(2)])
+    until(lambda: other.picture is not None and other.picture.seq == 2)
+    assert stream.picture is not None
+    assert stream.picture.seq == 1
+    stream.want(None)
+    until(lambda: stream.picture is not None and stream.picture.whole)
+    assert stream.picture.seq == 1
+    until(lambda: stream.arriving_hz is not None)
+    stream.hold(False)
+    images.offer([large(3)])
+    until(lambda: stream.picture is not None and stream.picture.seq == 3)
+
+
+def test_pictures_are_decoded_in_the_decoders_thread(images: Images) -> None:
+    seen: list[int] = []
+
+    class Extension(dict[str, object]):
+        def get(self, key: str, default: object = None) -> object:  # type: ignore[override]
+            seen.append(threading.get_ident())
+            return super().get(key, default)
+
+    stream = images.stream("/camera")
+    images.offer([Message("/camera", b"no picture at all", "image", "image", extension=Extension())])
+    until(lambda: stream.error is not None)
+    assert seen
+    assert threading.get_ident() not in seen

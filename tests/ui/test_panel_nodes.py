@@ -157,7 +157,7 @@ def test_generations_have_words(generation, words, version) -> None:
     node = NodeEntry("1", "old", generation=generation)
     assert generation_cell(NodeRow(node)).text == words
     assert version in limits_of(node)
-    assert generation_cell(NodeRow(node)).icon == "history"
+    assert generation_cell(NodeRow(node)).icon == "plug"
     assert limits_of(NodeEntry("1", "new")) == ""
 
 

@@ -1,0 +1,127 @@
+"""Messages as pictures: their colours and numbers, decoded as large as they are shown."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from app.core.pictures import decode, png_of
+from nep.errors import DecodeError
+from nep.message import Message
+
+
+def message(data: bytes, **extension: object) -> Message:
+    return Message("/camera", data, "image", "image", seq=3, stamp_ns=5, extension=extension)
+
+
+def scene(width: int, height: int) -> np.ndarray:
+    frame = np.zeros((height, width, 3), np.uint8)
+    frame[:, : width // 2] = (10, 20, 200)
+    frame[:, width // 2 :] = (30, 180, 40)
+    return frame
+
+
+def encoded(frame: np.ndarray, kind: str = "png") -> Message:
+    data = cv2.imencode(f".{kind}", frame)[1].tobytes()
+    return message(data, shape=[*frame.shape[:2], 3], encoding="jpeg" if kind == "jpg" else kind)
+
+
+def raw(frame: np.ndarray, encoding: str) -> Message:
+    return message(frame.tobytes(), shape=list(frame.shape), encoding=encoding)
+
+
+def test_all_of_a_picture_is_decoded_when_nobody_says_how_large_it_is_shown() -> None:
+    picture, error = decode(encoded(scene(32, 24)), 7.0)
+    assert error is None
+    assert picture is not None
+    assert (picture.width, picture.height, picture.seq, picture.stamp_ns, picture.received_s) == (
+        32,
+        24,
+        3,
+        5,
+        7.0,
+    )
+    assert picture.whole
+    assert picture.pixel(0, 0) == (200, 20, 10)
+    assert picture.pixel(31, 23) == (40, 180, 30)
+    assert picture.pixel(32, 0) is None
+
+
+@pytest.mark.parametrize("kind", ["jpg", "png", "bgr8", "rgb8"])
+def test_a_small_view_gets_a_small_picture_of_the_same_content(kind: str) -> None:
+    frame = scene(640, 480)
+    sent = raw(frame, kind) if kind.endswith("8") else encoded(frame, kind)
+    picture, _ = decode(sent, 0.0, (150, 100))
+    assert picture is not None
+    assert (picture.width, picture.height) == (640, 480)
+    assert picture.bgra.shape == (120, 160, 4)
+    assert not picture.whole
+    assert picture.pixel(3, 3) is None  # nobody decoded it
+    red = (200, 20, 10) if kind == "rgb8" else (10, 20, 200)
+    assert np.abs(picture.bgra[60, 10, :3].astype(int) - red).max() < 6
+    assert picture.bgra[60, 10, 3] == 255
+
+
+def test_a_view_of_more_than_half_the_size_gets_every_pixel() -> None:
+    picture, _ = decode(encoded(scene(640, 480), "jpg"), 0.0, (321, 241))
+    assert picture is not None
+    assert picture.whole
+
+
+def test_grey_and_depth_have_numbers() -> None:
+    grey = np.arange(24, dtype=np.uint8).reshape(4, 6)
+    depth = (grey.astype(np.uint16) + 1) * 1000
+    for sent, wanted in ((raw(grey, "mono8"), 23), (encoded(grey), 23), (encoded(depth), 24_000)):
+        picture, error = decode(sent, 0.0)
+        assert error is None
+        assert picture is not None
+        assert picture.pixel(5, 3) == wanted
+        assert picture.bgra.shape == (4, 6, 4)
+    small, _ = decode(raw(np.zeros((400, 600), np.uint8), "mono8"), 0.0, (60, 40))
+    assert small is not None
+    assert small.bgra.shape == (50, 75, 4)
+    assert small.numbers is None
+
+
+@pytest.mark.parametrize(
+    ("sent", "words"),
+    [
+        (message(b""), "nothing in it"),
+        (message(b"no picture"), "no picture"),
+        (message(b"123", shape=[4, 6], encoding="mono8"), "another size"),
+        (message(b"123", shape="wide", encoding="bgr8"), "no shape"),
+        (message(b"\x89PNG\r\n\x1a\n" + b"\0" * 40), "no picture"),
+    ],
+)
+def test_what_is_no_picture_is_a_sentence(sent: Message, words: str) -> None:
+    picture, error = decode(sent, 0.0)
+    assert picture is None
+    assert error is not None
+    assert words in error
+
+
+def test_a_head_that_tells_of_too_many_pixels_is_a_sentence_and_no_crash() -> None:
+    data = bytearray(cv2.imencode(".png", scene(8, 8))[1].tobytes())
+    data[16:24] = (60_000).to_bytes(4, "big") * 2
+    import zlib
+
+    data[29:33] = zlib.crc32(bytes(data[12:29])).to_bytes(4, "big")
+    picture, error = decode(message(bytes(data)), 0.0)
+    assert picture is None
+    assert error
+
+
+def test_a_snapshot_is_what_was_received() -> None:
+    frame = scene(64, 48)
+    png = encoded(frame)
+    assert png_of(png) == bytes(png.data)
+    for sent in (raw(frame, "bgr8"), raw(frame[:, :, ::-1].copy(), "rgb8")):
+        assert np.array_equal(
+            cv2.imdecode(np.frombuffer(png_of(sent), np.uint8), cv2.IMREAD_UNCHANGED), frame
+        )
+    jpeg = encoded(frame, "jpg")
+    back = cv2.imdecode(np.frombuffer(png_of(jpeg), np.uint8), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(back, cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
+    with pytest.raises(DecodeError):
+        png_of(message(b"nothing"))
