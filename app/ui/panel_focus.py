@@ -12,7 +12,7 @@ from app.ui.workbench import Workbench
 
 
 class PanelFocus(QObject):
-    """Gives the keyboard to panels of the workbench that shows; the title of the one that has it is marked."""
+    """Gives the keyboard to panels of the workbench that shows; marks the title of who has it."""
 
     def __init__(self, bench: Callable[[], Workbench | None], parent: QObject) -> None:
         """``bench`` gives the workbench that shows, None when there is none."""

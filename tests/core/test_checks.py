@@ -100,12 +100,6 @@ def test_a_large_message_is_left_to_who_shows_it() -> None:
     assert checks.take()["/a"].bad == 0
 
 
-def test_the_newest_message_stays_decoded_for_the_panels() -> None:
-    batch = messages(GOOD, GOOD)
-    Checks().look("/a", batch)
-    assert [message._payload == {"n": 1} for message in batch] == [False, True]
-
-
 def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
     checks = Checks()
     done = threading.Event()
