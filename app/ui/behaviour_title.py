@@ -17,6 +17,8 @@ class BehaviourTitle(QWidget):
         self.tabs = BehaviourTabs(theme)
         self.undo = IconButton(theme, "rotate-ccw", "Undo", "Ctrl+Z", size=32)
         self.redo = IconButton(theme, "rotate-cw", "Redo", "Ctrl+Shift+Z", size=32)
+        self.undo.setProperty("command", "edit.undo")
+        self.redo.setProperty("command", "edit.redo")
         self.copy = Button(theme, "Copy", "copy", size="small")
         self.copy.setAccessibleName("Copy the program")
         self.copy.hide()

@@ -62,6 +62,7 @@ class Commands:
             "topic.open": self._inspect,
             "block": self._show_block,
             "connect": self._connect_robot,
+            "key": lambda key: self.actions.run(self.habits.shortcuts.holder(key)),
             "run.confirm": lambda _nothing: self._session.runs.confirm_still(),
             **self.tabs.asked(),
         }

@@ -92,12 +92,12 @@ class Overlay(QWidget):
         self._scrim.surface = self
         self._scrim.pressed.connect(self.shut)
         self._before: QWidget | None = None
-        self._motion = QVariantAnimation(self)
-        self._motion.setStartValue(0.0)
-        self._motion.setEndValue(1.0)
-        self._motion.setEasingCurve(QEasingCurve.Type.OutCubic)
-        self._motion.valueChanged.connect(self._move_on)
-        self._motion.finished.connect(self._arrived)
+        self._opening = QVariantAnimation(self)
+        self._opening.setStartValue(0.0)
+        self._opening.setEndValue(1.0)
+        self._opening.setEasingCurve(QEasingCurve.Type.OutCubic)
+        self._opening.valueChanged.connect(self._move_on)
+        self._opening.finished.connect(self._arrived)
         theme.changed.connect(self.place)
         self.hide()
 
@@ -123,8 +123,8 @@ class Overlay(QWidget):
         if duration:
             self.setGraphicsEffect(QGraphicsOpacityEffect(self))
             self._move_on(0.0)
-            self._motion.setDuration(duration)
-            self._motion.start()
+            self._opening.setDuration(duration)
+            self._opening.start()
         else:
             self._scrim.set_strength(1.0)
         self.show()
@@ -143,7 +143,7 @@ class Overlay(QWidget):
         if isinstance(application, QApplication):
             application.focusChanged.disconnect(self._focus_changed)
         self.window_below().removeEventFilter(self)
-        self._motion.stop()
+        self._opening.stop()
         self._arrived()
         before = self._before
         if inside and before is not None and isValid(before) and before.isVisible():

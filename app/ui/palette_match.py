@@ -15,6 +15,7 @@ from operator import attrgetter
 WHOLE, WORD, INSIDE, SPREAD = 100.0, 80.0, 55.0, 40.0
 LEAST_SPREAD = 0.6  # share of the letters that begin a word or follow the letter before
 PER_LETTER = 0.05
+LATER = 5.0  # what can't be done now stands below what fits as well
 Span = tuple[int, int]
 
 
@@ -147,7 +148,7 @@ class Finder:
             fits = match(query, entry.words)
             if fits is not None:
                 count += 1
-                score = fits[0] - (0.5 if entry.reason else 0.0)
+                score = fits[0] - (LATER if entry.reason else 0.0)
                 kinds.setdefault(entry.kind, []).append(Found(entry, score, fits[1]))
         best = [heapq.nlargest(most, found, key=attrgetter("score")) for found in kinds.values()]
         best.sort(key=lambda found: -found[0].score)

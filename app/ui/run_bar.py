@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from app.core.run_view import RunView
 from app.ui.run_parts import Bar, Mark, Result, Sentence
 from app.ui.theme import Theme
-from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, paint
+from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, name_command, paint
 
 ROOM_PX = 960  # what the bar needs at 100 % text
 
@@ -29,9 +29,9 @@ class RunBar(Bar):
         self.run = RunButton(theme, "Run", "play", widest="Go on")
         self.pause = RunButton(theme, "Pause", "pause")
         self.step = RunButton(theme, "Step", "step-forward")
-        self.run.setToolTip("Runs the behaviour (F5)")
-        self.pause.setToolTip("Holds the program; robots hold still (F8)")
-        self.step.setToolTip("Runs one block (F10)")
+        name_command(self.run, "run.run", "Runs the behaviour", "F5")
+        name_command(self.pause, "run.pause", "Holds the program; robots hold still", "F8")
+        name_command(self.step, "run.step", "Runs one block", "F10")
         self.mark = Mark(theme)
         self.sentence = Sentence(theme)
         self.result = Result(theme)
@@ -108,6 +108,9 @@ class ToolBar(Bar):
         self.run.fill_icon = True
         self.pause = IconButton(theme, "pause", "Pause", "F8")
         self.step = IconButton(theme, "step-forward", "Step", "F10")
+        name_command(self.run, "run.run", "Runs the behaviour", "F5")
+        name_command(self.pause, "run.pause", "Pause", "F8")
+        name_command(self.step, "run.step", "Step", "F10")
         self.stop = StopButton(theme, "toolBar")
         self.tools = QHBoxLayout()
         self._build()

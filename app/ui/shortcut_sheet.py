@@ -26,6 +26,7 @@ ONLY_MODIFIERS = frozenset(
         Qt.Key.Key_unknown,
     }
 )
+PLACES = {"file": "File", "panel": "Panels", "edit": "Edit"}
 HINT = "Enter or a click gives a command another key. Delete takes its key away."
 WAITING = "Press the new key for “{0}”. Esc leaves it as it is."
 
@@ -122,15 +123,18 @@ class ShortcutSheet(Overlay):
         self._chosen()
 
     def _all(self) -> list[tuple[str, Entry]]:
-        found = []
+        groups: dict[str, list[Entry]] = {}
         for row in self._shortcuts.rows.values():
             keys = "\n".join(self._shortcuts.of(row.name))
             note = "yours" if self._shortcuts.own(row.name) else ""
-            found.append((row.menu or "Panels", Entry(f"command:{row.name}", row.text, "", note, keys)))
+            group = groups.setdefault(row.menu or PLACES.get(row.name.partition(".")[0], "View"), [])
+            group.append(Entry(f"command:{row.name}", row.text, "", note, keys))
         for number, fixed in enumerate(FIXED):
             keys = "\n".join(fixed.key.split(", "))
-            found.append((fixed.place, Entry(f"fixed:{number}", fixed.words, "", "stays", keys)))
-        return found
+            groups.setdefault(fixed.place, []).append(
+                Entry(f"fixed:{number}", fixed.words, "", "stays", keys)
+            )
+        return [(heading, entry) for heading, entries in groups.items() for entry in entries]
 
     def _chosen(self) -> None:
         entry = self.rows.entry

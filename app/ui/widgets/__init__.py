@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.ui.widgets.button import Button as Button
 from app.ui.widgets.button import IconButton as IconButton
+from app.ui.widgets.button import name_command as name_command
 from app.ui.widgets.chip import Chip as Chip
 from app.ui.widgets.choices import Choice as Choice
 from app.ui.widgets.choices import ColourSwatches as ColourSwatches

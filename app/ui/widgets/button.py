@@ -41,6 +41,13 @@ _COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] 
 }
 
 
+def name_command(widget: QWidget, command: str, tip: str, key: str = "") -> None:
+    """Say which command a button does; its tooltip follows the key that a person gives the command."""
+    widget.setProperty("command", command)
+    widget.setProperty("tip", tip)
+    widget.setToolTip(f"{tip} ({key})" if key else tip)
+
+
 class Button(QAbstractButton):
     """A button with a word and perhaps an icon; filled kinds are for the one thing most people want next."""
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from app.ui.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.button import Button
+from app.ui.widgets.button import Button, name_command
 
 Place = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
@@ -68,7 +68,7 @@ class StopButton(QAbstractButton):
         self.filled = True
         self.setText("Stop")
         self.setAccessibleName("Stop")
-        self.setToolTip("Stops the program and every robot (F12)")
+        name_command(self, "run.stop", "Stops the program and every robot", "F12")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)

@@ -1,0 +1,178 @@
+"""Layouts are kept as they were left, have names of their own, and survive damaged settings."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.core.session import Session
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+from app.ui.name_sheet import NameSheet
+from app.ui.theme import Theme
+from tests.ui.shell_parts import PANELS, Answers
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.fixture
+def shown(qtbot, window: MainWindow, commands: Commands) -> MainWindow:
+    window.theme.set_motion("on")
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run("layout.developer")
+    return window
+
+
+def opened(window: MainWindow) -> set[str]:
+    assert window.bench is not None
+    return set(window.bench.open_names())
+
+
+def keep_as(window: MainWindow, commands: Commands, name: str) -> NameSheet:
+    commands.run("layout.keep")
+    sheet = window.findChild(NameSheet)
+    assert sheet is not None
+    sheet.field.setText(name)
+    QTest.keyClick(sheet.field, Qt.Key.Key_Return)
+    return sheet
+
+
+def menu(window: MainWindow, commands: Commands) -> dict[str, bool]:
+    commands.habits._lists._list_layouts()
+    entries = commands.habits._lists._layouts.actions()
+    return {entry.text(): entry.isChecked() for entry in entries if not entry.isSeparator()}
+
+
+def use(window: MainWindow, commands: Commands, name: str) -> None:
+    menu(window, commands)
+    next(e for e in commands.habits._lists._layouts.actions() if e.text() == name).trigger()
+
+
+def test_a_layout_gets_a_name_and_the_built_in_one_stays(shown: MainWindow, commands: Commands) -> None:
+    before = opened(shown)
+    keep_as(shown, commands, "Only topics")
+    assert shown.toast.text == "Kept the layout “Only topics”"
+    for name in before - {"topics"}:
+        shown.bench.docks[name].close()
+    assert menu(shown, commands) == {"Behaviour": False, "Developer": False, "Only topics": True}
+    use(shown, commands, "Developer")
+    assert opened(shown) == before
+    use(shown, commands, "Only topics")
+    assert opened(shown) == {"topics"}
+
+
+def test_names_that_cant_be_are_said(shown: MainWindow, commands: Commands) -> None:
+    sheet = keep_as(shown, commands, "developer")
+    assert sheet.isVisible()
+    assert sheet.wrong.text() == "“developer” is there already."
+    sheet.field.setText("x" * 41)
+    QTest.keyClick(sheet.field, Qt.Key.Key_Return)
+    assert "40 letters" in sheet.wrong.text()
+    sheet.field.setText("  ")
+    QTest.keyClick(sheet.field, Qt.Key.Key_Return)
+    assert sheet.wrong.text() == "A layout needs a name."
+    QTest.keyClick(sheet.field, Qt.Key.Key_Escape)
+    assert not sheet.isVisible()
+    assert shown.arrangements.all() == ()
+
+
+def test_a_layout_is_renamed(shown: MainWindow, commands: Commands) -> None:
+    keep_as(shown, commands, "One")
+    commands.run("layout.rename")
+    sheet = shown.findChild(NameSheet)
+    assert sheet is not None
+    assert sheet.field.text() == "One"
+    sheet.field.setText("Two")
+    QTest.keyClick(sheet.field, Qt.Key.Key_Return)
+    assert [own.name for own in shown.arrangements.all()] == ["Two"]
+    assert shown.arrangements.own("developer") == "Two"
+
+
+def test_a_deleted_layout_comes_back_by_undo(shown: MainWindow, commands: Commands) -> None:
+    keep_as(shown, commands, "One")
+    shown.bench.docks["console"].close()
+    small = opened(shown)
+    commands.run("layout.delete")
+    assert shown.arrangements.all() == ()
+    assert opened(shown) > small
+    QTest.mouseClick(shown.toast.button, Qt.MouseButton.LeftButton)
+    assert [own.name for own in shown.arrangements.all()] == ["One"]
+    assert shown.arrangements.own("developer") == "One"
+    assert opened(shown) == small
+
+
+def test_the_next_start_shows_the_same_layout(
+    qtbot, shown: MainWindow, commands: Commands, session: Session, theme: Theme
+) -> None:
+    keep_as(shown, commands, "Mine")
+    shown.bench.docks["console"].close()
+    left = opened(shown)
+    shown.close()
+    other = MainWindow(session, theme, PANELS, [])
+    qtbot.addWidget(other)
+    again = Commands(other, Answers())
+    again.run("layout.developer")
+    assert other.arrangements.own("developer") == "Mine"
+    assert opened(other) == left
+    use(other, again, "Developer")
+    assert "console" in opened(other)
+
+
+DAMAGED: tuple[object, ...] = (
+    {"open": "x"},
+    {"open": ["topics"], "docks": "no base64"},
+    {"open": ["topics"], "docks": "AAAA", "panels": 7},
+    {"open": [1, None, "no such panel"], "docks": 12, "wide": []},
+    {"base": "developer"},
+)
+
+
+@pytest.mark.parametrize("damaged", DAMAGED)
+def test_a_damaged_layout_is_as_at_first_and_said_in_the_console(
+    qtbot, session: Session, theme: Theme, damaged: object
+) -> None:
+    session.settings.set("layouts", {"developer": damaged, "own:": 3, "own:Old": {"base": "gone"}})
+    window = MainWindow(session, theme, PANELS, [])
+    qtbot.addWidget(window)
+    Commands(window, Answers()).run("layout.developer")
+    assert {"topics", "inspector", "image", "console"} <= opened(window)
+    said = [record.text for record in session.console.records]
+    assert "The layout “developer” could not be put back; it is as at first." in said
+    assert window.arrangements.all() == ()
+    window.close()
+
+
+def test_settings_of_another_kind_change_nothing(qtbot, session: Session, theme: Theme) -> None:
+    session.settings.set("layouts", cast("object", "none"))
+    session.settings.set("chosen_layouts", {"developer": 5})
+    window = MainWindow(session, theme, PANELS, [])
+    qtbot.addWidget(window)
+    Commands(window, Answers()).run("layout.developer")
+    assert "topics" in opened(window)
+    window.close()
+
+
+def test_what_does_not_apply_is_grey_in_the_menu(shown: MainWindow, commands: Commands) -> None:
+    lists = commands.habits._lists
+    lists._refresh("View")
+    assert not commands.actions["layout.delete"].isEnabled()
+    assert not commands.actions["text.smaller"].isEnabled()
+    assert commands.actions["run.stop"].isEnabled()
+    commands.actions.enable_all()
+    keep_as(shown, commands, "One")
+    lists._refresh("View")
+    assert commands.actions["layout.delete"].isEnabled()
+    commands.actions.enable_all()
+
+
+def test_the_palette_shows_own_layouts(shown: MainWindow, commands: Commands) -> None:
+    keep_as(shown, commands, "Two cameras")
+    use(shown, commands, "Developer")
+    found = {entry.words: entry for entry in commands.habits._offers.all()}
+    commands.habits.do(found["Two cameras"])
+    assert shown.arrangements.own("developer") == "Two cameras"

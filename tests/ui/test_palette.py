@@ -1,0 +1,276 @@
+"""The command palette: what it finds, in which order, what it does, and what stays alive under it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from app.core.settings import RecentFile
+from app.core.topics import Topic
+from app.ui.commands import Commands
+from app.ui.entry_list import Heading
+from app.ui.main_window import MainWindow
+from app.ui.palette import Palette
+from app.ui.palette_match import Entry, Finder, Found, match
+from tests.ui.shell_parts import PlainPanel
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+CTRL = Qt.KeyboardModifier.ControlModifier
+
+
+def found(*words: str, query: str) -> list[str]:
+    entries = [Entry(f"command:{each}", each) for each in words]
+    return [each.entry.words for each in Finder(entries).find(query, 20)[0]]
+
+
+def bold(query: str, words: str) -> str:
+    fits = match(query, words)
+    assert fits is not None
+    return "|".join(words[begin:end] for begin, end in fits[1])
+
+
+def test_the_beginning_of_a_word_is_better_than_its_middle() -> None:
+    assert found("Unsaved", "Save", "Auto save", query="save") == ["Save", "Auto save", "Unsaved"]
+
+
+def test_letters_that_fit_are_told() -> None:
+    assert bold("reco", "Keep the last 60 s of the recording") == "reco"
+    assert bold("pb", "Put the panels back") == "P|b"
+    assert bold("text larger", "Larger text") == "Larger|text"
+    assert bold("ab", "ÄAB") == "AB"
+
+
+@pytest.mark.parametrize("query", ["xyz", "savex", "zz top", "keyboard mouse"])
+def test_what_does_not_fit_is_not_found(query: str) -> None:
+    assert found("Save", "Keyboard shortcuts", "Stop the program", query=query) == []
+
+
+def test_scattered_letters_do_not_fit() -> None:
+    assert found("Show the inside of every panel that is open", query="hif") == []
+
+
+def test_a_longer_query_finds_what_a_new_search_finds() -> None:
+    entries = [Entry(f"topic:/robot/{n}/camera", f"/robot/{n}/camera") for n in range(50)]
+    growing = Finder(entries)
+    for end in range(1, 9):
+        growing.find("camera 7"[:end], 40)
+    assert growing.find("camera 7", 40) == Finder(entries).find("camera 7", 40)
+    assert growing.find("", 40)[1] == 50
+
+
+def test_ten_thousand_topics_are_searched_within_a_frame_or_two() -> None:
+    finder = Finder(
+        [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
+    )
+    times = []
+    for query in ("j", "jo", "joi", "joint", "joint 9", "robot9999"):
+        began = time.perf_counter()
+        rows, count = finder.find(query, 40)
+        times.append(time.perf_counter() - began)
+        assert len(rows) <= 40 <= count or count == len(rows)
+    assert min(times) < 0.2  # a person does not see it; the bound is wide for a busy machine
+
+
+# -- in the window --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def palette(qtbot, window: MainWindow, commands: Commands) -> Palette:
+    """The palette, open over the Developer layout."""
+    window.theme.set_motion("on")
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run("layout.developer")
+    QTest.keyClick(window, Qt.Key.Key_K, CTRL)
+    made = window.findChild(Palette)
+    assert made is not None
+    assert made.isVisible()
+    return made
+
+
+def words(palette: Palette) -> list[str]:
+    return [line.entry.words for line in palette.rows.lines.lines if isinstance(line, Found)]
+
+
+def headings(palette: Palette) -> list[str]:
+    return [line.words for line in palette.rows.lines.lines if isinstance(line, Heading)]
+
+
+def test_it_is_640_wide_128_from_the_top_and_has_the_keyboard(palette: Palette, window: MainWindow) -> None:
+    assert (palette.width(), palette.y()) == (640, 128)
+    assert abs(palette.geometry().center().x() - window.rect().center().x()) <= 1
+    assert palette.field.hasFocus()
+    assert palette.rows.entry is not None
+
+
+def test_it_opens_in_120_ms_and_at_once_with_less_motion(qtbot, palette: Palette, window: MainWindow) -> None:
+    assert palette.graphicsEffect() is None
+    palette.shut()
+    window.theme.set_motion("off")
+    palette.open()
+    assert palette._opening.duration() == 120
+    qtbot.waitUntil(lambda: palette.graphicsEffect() is None)
+
+
+def test_stop_stays_bright_and_can_be_pressed(palette: Palette, window: MainWindow) -> None:
+    stop = window.tool_bar.stop
+    middle = stop.mapTo(window, stop.rect().center())
+    assert window.childAt(middle) is stop
+    beside = stop.mapTo(window, QPoint(-30, stop.height() // 2))
+    assert window.childAt(beside) is palette._scrim
+    pressed: list[str] = []
+    window.tool_bar.stop_pressed.connect(lambda: pressed.append("stop"))
+    QTest.mouseClick(stop, Qt.MouseButton.LeftButton)
+    assert pressed == ["stop"]
+
+
+def test_f12_stops_while_it_is_open(palette: Palette, commands: Commands) -> None:
+    stops: list[str] = []
+    commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
+    QTest.keyClick(palette.field, Qt.Key.Key_F12)
+    assert stops == ["stop"]
+    assert palette.isVisible()
+
+
+def test_a_command_is_found_and_done(palette: Palette, window: MainWindow) -> None:
+    QTest.keyClicks(palette.field, "dark")
+    assert words(palette)[0] == "Dark"
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    assert not palette.isVisible()
+    assert window.theme.dark
+    palette.open()
+    assert headings(palette)[0] == "Recently used"
+    assert words(palette)[0] == "Dark"
+
+
+def test_what_was_used_is_known_after_a_new_start(palette: Palette, window: MainWindow) -> None:
+    QTest.keyClicks(palette.field, "larger")
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    assert window.session.settings.get("palette_last", []) == ["command:text.larger"]
+
+
+def test_keys_choose(palette: Palette) -> None:
+    order = words(palette)
+
+    def chosen_after(key: Qt.Key) -> str:
+        QTest.keyClick(palette.field, key)
+        entry = palette.rows.entry
+        assert entry is not None
+        return entry.words
+
+    assert chosen_after(Qt.Key.Key_Down) == order[1]
+    assert chosen_after(Qt.Key.Key_Up) == order[0]
+    assert chosen_after(Qt.Key.Key_Up) == order[0]
+    page = order.index(chosen_after(Qt.Key.Key_PageDown))
+    assert 3 < page < 20
+    assert chosen_after(Qt.Key.Key_End) == order[-1]
+    assert chosen_after(Qt.Key.Key_Home) == order[0]
+
+
+def test_esc_and_ctrl_k_close_it_and_the_keyboard_goes_back(palette: Palette, window: MainWindow) -> None:
+    palette.shut()
+    panel = window.benches["developer"].docks["topics"].panel
+    assert isinstance(panel, PlainPanel)
+    panel.filter.setFocus()
+    palette.open()
+    QTest.keyClick(palette.field, Qt.Key.Key_Escape)
+    assert not palette.isVisible()
+    assert panel.filter.hasFocus()
+    palette.open()
+    QTest.keyClick(palette.field, Qt.Key.Key_K, CTRL)
+    assert not palette.isVisible()
+
+
+def test_a_click_beside_it_closes_it(palette: Palette) -> None:
+    QTest.mouseClick(palette._scrim, Qt.MouseButton.LeftButton, pos=QPoint(20, 400))
+    assert not palette.isVisible()
+
+
+def test_tab_stays_inside(palette: Palette) -> None:
+    for _ in range(3):
+        QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+        focus = QApplication.focusWidget()
+        assert focus is not None
+        assert palette.isAncestorOf(focus)
+
+
+def test_panels_topics_and_files_are_found(palette: Palette, window: MainWindow, tmp_path: Path) -> None:
+    palette.shut()
+    topics = window.session.topics
+    topics._topics["/faces"] = Topic("/faces", "json", "json")
+    topics.revision += 1
+    file = tmp_path / "faces.nepb"
+    file.write_text("{}", "utf-8")
+    gone = RecentFile(tmp_path / "gone" / "old faces.nepb", "old faces", 0.0)
+    window.session.settings.set_recent([RecentFile(file, "faces", 0.0), gone])
+    palette.open()
+    QTest.keyClicks(palette.field, "faces")
+    assert {"Topics", "Recent files"} <= set(headings(palette))
+    lines = {line.entry.words: line.entry for line in palette.rows.lines.lines if isinstance(line, Found)}
+    assert lines["old faces"].reason == "Not in gone any more"
+    assert lines["faces"].reason == ""
+    palette.field.setText("/faces")
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    inspector = window.benches["developer"].docks["inspector"].panel
+    assert isinstance(inspector, PlainPanel)
+    assert inspector.topics == ["/faces"]
+    palette.open()
+    palette.field.setText("console")
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    dock = window.panel_focus.dock()
+    assert dock is not None
+    assert dock.description.name == "console"
+
+
+def test_what_cant_be_done_says_why_and_is_not_done(palette: Palette, window: MainWindow) -> None:
+    palette.field.setText("smaller text")
+    entry = palette.rows.entry
+    assert entry is not None
+    assert entry.reason == "Text is as small as it gets"
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    assert palette.isVisible()
+    assert window.theme.text_percent == 100
+
+
+def test_nothing_found_is_said(palette: Palette) -> None:
+    palette.field.setText("qqqq")
+    assert palette.rows.entry is None
+    assert palette.nothing.text() == "Nothing is called “qqqq”."
+    assert palette.nothing.isVisible()
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    assert palette.isVisible()
+
+
+def test_it_stays_small_with_very_many_topics(palette: Palette, window: MainWindow) -> None:
+    palette.shut()
+    for number in range(10_000):
+        window.session.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")
+    window.session.topics.revision += 1
+    palette.open()
+    assert len(palette.rows.lines.lines) < 120
+    QTest.keyClicks(palette.field, "t9")
+    assert len(palette.rows.lines.lines) < 120
+    assert palette.foot.counted.endswith(f" of {len(palette._finder.entries)}")
+    assert palette.height() < 600
+
+
+def test_a_screen_reader_hears_words_key_and_reason(palette: Palette) -> None:
+    palette.field.setText("stop the program")
+    index = palette.rows.currentIndex()
+    spoken = index.data(Qt.ItemDataRole.AccessibleTextRole)
+    assert spoken == "Stop the program and all robots, Run, key F12"
+    assert palette.field.accessibleName()
+    assert palette.accessibleName() == "Command palette"
+
+
+def test_the_field_in_the_app_bar_opens_it(palette: Palette, window: MainWindow) -> None:
+    palette.shut()
+    assert window.bar.find.toolTip() == "Find a command or panel (Ctrl K)"
+    QTest.mouseClick(window.bar.find, Qt.MouseButton.LeftButton)
+    assert palette.isVisible()

@@ -1,0 +1,241 @@
+"""Shortcuts: one table, each key changeable, Stop's F12 never."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QKeyCombination, Qt
+from PySide6.QtGui import QKeySequence
+from PySide6.QtTest import QTest
+
+from app.core.settings import Settings
+from app.ui.actions import TABLE
+from app.ui.commands import Commands
+from app.ui.entry_list import Heading
+from app.ui.main_window import MainWindow
+from app.ui.palette import Palette
+from app.ui.palette_match import Found
+from app.ui.shortcut_sheet import ShortcutSheet
+from app.ui.shortcuts import FIXED, Shortcuts
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+CTRL = Qt.KeyboardModifier.ControlModifier
+NONE = Qt.KeyboardModifier.NoModifier
+
+
+@pytest.fixture
+def keys(qapp: object, tmp_path: Path) -> Shortcuts:
+    return Shortcuts(Settings(tmp_path), lambda _sentence: None)
+
+
+def test_no_two_commands_have_the_same_key_at_first(keys: Shortcuts) -> None:
+    given = [key for row in TABLE for key in keys.of(row.name)]
+    assert sorted(given) == sorted(set(given))
+    assert all(key == QKeySequence(key).toString() for key in given)
+
+
+def test_a_new_key_is_kept(keys: Shortcuts, tmp_path: Path) -> None:
+    keys.give("file.save", "Ctrl+Alt+S")
+    again = Shortcuts(Settings(tmp_path), lambda _sentence: None)
+    assert again.of("file.save") == ("Ctrl+Alt+S",)
+    assert again.own("file.save")
+    assert not again.own("file.open")
+
+
+def test_a_key_leaves_the_command_that_had_it(keys: Shortcuts) -> None:
+    keys.give("file.open", "Ctrl+S")
+    assert keys.of("file.save") == ()
+    assert keys.holder("Ctrl+S") == "file.open"
+
+
+def test_two_commands_swap(keys: Shortcuts) -> None:
+    keys.swap("file.open", "Ctrl+S")
+    assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+S",), ("Ctrl+O",))
+
+
+def test_one_or_all_are_reset(keys: Shortcuts, tmp_path: Path) -> None:
+    keys.swap("file.open", "Ctrl+S")
+    keys.reset("file.open")
+    assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+O",), ())
+    keys.reset_all()
+    assert keys.of("file.save") == ("Ctrl+S",)
+    assert Settings(tmp_path).get("shortcuts", {"not": "kept"}) == {}
+
+
+def test_stop_keeps_f12_and_may_have_a_second_key(keys: Shortcuts) -> None:
+    keys.give("run.stop", "")
+    assert keys.of("run.stop") == ("F12",)
+    keys.give("run.stop", "Ctrl+.")
+    assert keys.of("run.stop") == ("F12", "Ctrl+.")
+    keys.swap("run.stop", "F5")
+    assert keys.of("run.stop") == ("F12", "F5")
+    assert keys.of("run.run") == ()
+    keys.reset("run.stop")
+    assert keys.of("run.stop") == ("F12",)
+
+
+def test_nobody_else_gets_f12_not_even_from_the_settings(tmp_path: Path, qapp: object) -> None:
+    settings = Settings(tmp_path)
+    settings.set("shortcuts", {"run.run": ["F12"], "run.stop": [], "no.such": ["F2"], "file.open": 7})
+    keys = Shortcuts(settings, lambda _sentence: None)
+    assert keys.of("run.run") == ()
+    assert keys.of("run.stop") == ("F12",)
+    assert keys.of("file.open") == ("Ctrl+O",)
+
+
+@pytest.mark.parametrize(
+    ("key", "held", "said"),
+    [
+        (Qt.Key.Key_S, NONE, "typing"),
+        (Qt.Key.Key_Return, NONE, "typing"),
+        (Qt.Key.Key_A, Qt.KeyboardModifier.ShiftModifier, "typing"),
+        (Qt.Key.Key_F12, NONE, "F12 is Stop"),
+        (Qt.Key.Key_C, CTRL, "Ctrl C stays"),
+        (Qt.Key.Key_F4, NONE, ""),
+        (Qt.Key.Key_S, CTRL, ""),
+    ],
+)
+def test_keys_that_cant_be(keys: Shortcuts, key: Qt.Key, held: Qt.KeyboardModifier, said: str) -> None:
+    refusal = keys.refusal("file.open", QKeyCombination(held, key))
+    assert said in refusal
+    assert bool(refusal) == bool(said)
+
+
+# -- the sheet ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def sheet(qtbot, window: MainWindow, commands: Commands) -> ShortcutSheet:
+    window.theme.set_motion("on")
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run("layout.developer")
+    QTest.keyClick(window, Qt.Key.Key_F1)
+    made = window.findChild(ShortcutSheet)
+    assert made is not None
+    assert made.isVisible()
+    return made
+
+
+def choose(sheet: ShortcutSheet, words: str) -> None:
+    sheet.field.setText(words)
+    entry = sheet.rows.entry
+    assert entry is not None
+    assert entry.words == words
+
+
+def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -> None:
+    QTest.keyClick(sheet.field, key, held)
+
+
+def test_the_sheet_lists_every_command_and_every_fixed_key(sheet: ShortcutSheet) -> None:
+    shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Found)]
+    assert shown == list(dict.fromkeys(shown))
+    assert set(shown) == {f"command:{row.name}" for row in TABLE} | {
+        f"fixed:{number}" for number in range(len(FIXED))
+    }
+    headings = [line.words for line in sheet.rows.lines.lines if isinstance(line, Heading)]
+    assert len(headings) == len(set(headings))
+    assert {"File", "View", "Run", "Block editor"} <= set(headings)
+
+
+def test_a_new_key_works_at_once_everywhere(
+    sheet: ShortcutSheet, window: MainWindow, commands: Commands
+) -> None:
+    choose(sheet, "Pause")
+    press(sheet, Qt.Key.Key_Return)
+    press(sheet, Qt.Key.Key_F4)
+    assert sheet.said.text() == "“Pause” has F4 now."
+    assert commands.actions["run.pause"].shortcut() == QKeySequence("F4")
+    assert window.tool_bar.pause.toolTip() == "Pause (F4)"
+    paused: list[str] = []
+    commands.actions["run.pause"].triggered.connect(lambda: paused.append("pause"))
+    press(sheet, Qt.Key.Key_Escape)
+    assert not sheet.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_F4)
+    QTest.keyClick(window, Qt.Key.Key_F8)
+    assert paused == ["pause"]
+    commands.habits.open_palette()
+    palette = window.findChild(Palette)
+    assert palette is not None
+    palette.field.setText("pause")
+    assert palette.rows.entry is not None
+    assert palette.rows.entry.key == "F4"
+
+
+def test_a_conflict_names_the_other_and_swaps(sheet: ShortcutSheet, commands: Commands) -> None:
+    choose(sheet, "Open a file")
+    press(sheet, Qt.Key.Key_Return)
+    press(sheet, Qt.Key.Key_S, CTRL)
+    assert "“Save”" in sheet.said.text()
+    assert commands.habits.shortcuts.of("file.open") == ("Ctrl+O",)
+    assert sheet.swap.isVisible()
+    QTest.mouseClick(sheet.swap, Qt.MouseButton.LeftButton)
+    assert commands.habits.shortcuts.of("file.open") == ("Ctrl+S",)
+    assert commands.habits.shortcuts.of("file.save") == ("Ctrl+O",)
+    assert not sheet.swap.isVisible()
+
+
+def test_esc_leaves_a_key_as_it_is(sheet: ShortcutSheet, commands: Commands) -> None:
+    choose(sheet, "Save")
+    press(sheet, Qt.Key.Key_Return)
+    press(sheet, Qt.Key.Key_Escape)
+    assert sheet.isVisible()
+    assert commands.habits.shortcuts.of("file.save") == ("Ctrl+S",)
+
+
+def test_f12_stops_while_a_key_is_awaited(sheet: ShortcutSheet, commands: Commands) -> None:
+    stops: list[str] = []
+    commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
+    choose(sheet, "Save")
+    press(sheet, Qt.Key.Key_Return)
+    press(sheet, Qt.Key.Key_F12)
+    assert stops == ["stop"]
+    assert commands.habits.shortcuts.of("file.save") == ("Ctrl+S",)
+
+
+def test_no_command_is_done_by_the_key_that_is_recorded(sheet: ShortcutSheet, commands: Commands) -> None:
+    done: list[str] = []
+    commands.actions["text.larger"].triggered.connect(lambda: done.append("larger"))
+    choose(sheet, "Save")
+    press(sheet, Qt.Key.Key_Return)
+    press(sheet, Qt.Key.Key_Plus, CTRL)
+    assert done == []
+    assert "“Larger text”" in sheet.said.text()
+
+
+def test_keys_are_taken_away_and_reset(sheet: ShortcutSheet, commands: Commands) -> None:
+    keys = commands.habits.shortcuts
+    choose(sheet, "Save")
+    sheet.rows.setFocus()
+    sheet.field.setFocus()
+    sheet._take_away()
+    assert keys.of("file.save") == ()
+    assert sheet.reset.isEnabled()
+    QTest.mouseClick(sheet.reset, Qt.MouseButton.LeftButton)
+    assert keys.of("file.save") == ("Ctrl+S",)
+    keys.give("file.save", "F3")
+    QTest.mouseClick(sheet.reset_all, Qt.MouseButton.LeftButton)
+    assert keys.of("file.save") == ("Ctrl+S",)
+    choose(sheet, "Stop the program and all robots")
+    sheet._take_away()
+    assert sheet.said.text() == "Stop keeps F12."
+
+
+def test_ctrl_enter_in_the_palette_leads_here(
+    sheet: ShortcutSheet, window: MainWindow, commands: Commands
+) -> None:
+    sheet.shut()
+    commands.habits.open_palette()
+    palette = window.findChild(Palette)
+    assert palette is not None
+    palette.field.setText("save as")
+    QTest.keyClick(palette.field, Qt.Key.Key_Return, CTRL)
+    assert not palette.isVisible()
+    assert sheet.isVisible()
+    assert sheet.rows.entry is not None
+    assert sheet.rows.entry.name == "file.save_as"
+    press(sheet, Qt.Key.Key_F4)
+    assert commands.habits.shortcuts.of("file.save_as") == ("F4",)
