@@ -116,6 +116,9 @@ class Census:
         if member is None:
             member = self.members[node.id] = Member(node, now)
             self.revision += 1
+        elif member.node != node:  # an original's version shows only in what it sends
+            member.node = node
+            self.revision += 1
         member.renewed_at = now
         if is_managed is not None:
             member.is_managed = is_managed

@@ -25,7 +25,10 @@ class Link:
 
 @dataclass(frozen=True)
 class Program:
-    """One original node, as the graph shows it."""
+    """One original node, as the graph shows it.
+
+    `generation` is "A" or "B", or the version of a program that can't be served ("0.5.4.6", "0.5.4.7").
+    """
 
     node_id: str
     name: str
@@ -74,6 +77,16 @@ class Census:
             grouped.setdefault(registration.node_id, []).append(registration)
         return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
 
+    def names(self, line: Line, role: Role) -> tuple[str, ...]:
+        """The names of the nodes that publish or subscribe on this line."""
+        return tuple(
+            dict.fromkeys(
+                registration.node
+                for registration in self._known.registrations
+                if registration.line == line and role in self._roles.get(registration, ())
+            )
+        )
+
     def languages(self) -> dict[Line, frozenset[str]]:
         """In which languages the programs on each line are written, as far as it is known."""
         told: dict[Line, frozenset[str]] = {}
@@ -118,7 +131,18 @@ class Census:
             for role in sorted(self._roles.get(registration, ()))
         }
         first = asked[0]
-        return Program(node_id, first.node, first.pid, first.generation, first.language, tuple(links))
+        generation = self._unserved(asked) or first.generation
+        return Program(node_id, first.node, first.pid, generation, first.language, tuple(links))
+
+    def _unserved(self, asked: list[Registration]) -> str | None:
+        """The version of a program that can't be served, where no other program on the line can be meant."""
+        for registration in asked:
+            pair = self._pair_of(registration.line)
+            for role in self._roles.get(registration, ()):
+                version = pair.unserved.get(role) if pair is not None else None
+                if version is not None and len(self.names(registration.line, role)) == 1:
+                    return version
+        return None
 
     def _roles_of(self, registration: Registration) -> Iterable[Role]:
         pair = self._pair_of(registration.line)

@@ -17,7 +17,7 @@ from nep.gateway.pair import Pair, is_free, port_to_tell
 from nep.gateway.portmap import Line, PortMap, Registration
 from nep.gateway.processes import Processes
 from nep.gateway.relay import Alerts, NativeSide, Relay
-from nep.gateway.requests import Request, RequestError
+from nep.gateway.requests import Request, RequestError, Role
 from nep.message import Message
 
 _LOOK_S = 1.0
@@ -70,13 +70,14 @@ class Gateway:
         self._ending = threading.Event()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._context.set(zmq.MAX_SOCKETS, _MAX_SOCKETS)
-        self._relay = Relay(self._context, outside, outside)
+        self._relay = Relay(self._context, outside, outside, self._who)
         self._desk = Desk(self._context, ports or Ports(), outside, self._decide)
         self._census = Census(self._known, processes, self._relay.pair)
         self._poller: zmq.Poller | None = None
         self._counters: dict[zmq.Socket[bytes], int] = {}
         self._pairs: dict[zmq.Socket[bytes], Pair] = {}
         self._look_at = 0.0
+        self._shown_unserved: dict[Line, dict[Role, str]] = {}
         self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
 
     def start(self, timeout_s: float = 5.0) -> bool:
@@ -161,9 +162,18 @@ class Gateway:
             self._show()
         if self._desk.open():
             self._poller = None
+        if self._unserved() != self._shown_unserved:
+            self._show()
         self._outside.look()
 
+    def _who(self, line: Line, role: Role) -> tuple[str, ...]:
+        return self._census.names(line, role)  # made after the relay, whose pairs it looks at
+
+    def _unserved(self) -> dict[Line, dict[Role, str]]:
+        return {pair.line: dict(pair.unserved) for pair in self._relay.pairs if pair.unserved}
+
     def _show(self) -> None:
+        self._shown_unserved = self._unserved()
         self._relay.know_languages(self._census.languages())
         self._outside.show(self._census.programs())
         self._desk.tell(self._census.members())

@@ -61,6 +61,7 @@ def is_free(port: int) -> bool:
 class Pair:
     """An XSUB that takes what originals publish and an XPUB from which they read.
 
+    `unserved` tells on which side a version was seen that no other version understands.
     Belongs to the gateway's thread. Raises `zmq.ZMQError` when a port is taken.
     """
 
@@ -71,6 +72,7 @@ class Pair:
         self.ends = ends_of(line, base)
         self.filters: set[bytes] = set()
         self.openings = 0
+        self.unserved: dict[Role, str] = {}
         self._open_handles: dict[Role, set[int]] = {"publisher": set(), "subscriber": set()}
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
         self.languages: frozenset[str] = frozenset()

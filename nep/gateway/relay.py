@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import zmq
@@ -10,6 +10,7 @@ import zmq
 from nep.gateway.framing import FrameError
 from nep.gateway.pair import Pair
 from nep.gateway.portmap import Line
+from nep.gateway.requests import Role
 
 _BATCH = 200
 """Frames taken from one line before the others have their turn."""
@@ -48,13 +49,24 @@ Key = tuple[str, str]
 """A topic and its codec: what is translated into one another."""
 
 
-class Relay:
-    """All lines that are open now. Belongs to the gateway's thread."""
+Who = Callable[[Line, Role], Sequence[str]]
+"""The names of the programs that publish or subscribe on a line, as far as they are known."""
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], native: NativeSide, alerts: Alerts) -> None:
+
+class Relay:
+    """All lines that are open now. Belongs to the gateway's thread. `who` names programs in alerts."""
+
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        native: NativeSide,
+        alerts: Alerts,
+        who: Who = lambda _line, _role: (),
+    ) -> None:
         self._context = context
         self._native = native
         self._alerts = alerts
+        self._who = who
         self._pairs: dict[Line, Pair] = {}
         self._subscribed: set[Key] = set()
         self._publishing: set[Key] = set()
@@ -79,8 +91,8 @@ class Relay:
         if pair is not None:
             pair.close()
             self.settle((line.topic, line.codec))
-            for role in ("publisher", "subscriber"):
-                self._alerts.cure(f"version:{line.topic}:{role}")
+            for role in tuple(pair.unserved):
+                self._serve_again(pair, role)
 
     def close(self) -> None:
         """Close everything."""
@@ -157,20 +169,30 @@ class Relay:
         if error.version is None:
             self._alerts.tell(f"message:{pair.line.topic}", str(error))
         else:
-            self._tell_version(f"version:{pair.line.topic}:publisher", pair, error.version)
+            self._tell_version("publisher", pair, error.version)
 
     def _judge(self, pair: Pair) -> None:
-        told = f"version:{pair.line.topic}:subscriber"
+        """Name again who can't be served (its name may be known by now), or take it back."""
         if pair.has_0546:
-            self._tell_version(told, pair, "0.5.4.6")
-        elif pair.line.framing == "bare":
-            self._alerts.cure(told)
-            if not pair.connections["publisher"]:
-                self._alerts.cure(f"version:{pair.line.topic}:publisher")
+            self._tell_version("subscriber", pair, "0.5.4.6")
+        else:
+            self._serve_again(pair, "subscriber")
+        version = pair.unserved.get("publisher")
+        if version is not None and pair.connections["publisher"]:
+            self._tell_version("publisher", pair, version)
+        else:
+            self._serve_again(pair, "publisher")
 
-    def _tell_version(self, id: str, pair: Pair, version: str) -> None:
+    def _tell_version(self, role: Role, pair: Pair, version: str) -> None:
+        pair.unserved[role] = version
+        names = [f"“{name}”" for name in self._who(pair.line, role)]
+        who = "A program" if not names else names[0] if len(names) == 1 else f"One of {', '.join(names)}"
         self._alerts.tell(
-            id,
-            f"A program on “{pair.line.topic}” uses nep {version}, which no other version understands",
+            f"version:{pair.line.topic}:{role}",
+            f"{who} on “{pair.line.topic}” uses nep {version}, which no other version understands",
             "Install nep 0.5.4.8 or 0.5.4.5 for that program.",
         )
+
+    def _serve_again(self, pair: Pair, role: Role) -> None:
+        if pair.unserved.pop(role, None) is not None:
+            self._alerts.cure(f"version:{pair.line.topic}:{role}")

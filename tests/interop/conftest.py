@@ -23,9 +23,14 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 CACHE = REPOSITORY / ".cache" / "peers"
 SCRIPTS = Path(__file__).parent / "peers"
 FIXED_PORTS = (7000, 50000)
+PICTURES = ("numpy>=1.26,<2.3", "opencv-python-headless>=4.10,<4.13")
+"""nep publishes pictures with numpy's `tostring`, which numpy 2.3 took away."""
 PYTHON_PEERS = {
-    "0.5.3.5": ("nep==0.5.3.5", "pyzmq", "simplejson", "numpy", "tornado"),
-    "0.5.4.8": ("nep==0.5.4.8", "pyzmq", "simplejson", "numpy", "msgpack"),
+    "0.5.3.5": ("nep==0.5.3.5", "pyzmq", "simplejson", "tornado", *PICTURES),
+    "0.5.4.5": ("nep==0.5.4.5", "pyzmq", "simplejson", "msgpack", *PICTURES),
+    "0.5.4.6": ("nep==0.5.4.6", "pyzmq", "simplejson", "msgpack", "numpy"),
+    "0.5.4.7": ("nep==0.5.4.7", "pyzmq", "simplejson", "msgpack", "numpy"),
+    "0.5.4.8": ("nep==0.5.4.8", "pyzmq", "simplejson", "msgpack", *PICTURES),
 }
 JAVASCRIPT_PEER = "nep-js@0.1.1"
 MARK = "\x1e"
@@ -99,6 +104,11 @@ class Program:
         with self._news:
             return self._news.wait_for(lambda: {"got": value} in self._said, timeout_s)
 
+    def settle(self, timeout_s: float) -> None:
+        """Give others a moment: what they received can't be waited for here."""
+        with self._news:
+            self._news.wait_for(lambda: self.process.poll() is not None, timeout_s)
+
     def wait_ready(self) -> Program:
         """Wait until it has its sockets."""
         self.wait(lambda: "ready" in self._said, f"{self.process.args} being ready")
@@ -137,7 +147,7 @@ class Peers:
         mode: str = "many2many",
         name: str = "",
     ) -> Program:
-        """A program of `version` ("0.5.3.5", "0.5.4.8" or "nep-js") with its own node."""
+        """A program of `version` (one of `PYTHON_PEERS`, "nep-js" or "native") with its own node."""
         arguments = [role, topic, msg_type, mode, name or f"{role}_{version.replace('.', '')}"]
         if version == "nep-js":
             folder = self._have(version, _install_javascript)
@@ -161,7 +171,9 @@ class Peers:
     def _have(self, version: str, install: Callable[[str, Path], str]) -> Path:
         folder = CACHE / version
         if version not in self._missing:
-            self._missing[version] = "" if (folder / "complete").is_file() else install(version, folder)
+            done = folder / "complete"
+            made = done.read_text("utf-8") if done.is_file() else None
+            self._missing[version] = "" if made == _packages(version) else install(version, folder)
         if self._missing[version]:
             pytest.skip(self._missing[version])
         return folder
@@ -184,7 +196,7 @@ def _install_python(version: str, folder: Path) -> str:
         [str(_python_of(folder)), "-m", "pip", "install", "--quiet", *PYTHON_PEERS[version]],
         [str(_python_of(folder)), "-c", "import nep; nep.node"],
     )
-    return _run_all(commands, f"the test peer nep {version}", folder)
+    return _run_all(commands, version, folder)
 
 
 def _install_javascript(version: str, folder: Path) -> str:
@@ -205,11 +217,17 @@ def _install_javascript(version: str, folder: Path) -> str:
         ],
         ["node", "-e", f"require({json.dumps(str(folder / 'node_modules' / 'nep-js'))})"],
     )
-    return _run_all(commands, "the test peer nep-js", folder)
+    return _run_all(commands, version, folder)
 
 
-def _run_all(commands: Sequence[Sequence[str]], what: str, folder: Path) -> str:
+def _packages(version: str) -> str:
+    """What a peer's environment is made of: when that changes it is made anew."""
+    return " ".join(PYTHON_PEERS.get(version, (JAVASCRIPT_PEER,)))
+
+
+def _run_all(commands: Sequence[Sequence[str]], version: str, folder: Path) -> str:
     """Run the commands that install a peer; the reason why it is not there, or nothing."""
+    what = f"the test peer {version if version == 'nep-js' else f'nep {version}'}"
     where = folder.parent  # not where we are: `import nep` would find our own
     where.mkdir(parents=True, exist_ok=True)
     for command in commands:
@@ -228,7 +246,7 @@ def _run_all(commands: Sequence[Sequence[str]], what: str, folder: Path) -> str:
             return f"{what} could not be installed: {lines[-1]}"
         except (OSError, subprocess.TimeoutExpired) as error:
             return f"{what} could not be installed: {error}"
-    (folder / "complete").touch()
+    (folder / "complete").write_text(_packages(version), "utf-8")
     return ""
 
 

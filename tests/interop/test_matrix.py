@@ -6,7 +6,7 @@ import pytest
 
 pytestmark = [pytest.mark.ports, pytest.mark.interop, pytest.mark.timeout(300)]
 
-KINDS = ("native", "0.5.3.5", "0.5.4.8", "nep-js")
+KINDS = ("native", "0.5.3.5", "0.5.4.5", "0.5.4.8", "nep-js")
 MESSAGES = 40
 
 
@@ -80,7 +80,7 @@ def test_json_in_every_direction(peers, master):
 
 
 def test_strings_in_every_direction(peers, master):
-    room = Room(peers, KINDS[:3], "words", "string", master)
+    room = Room(peers, KINDS[:4], "words", "string", master)
     room.warm_up(text)
     room.publish(text)
     room.assert_each_once(text)

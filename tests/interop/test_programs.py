@@ -45,7 +45,7 @@ def tell_until_heard(publisher, value, *subscribers):
     pytest.fail(f"{value} is not heard: {[each.printed for each in subscribers]}")
 
 
-@pytest.mark.parametrize("kind", ["0.5.3.5", "0.5.4.8", "nep-js"])
+@pytest.mark.parametrize("kind", ["0.5.3.5", "0.5.4.5", "0.5.4.8", "nep-js"])
 def test_an_original_is_in_the_lists_with_its_rate_and_leaves_with_its_process(
     peers, node, graph_shows, kind
 ):
@@ -124,7 +124,7 @@ def test_dictionary_of_0548_speaks_with_everybody(peers, master):
 
 
 @pytest.mark.parametrize("mode", ["one2many", "many2one"])
-@pytest.mark.parametrize("kind", ["0.5.3.5", "0.5.4.8"])
+@pytest.mark.parametrize("kind", ["0.5.3.5", "0.5.4.5", "0.5.4.8"])
 def test_one_sided_modes_reach_native_programs_and_come_from_them(peers, master, kind, mode):
     native = peers.start("native", "subscriber", "t").wait_ready()
     subscriber = peers.start(kind, "subscriber", "t", mode=mode).wait_ready()
@@ -142,6 +142,59 @@ def test_clients_and_servers_of_originals_find_each_other(peers, master, asks, a
     client = peers.start(asks, "client", "sum").wait_ready()
     client.tell({"a": 1})
     assert client.hears({"echo": {"a": 1}})
+
+
+def test_nep_0546_and_0547_are_named_with_their_nodes_and_disturb_nobody(peers, master, node, graph_shows):
+    heard = peers.start("0.5.4.8", "subscriber", "t", name="served").wait_ready()
+    peers.start("0.5.4.6", "subscriber", "t", name="viewer").wait_ready()
+    sender = peers.start("0.5.4.7", "publisher", "t", name="sender").wait_ready()
+
+    def both_are_named(view):
+        sender.tell({"n": 1})
+        told = {alert.id: alert.sentence for alert in view.alerts}
+        wires = {each.name: each.generation for each in view.nodes.values()}
+        return (
+            "0.5.4.6" in told.get("version:t:subscriber", "")
+            and told.get("version:t:publisher", "").startswith("“sender” on “t” uses nep 0.5.4.7")
+            and wires.get("sender") == "0.5.4.7"
+        )
+
+    view = graph_shows(both_are_named)
+    told = {alert.id: alert.sentence for alert in view.alerts}["version:t:subscriber"]
+    assert "“viewer”" in told
+    assert "“served”" in told, "which of two subscribers it is can't be told"
+    heard.kill()
+    view = graph_shows(
+        lambda view: {"0.5.4.6"} == {n.generation for n in view.nodes.values() if n.name == "viewer"}
+    )
+    assert any(alert.sentence.startswith("“viewer” on “t” uses nep 0.5.4.6") for alert in view.alerts)
+    sender.kill()
+    graph_shows(lambda view: "version:t:publisher" not in {alert.id for alert in view.alerts})
+    served = peers.start("0.5.4.8", "subscriber", "t", name="again").wait_ready()
+    tell_until_heard(peers.start("native", "publisher", "t").wait_ready(), {"n": 2}, served)
+
+
+def test_the_register_on_7777_names_programs_of_every_kind(peers, master):
+    context = zmq.Context()
+    try:
+        with context.socket(zmq.SUB) as tool:
+            tool.setsockopt(zmq.SUBSCRIBE, b"master")
+            tool.setsockopt(zmq.RCVTIMEO, 20_000)
+            tool.connect("tcp://127.0.0.1:7777")
+            for at, kind in enumerate(("0.5.3.5", "0.5.4.5", "0.5.4.8", "nep-js")):
+                peers.start(kind, "subscriber", f"t{at}", name=f"n{at}").wait_ready()
+            told = {}
+            while len(told) < 4:
+                frame = tool.recv()
+                assert frame.startswith(b"master {")
+                told = json.loads(frame.partition(b" ")[2])
+        assert {topic: list(entry["nodes"]) for topic, entry in told.items()} == {
+            f"t{at}": [f"n{at}"] for at in range(4)
+        }
+        assert {entry["mode"] for entry in told.values()} == {"many2many"}
+        assert len({entry["port"] for entry in told.values()}) == 4
+    finally:
+        context.destroy(linger=0)
 
 
 def test_bad_requests_do_not_disturb_a_running_master(peers, master, node):

@@ -2,10 +2,12 @@
 
 Arguments: ROLE TOPIC TYPE MODE NAME. A publisher publishes each line of JSON that comes in; a subscriber
 writes each message as a line of JSON; a client asks what comes in and writes the answer; a server answers.
+A picture is told as the colour that fills it: {"bgr": [b, g, r], "shape": [height, width, 3]}.
 """
 
 import json
 import sys
+import threading
 
 import nep
 
@@ -17,19 +19,40 @@ def say(value):
     sys.stdout.flush()
 
 
+def painted(told):
+    """The value that a line of JSON stands for."""
+    if not msg_type.startswith("image"):
+        return told
+    import numpy
+
+    picture = numpy.zeros(told["shape"], numpy.uint8)
+    picture[:] = told["bgr"]
+    return picture
+
+
+def seen(value):
+    """What a value is told as."""
+    if not msg_type.startswith("image"):
+        return value
+    return {"bgr": [round(float(each)) for each in value.mean(axis=(0, 1))], "shape": list(value.shape)}
+
+
 node = nep.node(name)
+pause = threading.Event()  # nep's "image" never waits by itself
 if role == "publisher":
     pub = node.new_pub(topic, msg_type, node.hybrid(mode=mode))
     say("ready")
     for line in sys.stdin:
-        pub.publish(json.loads(line))
+        pub.publish(painted(json.loads(line)))
 elif role == "subscriber":
     sub = node.new_sub(topic, msg_type, node.hybrid(mode=mode))
     say("ready")
     while True:
         ok, message = sub.listen(True)
         if ok:
-            say({"got": message})
+            say({"got": seen(message)})
+        elif msg_type == "image":
+            pause.wait(0.01)
 elif role == "client":
     client = node.new_client(topic)
     say("ready")
