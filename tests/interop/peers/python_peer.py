@@ -23,9 +23,9 @@ def painted(told):
     """The value that a line of JSON stands for."""
     if not msg_type.startswith("image"):
         return told
-    import numpy
+    import numpy as np
 
-    picture = numpy.zeros(told["shape"], numpy.uint8)
+    picture = np.zeros(told["shape"], np.uint8)
     picture[:] = told["bgr"]
     return picture
 
