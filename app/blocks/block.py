@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +11,7 @@ from typing import Literal
 from app.blocks.fields import Argument, StatementInput, ValueInput
 from app.blocks.template import holes
 
-Shape = Literal["hat", "statement", "cap", "value", "boolean"]
+Shape = Literal["hat", "definition", "statement", "cap", "value", "boolean"]
 Kind = Literal["action", "sensor", "event"]
 
 _HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
@@ -47,12 +48,22 @@ class Block:
     variant: str | None = None
     check: str | None = None  # what a value is: "Number", "String", or None for anything
     constants: Mapping[str, object] = field(default_factory=dict)
+    trees: Mapping[str, ast.expr] = field(default_factory=dict)  # constants that are trees already
     keywords: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
     robot: RobotUse | None = None
     parameters: tuple[str, ...] = ()  # a hat's: names that its function gets
     fails: bool = True  # a value's: may its Python raise?
     needs_message: bool = False  # reads the message that started its script
     publishes: bool = False  # its topics are published on, not listened to
+    python_in_function: str = ""  # its Python inside a function, when that differs
+    mutator: str = ""  # how the editor lets people change its gaps: "items", "function", "call"
+    extra: Mapping[str, object] = field(default_factory=dict)  # what the editor keeps of that, in the toolbox
+    needs_function: str = ""  # stands only inside a function: "result" or "plain" ones
+    calls: bool = False  # runs blocks of another place
+    undefined: str = ""  # why it can't run: nobody defined what it calls
+    in_toolbox: bool = True
+    help: str = ""  # for people who ask: more than the tooltip, with an example
+    words: tuple[str, ...] = ()  # other words that people look for it by
 
     def argument(self, name: str) -> Argument | None:
         """The argument of that name."""
@@ -65,7 +76,11 @@ class Block:
 
     def problems(self) -> tuple[str, ...]:
         """What is wrong with the description itself; empty when it is sound."""
-        known = {argument.name for argument in self.arguments} | set(self.constants) | set(self.keywords)
+        known = {argument.name for argument in self.arguments} | {
+            *self.constants,
+            *self.trees,
+            *self.keywords,
+        }
         named = {argument for pairs in self.keywords.values() for argument, _ in pairs}
         missing = {hole for text in self.templates for hole in holes(text)} - known
         found = [f"{self.type}: its Python needs %{name}" for name in sorted(missing)]
@@ -75,7 +90,7 @@ class Block:
         found += [
             f"{self.type}: %{argument.name} is used nowhere"
             for argument in self.arguments
-            if argument.name not in used and argument.silent is False
+            if argument.name not in used and not argument.silent and self.shape != "definition"
         ]
         return tuple(found)
 
@@ -84,6 +99,8 @@ class Block:
         definition: dict[str, object] = {"type": self.type, "style": self.style, "tooltip": self.tooltip}
         definition.update(_messages(self))
         definition["inputsInline"] = True
+        if self.mutator:
+            definition["mutator"] = f"nep_{self.mutator}"
         if self.shape in ("value", "boolean"):
             definition["output"] = "Boolean" if self.shape == "boolean" else self.check
         if self.shape in ("statement", "cap"):
@@ -98,10 +115,12 @@ class Block:
         if fields:
             entry["fields"] = dict(fields)
         inputs = {
-            argument.name: {"shadow": shadow}
+            argument.name: filling
             for argument in self.arguments
-            if isinstance(argument, ValueInput) and (shadow := argument.shadow()) is not None
+            if isinstance(argument, ValueInput) and (filling := argument.filling()) is not None
         }
+        if self.extra:
+            entry["extraState"] = dict(self.extra)
         if inputs:
             entry["inputs"] = inputs
         return entry

@@ -44,4 +44,5 @@ class Category:
     blocks: tuple[Block, ...] = ()
     button: tuple[str, str] | None = None
     make: Callable[[Robot, Sequence[Robot]], tuple[Block, ...]] | None = None
+    dynamic: str = ""  # the editor adds what people made themselves: "functions"
     groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import sys
 
-from app.blocks import values
+from app.blocks import calls, lists, values
 from app.blocks.fleet_search import find_robots
 from app.blocks.network import Network
 from app.blocks.runtime import Runtime
 from nep import node as new_node
 
 __all__ = [
-    "fail", "is_known", "join", "length", "newest", "on_message", "on_start", "on_true", "part", "publish",
-    "random_number", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_program",
-    "wait", "wait_until", "write",
+    "add_item", "contains", "each", "fail", "insert_item", "is_known", "item", "join", "join_items", "length",
+    "new_list", "newest", "on_message", "on_start", "on_true", "part", "position", "publish",
+    "random_number", "remove_item", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run",
+    "set_item", "split_text", "stop_program", "stop_script", "wait", "wait_until", "write",
 ]  # fmt: skip
 
 
@@ -35,6 +36,7 @@ on_true = _runtime.on_true
 publish = _runtime.publish
 robot = _runtime.robot
 stop_program = _runtime.stop_program
+stop_script = calls.stop_script
 wait = _runtime.wait
 wait_until = _runtime.wait_until
 write = _runtime.write
@@ -48,6 +50,18 @@ repeat = values.repeat
 rounded = values.rounded
 rounded_down = values.rounded_down
 rounded_up = values.rounded_up
+
+add_item = lists.add_item
+contains = lists.contains
+each = lists.each
+insert_item = lists.insert_item
+item = lists.item
+join_items = lists.join_items
+new_list = lists.new_list
+position = lists.position
+remove_item = lists.remove_item
+set_item = lists.set_item
+split_text = lists.split_text
 
 LOOK_S = 3.0
 STOP_ANSWER_S = 1.0

@@ -3,39 +3,25 @@
 from __future__ import annotations
 
 import ast
-import keyword
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from app.blocks.block import Block
 from app.blocks.catalogue import Catalogue
-from app.blocks.fields import (
-    Field,
-    FieldError,
-    StatementInput,
-    ValueInput,
-    VariableField,
-)
+from app.blocks.fields import Field, FieldError, StatementInput, ValueInput, VariableField
+from app.blocks.growing import InputField
 from app.blocks.names import Names
 from app.blocks.notes import Notes
+from app.blocks.pieces import COMMANDS as COMMANDS
+from app.blocks.pieces import RESERVED, ending, imports, keywords, template
 from app.blocks.program import Program
 from app.blocks.reading import reading
 from app.blocks.render import instrumented, readable
+from app.blocks.shaping import END, Function, Shaping
 from app.blocks.template import expression, literal, statements
-from app.blocks.uses import Uses, saved_value
+from app.blocks.uses import Uses
 from app.blocks.workspace import Placed, Workspace, parse_workspace
 from app.robots.description import Robot
-
-COMMANDS = frozenset(
-    {
-        "fail", "is_known", "join", "length", "newest", "on_message", "on_start", "on_true", "part",
-        "publish",
-        "random_number", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run", "stop_program",
-        "wait", "wait_until", "write",
-    }
-)  # fmt: skip
-"""What a program may call (`app.blocks.commands`); no variable gets one of these names."""
-
-_RESERVED = COMMANDS | {"step", "value", "number", "message", "_"}
 
 
 class _Skip(Exception):  # noqa: N818 (no error: the block is left out, and its problem is noted)
@@ -62,9 +48,12 @@ def compile_behaviour(
 class _Compiler:
     def __init__(self, catalogue: Catalogue, workspace: Workspace, name: str) -> None:
         self._catalogue = catalogue
-        self._workspace = workspace
         self._name = name
-        self._names = Names(_RESERVED)
+        self._names = Names(RESERVED)
+        self._shaping = Shaping(workspace, catalogue, self._names)
+        self._workspace = workspace = self._shaping.workspace
+        self._function: Function | None = None  # the one that is being compiled
+        self._calls: set[str] = set()  # the blocks that run a function
         self._variables: dict[str, str] = {}  # Blockly's id -> Python's name
         self._marks: dict[ast.AST, str] = {}
         self._notes = Notes(catalogue, workspace)
@@ -75,19 +64,21 @@ class _Compiler:
         self._numbers: set[str] = set()  # the blocks that must give a number
 
     def program(self) -> Program:
+        own = self._definitions()
         functions = [
             function for script in self._workspace.scripts if (function := self._script(script)) is not None
         ]
         self._notes.check_starts(len(functions))
         body: list[ast.stmt] = [
             *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
+            *own,
             *functions,
         ]
-        source, lines = readable([*_imports(body), *body, *_run(self._name)], self._marks)
+        source, lines = readable([*imports(body), *body, *ending(self._name)], self._marks)
         return Program(
             name=self._name,
             source=source,
-            runnable=instrumented(body, self._marks, self._numbers),
+            runnable=instrumented(body, self._marks, self._numbers, self._calls),
             lines=lines,
             robots=tuple(self._uses.robots),
             sensors=tuple(self._uses.sensors),
@@ -109,7 +100,7 @@ class _Compiler:
         if not first.enabled:
             return None
         block = self._known(first)
-        if block is None:
+        if block is None or block.shape == "definition":
             return None
         if block.shape != "hat":
             self._notes.unattached(first, block)
@@ -121,7 +112,7 @@ class _Compiler:
             expressions = self._expressions(first, block)
         except _Skip:
             return None
-        decorator = expression(_template(block, first), expressions, self._keywords(block, expressions))
+        decorator = expression(self._template(block, first), expressions, keywords(block, expressions))
         self._uses.remember(first, block)
         parameters = ", ".join(block.parameters)
         (function,) = statements(
@@ -134,6 +125,30 @@ class _Compiler:
             self._declare(function)
         self._marks[function] = first.id
         return function
+
+    def _definitions(self) -> list[ast.stmt]:
+        """The functions that people made."""
+        made: list[ast.stmt] = []
+        for script in self._workspace.scripts:
+            self._function = self._shaping.function(script[0])
+            if self._function is not None and self._known(script[0]) is not None:
+                made.append(self._definition(script[0], self._function))
+        self._function = None
+        return made
+
+    def _definition(self, placed: Placed, function: Function) -> ast.stmt:
+        self._in_message = False
+        self._read(placed)
+        body = self._statements(placed.inputs.get("BODY", ()))
+        if function.gives:
+            body += self._statement(replace(placed, type=f"{END}:{placed.id}"))
+        (made,) = statements("def script():\n    %BODY", {}, {"BODY": body})
+        if isinstance(made, ast.FunctionDef):
+            made.name = function.python
+            made.args.args = [ast.arg(name) for name in function.parameters.values()]
+            self._declare(made)
+        self._marks[made] = placed.id
+        return made
 
     def _declare(self, function: ast.FunctionDef) -> None:
         """``global`` for the variables that the function sets: all scripts share them."""
@@ -157,7 +172,7 @@ class _Compiler:
         block = self._known(placed)
         if block is None:
             return []
-        if block.shape not in ("statement", "cap"):
+        if block.shape not in ("statement", "cap") or not self._is_at_home(block):
             self._notes.misplaced(placed, block)
             return []
         self._read(placed)
@@ -175,8 +190,18 @@ class _Compiler:
             for argument in block.arguments
             if isinstance(argument, StatementInput)
         }
-        text = _template(block, placed)
-        return self._marked(statements(text, expressions, bodies, self._keywords(block, expressions)), placed)
+        text = self._template(block, placed)
+        made = statements(text, expressions, bodies, keywords(block, expressions))
+        if block.calls and isinstance(made[0], ast.Expr):
+            self._marks[made[0].value] = placed.id
+            self._calls.add(placed.id)
+        return self._marked(made, placed)
+
+    def _is_at_home(self, block: Block) -> bool:
+        """Whether the function that is being compiled is of the kind that the block needs."""
+        if not block.needs_function:
+            return True
+        return self._function is not None and self._function.gives == (block.needs_function == "result")
 
     def _marked(self, made: list[ast.stmt], placed: Placed) -> list[ast.stmt]:
         self._marks[made[0]] = placed.id
@@ -186,7 +211,7 @@ class _Compiler:
 
     def _expressions(self, placed: Placed, block: Block) -> dict[str, ast.expr]:
         """A tree for each hole; _Skip when one of them can't be had."""
-        made = {name: literal(constant) for name, constant in block.constants.items()}
+        made = {name: literal(constant) for name, constant in block.constants.items()} | dict(block.trees)
         for argument in block.arguments:
             if isinstance(argument, ValueInput):
                 made[argument.name] = self._value(placed, argument)
@@ -215,11 +240,13 @@ class _Compiler:
             made = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
         else:
             self._uses.remember(placed, block)
-            made = expression(_template(block, placed), expressions, self._keywords(block, expressions))
+            made = expression(self._template(block, placed), expressions, keywords(block, expressions))
         if block.fails or missing is not None:
             self._marks[made] = placed.id
             if block.check == "Number" and missing is None:
                 self._numbers.add(placed.id)
+            if block.calls:
+                self._calls.add(placed.id)
         return made
 
     def _field(self, placed: Placed, block: Block, field: Field) -> ast.expr:
@@ -228,27 +255,23 @@ class _Compiler:
         except FieldError as error:
             self._notes.wrong_field(placed, block, error)
             raise _Skip from None
+        if isinstance(field, InputField):
+            return self._input(placed, block, str(value))
         if isinstance(field, VariableField):
             return ast.Name(self._variable(str(value)), ast.Load())
         return literal(value)
+
+    def _input(self, placed: Placed, block: Block, id: str) -> ast.expr:
+        name = self._function.parameters.get(id) if self._function is not None else None
+        if name is None:
+            self._notes.no_input(placed, block)
+            raise _Skip
+        return ast.Name(name, ast.Load())
 
     def _variable(self, id: str) -> str:
         if id not in self._variables:
             self._variables[id] = self._names.new(self._workspace.variables.get(id, id), "variable")
         return self._variables[id]
-
-    @staticmethod
-    def _keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, list[ast.keyword]]:
-        """Arguments by name; a name that Python could not write goes in as ``**{"a-b": …}``."""
-        made: dict[str, list[ast.keyword]] = {}
-        for hole, pairs in block.keywords.items():
-            plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_plain(name)]
-            odd = [(literal(name), expressions[at]) for at, name in pairs if not _is_plain(name)]
-            if odd:
-                table = ast.Dict([key for key, _ in odd], [value for _, value in odd])
-                plain.append(ast.keyword(None, table))
-            made[hole] = plain
-        return made
 
     # ---- what is known about a block
 
@@ -260,7 +283,12 @@ class _Compiler:
         block = self._catalogue.blocks.get(placed.type)
         if self._notes.absent(placed, block, holder):
             return None
+        if block is not None and block.undefined:
+            self._notes.undefined(placed, block)
         return block
+
+    def _template(self, block: Block, placed: Placed) -> str:
+        return template(block, placed, in_function=self._function is not None)
 
     def _read(self, placed: Placed) -> str:
         words = reading(placed, self._catalogue.blocks, self._workspace.variables)
@@ -268,26 +296,3 @@ class _Compiler:
         block = self._catalogue.blocks.get(placed.type)
         self._labels[placed.id] = self._notes.label(placed, block)
         return words
-
-
-def _template(block: Block, placed: Placed) -> str:
-    if isinstance(block.python, str):
-        return block.python
-    chosen = saved_value(block, placed, block.variant or "")
-    return block.python[str(chosen)]
-
-
-def _is_plain(name: str) -> bool:
-    """Whether Python can write this name before an equals sign."""
-    return name.isidentifier() and name.isascii() and not keyword.iskeyword(name)
-
-
-def _imports(body: Sequence[ast.stmt]) -> list[ast.stmt]:
-    names = {
-        node.id for statement in body for node in ast.walk(statement) if isinstance(node, ast.Name)
-    } & COMMANDS
-    return statements(f"from app.blocks.commands import {', '.join(sorted({*names, 'run'}))}", {})
-
-
-def _run(name: str) -> list[ast.stmt]:
-    return statements("run(%NAME)", {"NAME": literal(name)})

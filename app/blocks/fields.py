@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-Check = Literal["Number", "String", "Boolean"]
+Check = Literal["Number", "String", "Boolean", "List"]
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _TOPIC_LIMIT = 200
@@ -39,18 +39,39 @@ class Argument:
 
 @dataclass(frozen=True)
 class ValueInput(Argument):
-    """A gap for a value block; ``default`` is what its shadow block says, None leaves the gap empty."""
+    """A gap for a value block; ``default`` is what its shadow block says, None leaves the gap empty.
+
+    ``only`` is a field and a value: the gap is there only while the field has that value. ``variable`` is
+    what the toolbox puts into the gap: a variable of that name.
+    """
 
     check: Check | None = None
     default: str | float | bool | None = None
     unit: str = ""
+    only: tuple[str, str] | None = None
+    variable: str | None = None
 
     def to_blockly(self) -> dict[str, object]:
         """A value input, with its type check."""
         entry: dict[str, object] = {"type": "input_value", "name": self.name}
         if self.check is not None:
             entry["check"] = self.check
+        if self.only is not None:
+            entry["only"] = list(self.only)
         return entry
+
+    def is_there(self, fields: Mapping[str, object]) -> bool:
+        """Whether the gap is there, with these saved fields."""
+        return self.only is None or str(fields.get(self.only[0], self.only[1])) == self.only[1]
+
+    def filling(self) -> dict[str, object] | None:
+        """What is in the gap when the block comes out of the toolbox."""
+        if self.variable is not None:
+            return {
+                "block": {"type": "variables_get", "fields": {"VAR": {"name": self.variable, "type": ""}}}
+            }
+        shadow = self.shadow()
+        return None if shadow is None else {"shadow": shadow}
 
     def shadow(self) -> dict[str, object] | None:
         """The shadow block that fills the gap until somebody puts a block in."""
@@ -249,11 +270,6 @@ class LiveField(Field):
     def read(self, saved: object) -> object:  # noqa: ARG002 (whatever a file says)
         """Nothing."""
         return None
-
-
-def choices(*words: str) -> tuple[tuple[str, object], ...]:
-    """Options whose words are their values."""
-    return tuple((word, word) for word in words)
 
 
 def _key(value: object) -> str:

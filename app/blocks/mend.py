@@ -6,6 +6,9 @@ import copy
 from collections.abc import Iterator, Mapping
 
 from app.blocks.catalogue import categories
+from app.blocks.growing import inputs_of, name_of
+from app.blocks.shaping import CALL, CALL_RESULT, PLAIN, RESULT
+from app.blocks.workspace import Placed
 
 LIMIT_S = 10
 
@@ -14,7 +17,7 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
     """The workspace after a problem's ``mend_action``; None for an action that is no matter of blocks.
 
     ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script that
-    nothing starts.
+    nothing starts, ``define:<id>`` makes the function that a block calls.
     """
     verb, _, object_ = action.partition(":")
     made: dict[str, object] = copy.deepcopy(dict(workspace))
@@ -23,6 +26,10 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
             if block.get("id") == object_ and block.get("type") == "control_wait_until":
                 _limit(block)
                 return made
+    if verb == "define":
+        for block in _blocks(made):
+            if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
+                return _defined(made, block)
     if verb == "add":
         return _started(made, object_)
     return None
@@ -33,6 +40,27 @@ def _limit(block: dict[str, object]) -> None:
     inputs = block.setdefault("inputs", {})
     if isinstance(inputs, dict):
         inputs["SECONDS"] = {"shadow": {"type": "values_number", "fields": {"NUMBER": LIMIT_S}}}
+
+
+def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
+    """A function with the name and the inputs that the call has."""
+    extra = call.get("extraState")
+    known: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
+    placed = Placed("", "", {}, extra=known)
+    definition: dict[str, object] = {
+        "type": RESULT if call.get("type") == CALL_RESULT else PLAIN,
+        "x": 40,
+        "y": 40,
+        "fields": {"NAME": name_of(placed)},
+        "extraState": {"inputs": [{"id": each.id, "name": each.name} for each in inputs_of(known)]},
+    }
+    if isinstance(known.get("function"), str):
+        definition["id"] = known["function"]
+    blocks = workspace.get("blocks")
+    tops = blocks.get("blocks") if isinstance(blocks, dict) else None
+    if isinstance(tops, list):
+        tops.append(definition)
+    return workspace
 
 
 def _started(workspace: dict[str, object], block_type: str) -> dict[str, object]:

@@ -11,7 +11,13 @@ from app.blocks.workspace import Placed, Workspace
 from app.robots.description import Action
 
 _ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
-_NEEDS = {"Number": "a number", "String": "a text", "Boolean": "a condition", None: "a value"}
+_NEEDS = {
+    "Number": "a number",
+    "String": "a text",
+    "Boolean": "a condition",
+    "List": "a list",
+    None: "a value",
+}
 _LITERALS = {"values_number": "NUMBER", "values_text": "TEXT"}
 _STARTER = "events_started"
 
@@ -67,6 +73,19 @@ class Notes:
         self._note(
             "warning", placed, block, name,
             f"{name} is known only under “when a message arrives”.",
+        )  # fmt: skip
+
+    def no_input(self, placed: Placed, block: Block) -> None:
+        """An input of a function outside of it, or one that was taken away."""
+        name = reading(placed, self._catalogue.blocks, self._workspace.variables)
+        sentence = f"“{name}” is known only inside the function that has it. It is kept and skipped."
+        self._note("warning", placed, block, name, sentence)
+
+    def undefined(self, placed: Placed, block: Block) -> None:
+        """A call of a function that nobody defined here."""
+        self._note(
+            "error", placed, block, self.label(placed, block), block.undefined,
+            mend="Define it", mend_action=f"define:{placed.id}",
         )  # fmt: skip
 
     def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
@@ -137,7 +156,7 @@ class Notes:
             if not isinstance(argument, ValueInput):
                 continue
             inner = placed.inputs.get(argument.name, ())
-            if inner and inner[0].enabled:
+            if (inner and inner[0].enabled) or not argument.is_there(placed.fields):
                 continue
             name = self.label(placed, block)
             sentence = f"{name} needs {_NEEDS[argument.check]}. Put one into the gap."

@@ -44,6 +44,8 @@ def reading(
             words = _field(argument, placed)
             return f"“{words}”" if is_text and isinstance(argument, TextField) else words
         if isinstance(argument, ValueInput):
+            if not argument.is_there(placed.fields):
+                return ""
             inner = placed.inputs.get(argument.name, ())
             return reading(inner[0], blocks, variables) if inner else "…"
         return ""

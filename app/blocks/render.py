@@ -27,12 +27,14 @@ def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str
     return text, lines
 
 
-def instrumented(body: Sequence[ast.stmt], marks: Marks, numbers: AbstractSet[str]) -> str:
+def instrumented(
+    body: Sequence[ast.stmt], marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]
+) -> str:
     """The text that runs; it changes the tree, so `readable` comes first.
 
-    `numbers` are the blocks that must give a number.
+    `numbers` are the blocks that must give a number, `calls` those that run a function.
     """
-    stepper = _Stepper(marks, numbers)
+    stepper = _Stepper(marks, numbers, calls)
     steps: list[ast.stmt] = []
     for statement in body:
         steps += stepper.statement(statement)
@@ -63,9 +65,10 @@ class _Stepper(ast.NodeTransformer):
     is empty.
     """
 
-    def __init__(self, marks: Marks, numbers: AbstractSet[str]) -> None:
+    def __init__(self, marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]) -> None:
         self._marks = marks
         self._numbers = numbers
+        self._calls = calls
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:
         id = self._marks.get(node)
@@ -99,7 +102,7 @@ class _Stepper(ast.NodeTransformer):
             return made
         empty = ast.arguments([], [], None, [], [], None, [])
         later = ast.Lambda(empty, made)
-        name = "number" if id in self._numbers else "value"
+        name = "called" if id in self._calls else "number" if id in self._numbers else "value"
         return ast.Call(ast.Name(name, ast.Load()), [literal(id), later], [])
 
 

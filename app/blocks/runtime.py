@@ -8,27 +8,21 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 
 from app.blocks import values
+from app.blocks.calls import Calls, EndScript
 from app.blocks.explain import BehaviourError, explain
 from app.blocks.hats import Hat, PassGate, changes, event_matches
 from app.blocks.link import Link
+from app.blocks.namespace import namespace
 from app.blocks.robot_handle import RobotHandle
 from app.blocks.scheduler import Scheduler, Stopped
 from app.robots.description import Robot
 
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
-
-_OWN = (
-    "fail", "newest", "number", "on_message", "on_start", "on_true", "publish", "robot", "step",
-    "stop_program",
-    "value", "wait", "wait_until", "write",
-)  # fmt: skip
-_PURE = (
-    "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
-)  # fmt: skip
 
 MESSAGES_WAITING = 16
 EVENTS_WAITING = 1
@@ -60,12 +54,13 @@ class Runtime:
         self._running = 0
         self._told: dict[str | None, str] = {}
         self.scheduler = Scheduler()
+        self._calls = Calls(self.scheduler)
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
 
     def namespace(self) -> dict[str, object]:
-        """The names of a program, each bound to what it does."""
-        return {name: getattr(self, name) for name in _OWN} | {name: getattr(values, name) for name in _PURE}
+        """The names of a program."""
+        return namespace(self)
 
     # ---- beginning and end
 
@@ -86,14 +81,16 @@ class Runtime:
 
     def _once(self, script: Script) -> None:
         self.scheduler.begin()
-        script()
+        with suppress(EndScript):
+            script()
 
     def _each(self, hat: Hat, script: Script) -> None:
         """Run a script for each of its events, one after the other."""
         while True:
             arguments = hat.next(self.scheduler)
             self.scheduler.begin()
-            script(*arguments)
+            with suppress(EndScript):
+                script(*arguments)
             self.scheduler.rest()
             if hat.dropped:
                 self.write(f"“{hat.title}” was too slow: {hat.dropped} of its events were left out")
@@ -152,6 +149,11 @@ class Runtime:
         if isinstance(result, complex):
             raise BehaviourError(f"{name} has no result for these numbers.", block)
         raise BehaviourError(f"{name} needs numbers, not a text.", block)
+
+    def called(self, block: str, call: Callable[[], object]) -> object:
+        """What a function gives back; afterwards the script is where it was before."""
+        name = self._labels.get(block, "")
+        return self.value(block, lambda: self._calls.run(block, name, call))
 
     def fail(self, sentence: str) -> object:
         """The block that can't run, says why."""

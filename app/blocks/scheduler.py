@@ -221,6 +221,10 @@ class Scheduler:
         """Whether the program ends."""
         return self._stopping
 
+    def return_to(self, block: str | None) -> None:
+        """The script goes on inside this block, after blocks of another place that it ran."""
+        self._script().block = block
+
     def block(self) -> str | None:
         """The block at which the calling script is."""
         return self._script().block

@@ -55,8 +55,9 @@ def _category(category: Category) -> dict[str, object]:
     if category.button is not None:
         words, key = category.button
         contents.append({"kind": "button", "text": words, "callbackkey": key})
-    contents += [block.to_toolbox() for block in category.blocks]
-    return _entry(category.name, category.title, category.style, category.icon, contents)
+    contents += [block.to_toolbox() for block in category.blocks if block.in_toolbox]
+    made = _entry(category.name, category.title, category.style, category.icon, contents)
+    return made | {"dynamic": category.dynamic} if category.dynamic else made
 
 
 def _group(robot: Robot, group: Group) -> dict[str, object]:

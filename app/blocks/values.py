@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from app.blocks.explain import BehaviourError, kind
 
+LONGEST_TEXT = 1_000_000
 _MOST_ROUNDS = 10**9
 
 
@@ -32,7 +33,10 @@ def is_known(value: object) -> bool:
 
 def join(first: object, second: object) -> str:
     """Both as one text."""
-    return text(first) + text(second)
+    one, other = text(first), text(second)
+    if len(one) + len(other) > LONGEST_TEXT:
+        raise BehaviourError(f"This text is too long: more than {LONGEST_TEXT} characters.")
+    return one + other
 
 
 def length(value: object) -> int:
@@ -85,8 +89,14 @@ def repeat(times: object) -> range:
 def part(message: object, path: str) -> object:
     """What is at a path inside a message, such as ``faces.0.name``; None when it is not there.
 
-    An empty path is the whole message; ``value`` of a plain value is that value.
+    An empty path is the whole message; ``value`` of a plain value is that value. A list is a copy: what a
+    program does with it does not change the message.
     """
+    found = _found(message, path)
+    return list(found) if isinstance(found, list) else found
+
+
+def _found(message: object, path: str) -> object:
     if not path:
         return message
     if isinstance(message, Mapping) and path in message:

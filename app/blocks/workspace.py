@@ -25,6 +25,7 @@ class Placed:
     inputs: Mapping[str, tuple[Placed, ...]] = field(default_factory=dict)
     enabled: bool = True
     shadow: bool = False
+    extra: Mapping[str, object] = field(default_factory=dict)  # what the editor keeps of its own shape
     too_deep: bool = False  # something inside was left out because it is nested too deep
 
     def field_id(self, name: str) -> str:
@@ -113,6 +114,7 @@ def _block(saved: Mapping[str, object], depth: int, numbers: _Numbers, *, shadow
         inputs=inputs,
         enabled=_enabled(saved),
         shadow=shadow,
+        extra=dict(extra) if isinstance(extra := saved.get("extraState"), Mapping) else {},
         too_deep=depth >= MAX_DEPTH and bool(connections),
     )
 

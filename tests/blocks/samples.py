@@ -238,6 +238,40 @@ def say(value: object, name: str = "Pepper") -> dict[str, object]:
     return block("robot_pepper_do_say", ROBOT=name, TEXT=value if isinstance(value, Mapping) else text(value))
 
 
+def define(
+    id: str, name: str, inputs: tuple[str, ...], *body: dict[str, object], result: object = None
+) -> dict[str, object]:
+    """A function; an input's id is its name with "i " before."""
+    made = block(
+        "functions_define" if result is None else "functions_define_result", id, NAME=name, BODY=list(body)
+    )
+    made["extraState"] = {"inputs": [{"id": f"i {each}", "name": each} for each in inputs]}
+    if result is not None:
+        _part(made, "inputs")["RESULT"] = {"block": result}
+    return made
+
+
+def call(
+    function: str, *, value: bool = False, id: str | None = None, **given: dict[str, object]
+) -> dict[str, object]:
+    """The use of a function as a statement or as a value."""
+    made = block("functions_result" if value else "functions_call", id)
+    inputs = [{"id": f"i {each}", "name": each} for each in given]
+    made["extraState"] = {"function": function, "name": function, "inputs": inputs}
+    made["inputs"] = {f"IN_i {each}": {"block": inner} for each, inner in given.items()}
+    return made
+
+
+def given(name: str) -> dict[str, object]:
+    """An input, inside its function."""
+    return block("functions_input", INPUT=f"i {name}")
+
+
+def list_of(*items: dict[str, object]) -> dict[str, object]:
+    made = block("lists_create", **{f"ITEM{number}": item for number, item in enumerate(items)})
+    return made | {"extraState": {"items": len(items)}}
+
+
 def write(value: object) -> dict[str, object]:
     return block("messages_write", VALUE=value)
 

@@ -13,7 +13,11 @@ from tests.blocks.fakes import FakeLink, Play, play, until
 from tests.blocks.samples import (
     block,
     boolean,
+    call,
+    define,
     get,
+    given,
+    list_of,
     nao,
     number,
     robot,
@@ -29,18 +33,65 @@ CATALOGUE = Catalogue([robot()])
 ALL = sorted(CATALOGUE.blocks.values(), key=lambda each: each.type)
 
 
+def made_by_hand(described) -> dict[str, object] | None:
+    """A workspace for a block that needs a function around it or behind it."""
+    greet = define("greet", "greet", ("who",), write(given("who")))
+    double = define("double", "double", ("number",), result=given("number"))
+    end = block("control_stop_program")
+    made: dict[str, tuple[dict[str, object], ...]] = {
+        "functions_define": (define("it", "greet", ("who",), write(given("who"))),),
+        "functions_define_result": (define("it", "double", (), result=number(2)),),
+        "functions_call": (greet, started(call("greet", id="it", who=text("Ada")), end)),
+        "functions_result": (
+            double,
+            started(write(call("double", value=True, id="it", number=number(2))), end),
+        ),
+        "functions_input": (
+            define("greet", "greet", ("who",), write(block("functions_input", "it", INPUT="i who"))),
+            started(call("greet", who=text("Ada")), end),
+        ),
+        "functions_return_if": (
+            define(
+                "double", "double", (),
+                block("functions_return_if", "it", CONDITION=boolean(True), VALUE=number(3)),
+                result=number(2),
+            ),
+            started(write(call("double", value=True)), end),
+        ),
+        "functions_leave_if": (
+            define("greet", "greet", (), block("functions_leave_if", "it", CONDITION=boolean(True))),
+            started(call("greet"), end),
+        ),
+    }  # fmt: skip
+    tops = made.get(described.type)
+    if tops is None:
+        return None
+    return workspace(*tops) if len(tops) == 2 else workspace(*tops, started(end))
+
+
 def filled(described) -> dict[str, object]:
     """A block with something in each gap."""
     parts: dict[str, object] = {}
     for argument in described.arguments:
         if isinstance(argument, ValueInput):
             default = argument.default
-            if argument.check == "Boolean":
+            if argument.check == "List" or argument.variable:
+                parts[argument.name] = list_of(text("a"), text("b"))
+            elif argument.check == "Boolean":
                 parts[argument.name] = boolean(False)
             else:
                 parts[argument.name] = text(default) if isinstance(default, str) else number(default or 1)
         elif isinstance(argument, StatementInput):
             parts[argument.name] = [write(text("inside"))]
+    parts |= own(described)
+    if described.type == "lists_create":
+        return list_of(text("a")) | {"id": "it"}
+    return block(described.type, "it", **parts)
+
+
+def own(described) -> dict[str, object]:
+    """What some blocks want."""
+    parts: dict[str, object] = {}
     if described.argument("ROBOT"):
         parts["ROBOT"] = "Pepper"
     if described.argument("VAR"):
@@ -49,11 +100,14 @@ def filled(described) -> dict[str, object]:
         parts["SECONDS"] = number(0.05)
     if described.type == "robot_pepper_do_listen":
         parts["WORDS"] = text("yes, no")
-    return block(described.type, "it", **parts)
+    return parts
 
 
 def around(described) -> dict[str, object]:
     """A workspace with this block in it, in a script that ends by itself."""
+    by_hand = made_by_hand(described)
+    if by_hand is not None:
+        return by_hand
     it = filled(described)
     if described.shape == "hat":
         return workspace(stack(it, write(text("ran"))), started(), variables=("score",))
@@ -104,6 +158,8 @@ def test_descriptions_are_sound():
         "control",
         "values",
         "variables",
+        "lists",
+        "functions",
         "messages",
         "robot",
     }

@@ -13,7 +13,7 @@ from app.blocks.compiler import compile_behaviour
 from app.blocks.explain import BehaviourError
 from app.blocks.runtime import Runtime
 from app.blocks.values import text as as_text
-from tests.blocks.samples import block, boolean, number, started, text, workspace, write
+from tests.blocks.samples import block, boolean, list_of, number, started, text, workspace, write
 
 ARITHMETIC = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "%": operator.mod,
@@ -23,6 +23,12 @@ COMPARE = {
     "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt,
     ">=": operator.ge,
 }  # fmt: skip
+
+CHOSEN = {
+    "arithmetic": ("values_arithmetic", "SIGN"),
+    "compare": ("values_compare", "RELATION"),
+    "logic": ("values_logic", "LOGIC"),
+}
 
 numbers_plain = st.integers(-9, 9) | st.floats(-20, 20, width=16)
 booleans_plain = st.booleans()
@@ -53,7 +59,10 @@ def logic(inner):
 boolean_trees = st.recursive(booleans_plain | comparisons, logic, max_leaves=6)
 joins = st.tuples(st.just("join"), st.none(), texts_plain | number_trees, texts_plain | boolean_trees)
 lengths = st.tuples(st.just("length"), st.none(), texts_plain | joins, st.none())
-trees = number_trees | boolean_trees | joins | lengths
+rows = st.tuples(st.just("list"), st.none(), number_trees | texts_plain, boolean_trees | joins)
+items = st.tuples(st.just("item"), st.sampled_from(["first", "last", "number"]), rows, st.integers(-1, 3))
+inside = st.tuples(st.just("contains"), st.none(), rows, numbers_plain | texts_plain | booleans_plain)
+trees = number_trees | boolean_trees | joins | lengths | rows | items | inside
 
 
 def reference(tree):
@@ -71,6 +80,8 @@ def reference(tree):
         return as_text(reference(first)) + as_text(reference(second))
     if kind == "length":
         return len(reference(first))
+    if kind in ("list", "item", "contains"):
+        return of_list(kind, how, first, second)
     left = reference(first)
     if kind == "round":
         return rounded(how, left)
@@ -83,6 +94,18 @@ def reference(tree):
     if isinstance(result, complex):
         raise NoResultError
     return result
+
+
+def of_list(kind, how, first, second):
+    if kind == "list":
+        return [reference(first), reference(second)]
+    both = reference(first)
+    if kind == "contains":
+        wanted = reference(second)
+        return any(each == wanted and isinstance(each, bool) is isinstance(wanted, bool) for each in both)
+    if how == "number" and second not in (1, 2):
+        raise NoResultError
+    return both[{"first": 0, "last": 1}.get(how, second - 1)]
 
 
 def rounded(how, value):
@@ -100,19 +123,26 @@ def blocks(tree):
     if not isinstance(tree, tuple):
         return number(tree)
     kind, how, first, second = tree
-    if kind == "arithmetic":
-        return block("values_arithmetic", A=blocks(first), SIGN=how, B=blocks(second))
-    if kind == "compare":
-        return block("values_compare", A=blocks(first), RELATION=how, B=blocks(second))
-    if kind == "logic":
-        return block("values_logic", A=blocks(first), LOGIC=how, B=blocks(second))
+    if kind in CHOSEN:
+        named, field = CHOSEN[kind]
+        return block(named, A=blocks(first), B=blocks(second), **{field: how})
     if kind == "not":
         return block("values_not", A=blocks(first))
     if kind == "round":
         return block("values_round", HOW=how, NUMBER=blocks(first))
     if kind == "length":
         return block("values_length", TEXT=blocks(first))
+    if kind in ("list", "item", "contains"):
+        return list_blocks(kind, how, first, second)
     return block("values_join", A=blocks(first), B=blocks(second))
+
+
+def list_blocks(kind, how, first, second):
+    if kind == "list":
+        return list_of(blocks(first), blocks(second))
+    if kind == "item":
+        return block("lists_get", WHERE=how, NUMBER=number(second), LIST=blocks(first))
+    return block("lists_contains", LIST=blocks(first), VALUE=blocks(second))
 
 
 def small(tree):

@@ -48,7 +48,17 @@ ATTACKS = (
 texts = st.sampled_from(ATTACKS) | st.text(max_size=20) | st.text(st.characters(), max_size=5)
 hostile = texts | st.integers() | st.floats() | st.none() | st.booleans() | st.lists(texts, max_size=2)
 
-OUR_NAMES = COMMANDS | {"step", "value", "number", "message", "_", "__builtins__"}
+shapes = st.fixed_dictionaries(
+    {},
+    optional={
+        "items": st.integers(-3, 60) | hostile,
+        "function": texts,
+        "name": hostile,
+        "inputs": st.lists(st.fixed_dictionaries({"id": texts, "name": hostile}), max_size=3),
+    },
+)
+
+OUR_NAMES = COMMANDS | {"step", "value", "number", "called", "message", "_", "__builtins__"}
 
 
 @st.composite
@@ -71,7 +81,10 @@ def filled(draw, described, depth: int) -> dict[str, object]:
             fields[argument.name] = draw(st.just("Pepper") | hostile)
         else:
             fields[argument.name] = draw(hostile | st.just(None))
-    return saved | {"fields": fields, "inputs": inputs}
+    shape = draw(hostile | shapes)
+    for each in (shape.get("inputs") or []) if isinstance(shape, dict) else []:
+        inputs[f"IN_{each['id']}"] = {"block": draw(blocks(3))}
+    return saved | {"fields": fields, "inputs": inputs, "extraState": shape}
 
 
 @settings(
@@ -88,16 +101,18 @@ def test_only_our_own_names_are_ever_called(tops, name, variables):
 def check(text: str) -> None:
     """The text is one that the compiler meant: nothing but calls of our commands, defs, and literals."""
     tree = ast.parse(text)
-    functions = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    made = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    functions = {node.name for node in made}
+    parameters = {argument.arg for node in made for argument in node.args.args} - {"message"}
     stored = {
         node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     }
-    assert not (functions | stored) & OUR_NAMES - {"_"}
+    assert not (functions | stored | parameters) & OUR_NAMES - {"_"}
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
             assert isinstance(node.func, (ast.Name, ast.Attribute))
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
-            assert node.id in OUR_NAMES | stored, node.id
+            assert node.id in OUR_NAMES | stored | functions | parameters, node.id
         if isinstance(node, ast.Attribute):
             assert node.attr in {"do", "ask", "get", "on", "on_change", "on_pass"}
             assert isinstance(node.value, ast.Call)

@@ -108,6 +108,7 @@ CATEGORY = Category(
             icon="corner-down-left",
             tooltip="Ends this script; the others go on. An event starts it again.",
             python="return",
+            python_in_function="stop_script()",
         ),
         Block(
             type="control_stop_program",

@@ -1,0 +1,215 @@
+"""Lists: several values under one name, numbered from 1."""
+
+from __future__ import annotations
+
+from app.blocks.block import Block
+from app.blocks.category import Category
+from app.blocks.fields import ChoiceField, StatementInput, ValueInput, VariableField
+from app.blocks.growing import Items
+
+_LIST = ValueInput("LIST", "List", variable="list")
+_NUMBER = ValueInput("NUMBER", "Number", 1, only=("WHERE", "number"))
+_PLACES = (("item number", "number"), ("first item", "first"), ("last item", "last"))
+_PLACES_OR_ANY = (*_PLACES, ("a random item", "random"))
+_WHERE = ChoiceField("WHERE", _PLACES_OR_ANY)
+
+
+def _at(call: str, places: tuple[tuple[str, str], ...] = _PLACES_OR_ANY) -> dict[str, str]:
+    """The Python for each place; ``@`` in the call is where it stands."""
+    return {place: call.replace("@", "%NUMBER" if place == "number" else f"'{place}'") for _, place in places}
+
+
+_MAKING = (
+    Block(
+        type="lists_empty",
+        text="empty list",
+        shape="value",
+        style="variables",
+        icon="list",
+        tooltip="A list with nothing in it yet.",
+        help="Put it into a variable first, then add items to that variable.",
+        python="new_list()",
+        check="List",
+        fails=False,
+        words=("new", "create", "array"),
+    ),
+    Block(
+        type="lists_create",
+        text="list of %ITEM",
+        shape="value",
+        style="variables",
+        icon="list-plus",
+        tooltip="A list of these items.",
+        help="The two buttons add and take away a gap. A list has room for 10000 items.",
+        python="new_list(%ITEM)",
+        arguments=(Items("ITEM"),),
+        check="List",
+        mutator="items",
+        extra={"items": 3},
+        words=("new", "create", "array", "make"),
+    ),
+    Block(
+        type="lists_split",
+        text="split %TEXT at %BETWEEN",
+        shape="value",
+        style="variables",
+        icon="split",
+        tooltip="A list of the pieces of a text between these characters.",
+        help="“a,b,c” at “,” gives a list of three items. At an empty text it gives the single characters.",
+        python="split_text(%TEXT, %BETWEEN)",
+        arguments=(ValueInput("TEXT", None, "yes,no"), ValueInput("BETWEEN", None, ",")),
+        check="List",
+        words=("text", "words", "separate"),
+    ),
+)
+
+_READING = (
+    Block(
+        type="lists_get",
+        text="%WHERE %NUMBER of %LIST",
+        shape="value",
+        style="variables",
+        icon="list-ordered",
+        tooltip="One item of a list; the first is number 1.",
+        help="When there is no such item, the behaviour stops here and says how many there are.",
+        python=_at("item(%LIST, @)"),
+        arguments=(_WHERE, _NUMBER, _LIST),
+        variant="WHERE",
+        words=("get", "element", "index", "choose"),
+    ),
+    Block(
+        type="lists_length",
+        text="number of items in %LIST",
+        shape="value",
+        style="variables",
+        icon="ruler",
+        tooltip="How many items a list has.",
+        python="length(%LIST)",
+        arguments=(_LIST,),
+        check="Number",
+        words=("length", "count", "size"),
+    ),
+    Block(
+        type="lists_contains",
+        text="%LIST contains %VALUE",
+        shape="boolean",
+        style="variables",
+        icon="list-checks",
+        tooltip="Whether such an item is in the list.",
+        help="For a text: whether these characters are in it.",
+        python="contains(%LIST, %VALUE)",
+        arguments=(ValueInput("LIST", None, variable="list"), ValueInput("VALUE", None, "apple")),
+        check="Boolean",
+        words=("in", "has", "includes", "find"),
+    ),
+    Block(
+        type="lists_position",
+        text="number of %VALUE in %LIST",
+        shape="value",
+        style="variables",
+        icon="search",
+        tooltip="Which number the first such item has; 0 when there is none.",
+        python="position(%LIST, %VALUE)",
+        arguments=(ValueInput("VALUE", None, "apple"), _LIST),
+        check="Number",
+        words=("index", "find", "where", "position"),
+    ),
+    Block(
+        type="lists_join",
+        text="all items of %LIST with %BETWEEN between them",
+        shape="value",
+        style="variables",
+        icon="link",
+        tooltip="One text of all items.",
+        help="Useful to let a robot say a whole list: with “, ” between them.",
+        python="join_items(%LIST, %BETWEEN)",
+        arguments=(_LIST, ValueInput("BETWEEN", None, ", ")),
+        check="String",
+        words=("join", "text", "say"),
+    ),
+)
+
+_CHANGING = (
+    Block(
+        type="lists_add",
+        text="add %VALUE to %LIST",
+        shape="statement",
+        style="variables",
+        icon="list-plus",
+        tooltip="Puts a value at the end of a list.",
+        help="A variable begins with 0: set it to an empty list before the first item.",
+        python="add_item(%LIST, %VALUE)",
+        arguments=(ValueInput("VALUE", None, "apple"), _LIST),
+        words=("append", "push", "put"),
+    ),
+    Block(
+        type="lists_insert",
+        text="insert %VALUE as %WHERE %NUMBER of %LIST",
+        shape="statement",
+        style="variables",
+        icon="list-plus",
+        tooltip="Puts a value into a list; the items behind it move on.",
+        python=_at("insert_item(%LIST, @, %VALUE)", _PLACES),
+        arguments=(ValueInput("VALUE", None, "apple"), ChoiceField("WHERE", _PLACES), _NUMBER, _LIST),
+        variant="WHERE",
+        words=("add", "put", "push"),
+    ),
+    Block(
+        type="lists_set",
+        text="set %WHERE %NUMBER of %LIST to %VALUE",
+        shape="statement",
+        style="variables",
+        icon="square-pen",
+        tooltip="Puts another value in the place of an item.",
+        python=_at("set_item(%LIST, @, %VALUE)"),
+        arguments=(_WHERE, _NUMBER, _LIST, ValueInput("VALUE", None, "apple")),
+        variant="WHERE",
+        words=("replace", "change"),
+    ),
+    Block(
+        type="lists_remove",
+        text="remove %WHERE %NUMBER of %LIST",
+        shape="statement",
+        style="variables",
+        icon="list-minus",
+        tooltip="Takes an item out of a list; the items behind it move up.",
+        python=_at("remove_item(%LIST, @)"),
+        arguments=(_WHERE, _NUMBER, _LIST),
+        variant="WHERE",
+        words=("delete", "drop", "pop"),
+    ),
+    Block(
+        type="lists_take",
+        text="take out %WHERE %NUMBER of %LIST",
+        shape="value",
+        style="variables",
+        icon="list-minus",
+        tooltip="Takes an item out of a list and gives it.",
+        help="To go through a list in a random order: take out a random item until the list is empty.",
+        python=_at("remove_item(%LIST, @)"),
+        arguments=(_WHERE, _NUMBER, _LIST),
+        variant="WHERE",
+        words=("pop", "draw", "remove"),
+    ),
+    Block(
+        type="lists_each",
+        text="for each item %VAR in %LIST %BODY",
+        shape="statement",
+        style="variables",
+        icon="repeat",
+        tooltip="Runs the blocks inside once for each item; the variable holds the item.",
+        help="It goes over the items that were there when it began, whatever happens to the list inside.",
+        python="for %VAR in each(%LIST):\n    %BODY",
+        arguments=(VariableField("VAR", "item"), _LIST, StatementInput("BODY")),
+        words=("loop", "repeat", "for"),
+    ),
+)
+
+CATEGORY = Category(
+    name="lists",
+    title="Lists",
+    style="variables",
+    icon="list",
+    order=45,
+    blocks=(*_MAKING, *_READING, *_CHANGING),
+)

@@ -1,0 +1,177 @@
+"""Lists: what their blocks do, and what they say when they can't."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.blocks import lists
+from app.blocks.explain import BehaviourError
+from app.blocks.values import LONGEST_TEXT
+from tests.blocks.fakes import play
+from tests.blocks.samples import block, get, list_of, number, started, text, workspace, write
+
+FRUITS = list_of(text("apple"), text("pear"), text("fig"))
+
+
+def test_items_are_counted_from_1_and_named_in_words() -> None:
+    fruits = lists.new_list("apple", "pear", "fig")
+    assert [lists.item(fruits, where) for where in (1, 2.0, "first", "last")] == [
+        "apple", "pear", "apple", "fig",
+    ]  # fmt: skip
+    assert lists.item(fruits, "random") in fruits
+    lists.set_item(fruits, 2, "plum")
+    lists.insert_item(fruits, "first", 0)
+    lists.insert_item(fruits, 5, "end")
+    lists.insert_item(fruits, "last", "very end")
+    lists.add_item(fruits, True)
+    assert fruits == [0, "apple", "plum", "fig", "end", "very end", True]
+    assert lists.remove_item(fruits, "last") is True
+    assert lists.remove_item(fruits, 1) == 0
+    assert lists.position(fruits, "fig") == 3
+    assert lists.position(fruits, "none") == 0
+    assert lists.contains(fruits, "plum")
+    assert lists.contains("plum tree", "tree")
+    assert not lists.contains([1], True)
+
+
+@pytest.mark.parametrize(
+    ("act", "sentence"),
+    [
+        (lambda: lists.item([1, 2, 3], 5), "The list has 3 items; there is no item 5."),
+        (lambda: lists.item([1], 0), "The list has 1 item; there is no item 0."),
+        (lambda: lists.item([], "first"), "The list is empty."),
+        (lambda: lists.remove_item([], "random"), "The list is empty."),
+        (lambda: lists.item([1, 2], 1.5), "“item number” needs a whole number, not 1.5."),
+        (lambda: lists.item([1, 2], "two"), "“item number” needs a number, not a text."),
+        (lambda: lists.item("abc", 1), "This needs a list, not a text."),
+        (
+            lambda: lists.add_item(0, 1),
+            "This needs a list, not a number. Set the variable to an empty list first.",
+        ),
+        (lambda: lists.item(None, 1), "This list is not known yet."),
+        (lambda: lists.add_item((1, 2), 3), "This list can't be changed."),
+        (lambda: lists.add_item([0] * lists.MOST_ITEMS, 1), "The list is full: it has room for 10000 items."),
+        (lambda: lists.split_text("a" * 20_000, ""), "The list is full: it has room for 10000 items."),
+        (
+            lambda: lists.join_items(["a" * LONGEST_TEXT], "b"),
+            "This text is too long: more than 1000000 characters.",
+        ),
+    ],
+)  # fmt: skip
+def test_what_a_list_cannot_do_is_said_in_words(act, sentence) -> None:
+    with pytest.raises(BehaviourError) as caught:
+        act()
+    assert caught.value.sentence == sentence
+
+
+def test_no_list_is_inside_itself_and_doubling_ends() -> None:
+    mine: list[object] = []
+    lists.add_item(mine, mine)
+    lists.add_item(mine, mine)
+    assert mine == [[], [[]]]
+
+    def double_for_ever(mine: list[object]) -> None:
+        while True:
+            mine = lists.new_list(mine, mine)
+
+    def grow_for_ever(mine: list[object]) -> None:
+        while True:
+            lists.add_item(mine, mine)
+
+    for act in (double_for_ever, grow_for_ever):
+        with pytest.raises(BehaviourError, match="full"):
+            act(mine)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.text(max_size=4)), st.text(min_size=1, max_size=2))
+def test_splitting_undoes_joining(items, between) -> None:
+    whole = lists.join_items(items, between)
+    assert between.join(map(str, lists.split_text(whole, between))) == whole
+
+
+operations = st.lists(
+    st.tuples(st.sampled_from(["add", "insert", "set", "remove"]), st.integers(-1, 6), st.integers())
+)
+
+
+@settings(max_examples=500, deadline=None)
+@given(operations)
+def test_changing_a_list_is_what_it_says(steps) -> None:
+    """Against a reference that counts from 0 and knows no errors."""
+    mine: list[object] = []
+    reference: list[object] = []
+    for what, place, value in steps:
+        sound = 1 <= place <= len(reference) + (what == "insert")
+        try:
+            if what == "add":
+                lists.add_item(mine, value)
+            elif what == "insert":
+                lists.insert_item(mine, place, value)
+            elif what == "set":
+                lists.set_item(mine, place, value)
+            else:
+                lists.remove_item(mine, place)
+        except BehaviourError:
+            assert not sound
+            assert what != "add"
+            continue
+        if what == "add":
+            reference.append(value)
+        elif what == "insert":
+            reference[place - 1 : place - 1] = [value]
+        elif what == "set":
+            reference[place - 1] = value
+        else:
+            del reference[place - 1]
+        assert mine == reference
+
+
+def test_a_behaviour_with_lists() -> None:
+    fruits = {"id": "fruits"}
+    run = play(
+        workspace(
+            started(
+                block("variables_set", VAR=fruits, VALUE=FRUITS),
+                block("lists_add", VALUE=text("kiwi"), LIST=get("fruits")),
+                block("lists_remove", WHERE="first", LIST=get("fruits")),
+                block(
+                    "lists_each", VAR={"id": "fruit"}, LIST=get("fruits"),
+                    BODY=[
+                        write(get("fruit")),
+                        write(block("lists_take", WHERE="last", LIST=get("fruits"))),
+                    ],
+                ),
+                write(block("lists_length", LIST=get("fruits"))),
+                write(block("lists_join", LIST=list_of(number(1), number(2)), BETWEEN=text(" and "))),
+            ),
+            variables=("fruits", "fruit"),
+        )
+    )  # fmt: skip
+    assert run.runtime.error is None
+    assert run.lines == ["pear", "kiwi", "fig", "fig", "kiwi", "pear", "0", "1 and 2"]
+    assert "for fruit in each(fruits):" in run.program.source
+    assert "new_list('apple', 'pear', 'fig')" in run.program.source
+
+
+def test_an_error_in_a_list_names_its_block() -> None:
+    gone = block("lists_get", "it", WHERE="number", NUMBER=number(5), LIST=FRUITS)
+    run = play(workspace(started(write(gone))))
+    assert run.runtime.error is not None
+    assert run.runtime.error.block == "it"
+    assert run.runtime.error.sentence == "The list has 3 items; there is no item 5."
+
+
+def test_a_gap_that_is_not_there_is_not_missed() -> None:
+    first = block("lists_get", WHERE="first", LIST=FRUITS)
+    run = play(workspace(started(write(first))))
+    assert run.lines == ["apple"]
+    readings = set(run.program.readings.values())
+    assert "first item of list of “apple” “pear” “fig”" in readings
+
+
+def test_an_empty_gap_of_a_new_list_is_said() -> None:
+    run = play(workspace(started(write(list_of() | {"extraState": {"items": 2}}))))
+    assert run.program.problems[0].sentence == "list of needs a value. Put one into the gap."

@@ -1,0 +1,59 @@
+"""Write the tables of blocks in docs/blocks.md from the blocks' own descriptions.
+
+``python tools/blocks_page.py`` after a block was added or changed; a test says when that was forgotten.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from app.blocks.block import Block  # noqa: E402
+from app.blocks.catalogue import categories  # noqa: E402
+
+PAGE = ROOT / "docs" / "blocks.md"
+BEGIN, END = "<!-- blocks: made by tools/blocks_page.py -->", "<!-- end of blocks -->"
+_HEAD = "| block | what it does | Python |\n|---|---|---|"
+_HOLE = re.compile(r"%([A-Z_]+)")
+
+
+def tables() -> str:
+    """Every category's blocks: what stands on them, what they do, their Python."""
+    parts = []
+    for category in categories():
+        if category.blocks:
+            rows = "\n".join(_row(block) for block in category.blocks)
+            parts.append(f"### {category.title}\n\n{_HEAD}\n{rows}\n")
+    return "\n".join(parts)
+
+
+def page(text: str) -> str:
+    """The page with its tables made anew."""
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"
+
+
+def _row(block: Block) -> str:
+    told = " ".join(_HOLE.sub(lambda hole: f"({hole[1].lower()})", block.text).split())
+    does = " ".join(part for part in (block.tooltip, block.help) if part)
+    return f"| {told} | {does} | {_python(block)} |"
+
+
+def _python(block: Block) -> str:
+    if block.mutator in ("function", "call"):
+        return "`def name(inputs): …`" if block.mutator == "function" else "`name(inputs)`"
+    shown = (_HOLE.sub(lambda hole: hole[1].lower(), each) for each in block.templates)
+    lines = (
+        re.sub(r"\s*\n\s*", " ", each).replace(" body", " …").replace(" else: else", " else: …")
+        for each in shown
+    )
+    return f"`{' · '.join(lines)}`"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
