@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from app.ui.picture_view import Box, boxes_of
+from app.ui.picture_boxes import Box, boxes_of
 
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink

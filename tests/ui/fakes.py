@@ -20,6 +20,7 @@ from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.moving import Moving
 from app.core.nodes import Nodes
+from app.core.pictures import Picture
 from app.robots.inputs import Choice, Parameter
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
 from app.robots.parts import Topics as RobotTopics
@@ -115,16 +116,6 @@ class Watch:
         self._close, self.open = None, False
 
 
-@dataclass(frozen=True, eq=False)
-class Picture:
-    bgra: np.ndarray
-    width: int
-    height: int
-    seq: int | None
-    stamp_ns: int | None
-    received_s: float
-
-
 class ImageStream:
     def __init__(self, topic: str) -> None:
         self.topic = topic
@@ -135,6 +126,15 @@ class ImageStream:
         self.error: str | None = None
         self.painted: list[Picture] = []
         self.closed = False
+        self.held = False
+        self.wishes: list[tuple[int, int] | None] = []
+
+    def want(self, size: tuple[int, int] | None) -> None:
+        if not self.wishes or self.wishes[-1] != size:
+            self.wishes.append(size)
+
+    def hold(self, held: bool) -> None:
+        self.held = held
 
     def shown(self) -> None:
         assert self.picture is not None
@@ -358,7 +358,9 @@ class Session:
         )  # fmt: skip
         self.companions = SimpleNamespace(
             ensure_master=lambda: self.calls.append(("ensure_master",)),
-            start_virtual_robot=lambda name="Pepper": self.calls.append(("start_virtual_robot", name)),
+            start_virtual_robot=lambda name="Pepper", model="pepper": self.calls.append(
+                ("start_virtual_robot", name)
+            ),
             virtual_robots=(),
         )
         self.graph: SimpleNamespace | None = None
@@ -576,7 +578,10 @@ def picture(width: int = 320, height: int = 240) -> Picture:
     bgra[height // 2 :] = (96, 128, 152, 255)
     rows, columns = np.ogrid[:height, :width]
     bgra[(rows - 150) ** 2 + (columns - 250) ** 2 < 22**2] = (58, 62, 210, 255)
-    return Picture(bgra, width, height, 7, time.time_ns(), time.monotonic())
+    extension = {"shape": [height, width, 3], "encoding": "bgr8"}
+    data = np.ascontiguousarray(bgra[:, :, :3]).tobytes()
+    message = Message("/robot/camera", data, "image", "image", stamp_ns=time.time_ns(), extension=extension)
+    return Picture(bgra, width, height, 7, message.stamp_ns, time.monotonic(), message)
 
 
 def _action(name: str, title: str, icon: str, parameters: Sequence[Parameter], **more: object) -> Action:

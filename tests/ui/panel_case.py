@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from PySide6.QtTest import QTest
@@ -20,6 +21,7 @@ class Window:
     theme: Theme = field(default_factory=lambda: Theme("light"))
     opened: list[str] = field(default_factory=list)
     toasts: list[str] = field(default_factory=list)
+    toast_buttons: list[tuple[str, Callable[[], object] | None]] = field(default_factory=list)
     commands: list[str] = field(default_factory=list)
 
     def context(self) -> PanelContext:
@@ -27,9 +29,14 @@ class Window:
             self.session,  # type: ignore[arg-type]
             self.theme,
             self.opened.append,
-            self.toasts.append,
+            self.say,
             self.commands.append,
         )
+
+    def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
+        """A toast."""
+        self.toasts.append(words)
+        self.toast_buttons.append((button, run))
 
     def make(self, panel: Panel, size: tuple[int, int] = (640, 480)) -> PanelWidget:
         """The panel, shown, with the widgets of its title beside it."""

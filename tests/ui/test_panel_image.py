@@ -1,14 +1,22 @@
 from __future__ import annotations
 
+import threading
+
+import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QRectF
+from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
+from PySide6.QtGui import QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
 
 from app.ui.panels.camera import PANEL as CAMERA
 from app.ui.panels.camera import CameraPanel
 from app.ui.panels.image import PANEL, ImagePanel
-from app.ui.picture_view import PictureView, boxes_of, rate_sentence
+from app.ui.picture_actions import ROWS
+from app.ui.picture_boxes import boxes_of
+from app.ui.picture_view import pixel_words, rate_sentence
+from app.ui.picture_zoom import ZoomablePicture
+from app.ui.snapshot_job import SnapshotJob
 from app.ui.theme import Theme
 from tests.ui.fakes import ImageStream, Picture, RobotLink, Session, Topic, pepper, picture
 from tests.ui.panel_case import Window
@@ -18,12 +26,21 @@ FACES = {"count": 1, "width": 320, "height": 240, "items": [FACE]}
 
 
 @pytest.fixture
-def view(qtbot, qapp) -> PictureView:
-    made = PictureView(Theme("light"))
+def view(qtbot, qapp) -> ZoomablePicture:
+    made = ZoomablePicture(Theme("light"))
     qtbot.addWidget(made)
     made.resize(400, 400)
     made.show()
     return made
+
+
+def made(qtbot, window: Window) -> ImagePanel:
+    panel = window.make(PANEL, (400, 300))
+    qtbot.addWidget(panel)
+    for widget in panel.header_widgets():
+        qtbot.addWidget(widget)
+    assert isinstance(panel, ImagePanel)
+    return panel
 
 
 def stream_of(shown: Picture, **figures: float) -> ImageStream:
@@ -48,7 +65,8 @@ def test_a_picture_keeps_its_aspect_on_black(view) -> None:
 
 def test_it_says_how_many_are_shown_and_their_size(view) -> None:
     view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
-    assert view.words == "shown 30 of 60/s  320\u00d7240"
+    assert view.words.startswith("shown 30 of 60/s  320\u00d7240  ")
+    assert view.words.endswith(" ms")  # its age
     assert rate_sentence(None, None) == ""
     assert rate_sentence(17.2, 15.0) == "shown 15 of 15/s"  # two windows of time: never more than arrive
 
@@ -91,17 +109,14 @@ def test_what_is_no_detection_makes_no_box(broken: object) -> None:
 def test_the_value_under_the_mouse_is_said(qtbot, view) -> None:
     view.take(stream_of(picture()))  # type: ignore[arg-type]
     QTest.mouseMove(view, QPoint(20, 60))
-    qtbot.waitUntil(lambda: "(16, 8)  196 198 190" in view.words)
+    qtbot.waitUntil(lambda: "(16, 8)  196 198 190  #C4C6BE" in view.words)
     QTest.mouseMove(view, QPoint(20, 20))
     qtbot.waitUntil(lambda: "(" not in view.words)
 
 
 def test_the_image_panel_shows_the_first_picture_topic_and_others_on_demand(qtbot, qapp) -> None:
     window = Window(Session.full())
-    panel = window.make(PANEL, (400, 300))
-    qtbot.addWidget(panel)
-    qtbot.addWidget(panel.header_widgets()[0])
-    assert isinstance(panel, ImagePanel)
+    panel = made(qtbot, window)
     assert panel.subtitle() == "/robot/camera"
     assert panel.topics() == ["/robot/camera", "/robot/depth"]
     panel.show_topic("/robot/depth")
@@ -117,10 +132,7 @@ def test_the_image_panel_shows_the_first_picture_topic_and_others_on_demand(qtbo
 def test_the_image_panel_marks_what_the_cameras_robot_recognises(qtbot, qapp) -> None:
     window = Window(Session.full())
     window.session.topics.put(Topic("/Pepper/camera", "image", "image"))
-    panel = window.make(PANEL)
-    qtbot.addWidget(panel)
-    qtbot.addWidget(panel.header_widgets()[0])
-    assert isinstance(panel, ImagePanel)
+    panel = made(qtbot, window)
     panel.refresh()
     assert panel.view.boxes == ()
     panel.show_topic("/Pepper/camera")
@@ -135,9 +147,7 @@ def test_the_image_panel_marks_what_the_cameras_robot_recognises(qtbot, qapp) ->
 def test_without_pictures_it_says_what_will_appear(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.images.source = lambda _topic: None
-    panel = window.make(PANEL)
-    qtbot.addWidget(panel)
-    assert isinstance(panel, ImagePanel)
+    panel = made(qtbot, window)
     assert panel.empty.isVisible()
     window.session.topics.put(Topic("/cam", "image", "image"))
     panel.refresh()
@@ -170,3 +180,214 @@ def test_the_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> 
     panel.shut()
     assert window.session.images.streams[0].closed
     assert window.session.fleet.looked_at == []
+
+
+# -- zoom, move, turn, keep ---------------------------------------------------------------------------
+
+
+def wheel(view: ZoomablePicture, at: QPoint, notches: int) -> None:
+    event = QWheelEvent(
+        QPointF(at), QPointF(view.mapToGlobal(at)), QPoint(), QPoint(0, 120 * notches),
+        Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    view.wheelEvent(event)
+
+
+def under(view: ZoomablePicture, at: QPoint) -> str:
+    view.mouse = QPointF(at)
+    return view._under_mouse()
+
+
+def test_the_wheel_zooms_where_the_mouse_is(view) -> None:
+    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    at = QPoint(313, 237)  # the ball
+    before = under(view, at)
+    assert before.endswith("210 62 58  #D23E3A")
+    wheel(view, at, 9)
+    assert view.scale() == pytest.approx(1.25 * 1.25**9)
+    assert under(view, at) == before
+    assert f"{round(view.scale() * 100)} %" in view.words
+    assert view.grab().toImage().pixelColor(at).name() == "#d23e3a"
+
+
+def test_from_twice_its_size_on_pixels_have_edges(view) -> None:
+    shown = picture(4, 4)
+    shown.bgra[:] = 0
+    shown.bgra[0, 0] = (255, 255, 255, 255)
+    view.take(stream_of(shown))  # type: ignore[arg-type]
+    image = view.grab().toImage()
+    assert {image.pixelColor(x, 20).name() for x in range(0, 200, 3)} == {"#ffffff", "#000000"}
+    view.place.set_zoom(1.9)
+    view.update()
+    image = view.grab().toImage()
+    colours = {image.pixelColor(x, y).name() for x in range(190, 210) for y in range(190, 210)}
+    assert len(colours) > 2  # smooth: there are greys
+
+
+@pytest.mark.parametrize("turned", [0, 90, 180, 270])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_values_and_boxes_follow_turning_and_flipping(view, turned: int, flipped: bool) -> None:
+    view.take(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
+    if flipped:
+        view.place.flip(across=True)
+    view.place.turn(turned)
+    ball = view.place.to_view(view.area()).map(QPointF(250.5 / 320, 150.5 / 240))
+    assert under(view, ball.toPoint()).endswith("210 62 58  #D23E3A")
+    image = view.grab().toImage()
+    assert image.pixelColor(ball.toPoint()).name() == "#d23e3a"
+    box = view.place.to_view(view.area()).mapRect(QRectF(0.5, 0.25, 0.25, 0.25))
+    assert image.pixelColor(round(box.center().x()), round(box.bottom())).name() == "#ffc53d"
+
+
+def test_dragging_and_the_arrow_keys_move_a_zoomed_picture(qtbot, view) -> None:
+    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    view.place.set_zoom(5.0)
+    before = under(view, QPoint(100, 100))
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(100, 100))
+    QTest.mouseMove(view, QPoint(150, 130))
+    qtbot.waitUntil(lambda: under(view, QPoint(150, 130)) == before)
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=QPoint(150, 130))
+    QTest.keyClick(view, Qt.Key.Key_Left)
+    QTest.keyClick(view, Qt.Key.Key_Down)
+    assert under(view, QPoint(190, 90)) == before
+
+
+def test_a_double_click_goes_between_the_whole_and_one_for_one(view) -> None:
+    view.take(stream_of(picture()))  # type: ignore[arg-type]
+    QTest.mouseDClick(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
+    assert view.scale() == pytest.approx(1.0)
+    QTest.mouseDClick(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
+    assert view.place.zoom is None
+
+
+def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(view) -> None:
+    stream = stream_of(picture(640, 320))
+    view.take(stream)  # type: ignore[arg-type]
+    assert stream.wishes[-1] == (400, 200)
+    view.place.turn(90)
+    view.take(stream)  # type: ignore[arg-type]
+    assert stream.wishes[-1] == (400, 200)
+    view.place.set_zoom(3.0)
+    view.take(stream)  # type: ignore[arg-type]
+    assert stream.wishes[-1] == (1920, 960)
+    view.place.set_zoom(None)
+    view.mouse = QPointF(200, 200)
+    view.take(stream)  # type: ignore[arg-type]
+    assert stream.wishes[-1] is None
+
+
+def test_a_pixel_is_said_as_colour_or_number_or_not_at_all() -> None:
+    assert pixel_words(1, 2, (255, 0, 16)) == "(1, 2)  255 0 16  #FF0010"
+    assert pixel_words(1, 2, 820) == "(1, 2)  820"
+    assert pixel_words(1, 2, None) == "(1, 2)"
+
+
+def test_every_action_has_a_key_that_works_while_the_picture_has_the_keyboard(qtbot, qapp) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    view, place = panel.view, panel.view.place
+    QTest.keyClicks(view, "++")
+    assert view.scale() == pytest.approx(1.25**3, rel=0.01)  # it fitted at 125 %
+    QTest.keyClick(view, Qt.Key.Key_Minus, Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClicks(view, "1")
+    assert view.scale() == pytest.approx(1.0)
+    QTest.keyClicks(view, "0r")
+    assert (place.zoom, place.turned) == (None, 90)
+    QTest.keyClick(view, Qt.Key.Key_R, Qt.KeyboardModifier.ShiftModifier)
+    assert place.turned == 0
+    QTest.keyClicks(view, "hv")
+    assert (place.flipped_across, place.flipped_down) == (True, True)
+    assert panel.actions_of["across"].isChecked()
+    QTest.keyClick(view, Qt.Key.Key_Space)
+    assert panel.freeze.isChecked()
+    assert window.session.images.streams[0].held
+    words = [action.text().partition("\t")[0] for action in panel.more_actions() if action.text()]
+    assert words == [*(row.words for row in ROWS), "Show in the inspector"]
+
+
+def test_the_windows_shortcuts_wait_while_the_picture_has_the_keyboard(qtbot, qapp) -> None:
+    panel = made(qtbot, Window(Session.full()))
+    for name in ("Ctrl++", "Ctrl+-", "Ctrl+0", "Space"):
+        assert name in panel.view.keys
+    assert "F12" not in panel.view.keys
+
+
+def test_a_frozen_picture_stays_and_says_so(qtbot, qapp) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    panel.freeze.click()
+    panel.refresh()
+    assert panel.view.words.startswith("Frozen, ")
+    panel.show_topic("/robot/depth")
+    assert not panel.freeze.isChecked()
+
+
+def test_a_picture_is_saved_as_it_was_received_and_the_toast_leads_to_its_folder(
+    qtbot, qapp, tmp_path
+) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    panel.job = SnapshotJob(panel, lambda: tmp_path / "kept")
+    panel.job.saved.connect(panel._saved)
+    panel.view.place.turn(90)
+    QTest.keyClicks(panel.view, "s")
+    qtbot.waitUntil(lambda: bool(window.toasts))
+    (file,) = (tmp_path / "kept").iterdir()
+    assert window.toasts == [f"Saved {file.name}"]
+    assert window.toast_buttons[0][0] == "Open folder"
+    assert file.name.startswith("robot camera 20")
+    read = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
+    assert np.array_equal(read, picture().bgra[:, :, :3])
+
+
+def test_a_picture_that_cannot_be_kept_is_an_alert_with_the_reason(qtbot, qapp, tmp_path) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    (tmp_path / "file").write_text("in the way")
+    panel.job = SnapshotJob(panel, lambda: tmp_path / "file")
+    panel.job.failed.connect(panel._failed)
+    panel.save_picture()
+    qtbot.waitUntil(lambda: window.session.alerts.has("snapshot"))
+    assert window.toasts == []
+
+
+def test_a_picture_is_copied_whole_and_made_in_another_thread(qtbot, qapp, monkeypatch) -> None:
+    threads: list[int] = []
+    whole = SnapshotJob._do
+
+    def watched(self: SnapshotJob, work: object) -> None:
+        threads.append(threading.get_ident())
+        whole(self, work)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(SnapshotJob, "_do", watched)
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    QTest.keyClick(panel.view, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    qtbot.waitUntil(lambda: bool(window.toasts))
+    assert window.toasts == ["Copied the picture, 320\u00d7240"]
+    assert QGuiApplication.clipboard().image().size().width() == 320
+    assert threads
+    assert threading.get_ident() not in threads
+
+
+def test_how_a_person_looked_comes_back_with_the_layout(qtbot, qapp) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    QTest.keyClicks(panel.view, "+rh")
+    again = made(qtbot, window)
+    again.restore_state(panel.save_state())
+    assert again.view.place == panel.view.place
+    assert again.actions_of["across"].isChecked()
+    again.restore_state({"topic": 3, "place": "nonsense"})
+
+
+def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:
+    window = Window(Session())
+    window.session.topics.put(Topic("/cam", "image", "image"))
+    panel = made(qtbot, window)
+    window.session.images.streams[0].error = "they are no picture"
+    panel.refresh()
+    assert panel.empty._title.text() == "This can't be shown as a picture"
+    next(each for each in panel.empty._buttons).click()
+    assert window.commands == ["inspect:/cam"]
+    assert panel.fit.isHidden()

@@ -27,8 +27,8 @@ ANY_TYPE = "*"
 class Toast(Protocol):
     """Says for some seconds what the person just did."""
 
-    def __call__(self, words: str) -> None:
-        """Show ``words``; "Copied robots.Pepper.pose.y"."""
+    def __call__(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
+        """Show ``words``, "Copied robots.Pepper.pose.y", and perhaps a ``button`` that does ``run``."""
 
 
 @dataclass(frozen=True, slots=True)

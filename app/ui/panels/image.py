@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction
+from PySide6.QtCore import QPoint, Qt, QUrl
+from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.picture_view import PictureView
+from app.ui.picture_actions import PictureActions
+from app.ui.picture_zoom import ZoomablePicture
 from app.ui.robot_boxes import boxes_on, owner_of
-from app.ui.widgets import EmptyState, IconButton
+from app.ui.snapshot_job import SnapshotJob
+from app.ui.widgets import EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream
     from app.core.watches import Watch
+    from nep.message import Message
 
 CODEC = "image"
 
@@ -36,8 +40,11 @@ class ImagePanel(PanelWidget):
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
         self.chips = [self.choose]
-        self.view = PictureView(self.theme)
+        self.view = ZoomablePicture(self.theme)
         self.view.setAccessibleName("Picture")
+        self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.view.customContextMenuRequested.connect(self._show_actions)
+        self._make_actions()
         self.empty = EmptyState(self.theme, "image", "", "")
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
@@ -45,7 +52,25 @@ class ImagePanel(PanelWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.pages)
+        self.setFocusProxy(self.view)
         self._say_nothing()
+
+    def _make_actions(self) -> None:
+        own = {"freeze": self._freeze_or_not, "save": self.save_picture, "copy": self.copy_picture}
+        self.actions_of = PictureActions(self.theme, self.view, own)
+        self.job = SnapshotJob(self)
+        self.job.saved.connect(self._saved)
+        self.job.copied.connect(self._copied)
+        self.job.failed.connect(self._failed)
+        self.fit = IconButton(self.theme, "maximize", "Whole picture", "0", size=26)
+        self.freeze = IconButton(
+            self.theme, "snowflake", "Freeze this picture", "Space", checkable=True, size=26
+        )
+        self.keep = IconButton(self.theme, "download", "Save as PNG", "S", size=26)
+        self.fit.clicked.connect(self.view.show_whole)
+        self.freeze.toggled.connect(self._hold)
+        self.keep.clicked.connect(self.save_picture)
+        self.header = [self.fit, self.freeze, self.keep]
 
     def topics(self) -> list[str]:
         """The picture topics that there are now."""
@@ -58,6 +83,7 @@ class ImagePanel(PanelWidget):
         self.shut()
         self._topic = name
         self.view.clear()
+        self.freeze.setChecked(False)
         self.set_title("Image", name)
         if name:
             self._stream = self.session.images.stream(name)
@@ -77,9 +103,11 @@ class ImagePanel(PanelWidget):
         link = self.session.fleet.link(self._watched_robot) if self._watched_robot else None
         self.view.take(self._stream, boxes_on(link, self._topic) if link is not None else ())
         if self._stream.picture is not None:
-            self.pages.setCurrentWidget(self.view)
+            self._page(there=True)
         elif self._stream.error:
-            self.empty.say("This can't be shown as a picture", f"{self._stream.error}.")
+            self.empty.say("This can't be shown as a picture", f"{self._stream.error}.", "circle-x")
+            look = EmptyAction("Look at the message", self._inspect, "list-tree")
+            self.empty.set_actions([look])
 
     def _look_at_robot(self) -> None:
         link = owner_of(self.session, self._topic)
@@ -92,10 +120,74 @@ class ImagePanel(PanelWidget):
 
     def _say_nothing(self) -> None:
         if self._topic:
-            self.empty.say("No pictures yet", f"The next picture on {self._topic} appears here.")
+            self.empty.say("No pictures yet", f"The next picture on {self._topic} appears here.", "image")
+            self.empty.set_actions([])
         else:
-            self.empty.say("No pictures yet", "Pictures appear here as soon as a camera publishes them.")
-        self.pages.setCurrentWidget(self.empty)
+            words = "Pictures appear here as soon as a camera publishes them."
+            self.empty.say("No pictures yet", words, "image")
+            robot = EmptyAction("Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot")
+            self.empty.set_actions([robot])
+        self._page(there=False)
+
+    def _page(self, *, there: bool) -> None:
+        wanted = self.view if there else self.empty
+        if self.pages.currentWidget() is wanted and self.fit.isHidden() is not there:
+            return
+        self.pages.setCurrentWidget(wanted)
+        self.actions_of.set_enabled(there)
+        for button in (self.fit, self.freeze, self.keep):
+            button.setVisible(there)
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def _freeze_or_not(self) -> None:
+        self.freeze.setChecked(not self.freeze.isChecked())
+
+    def _hold(self, held: bool) -> None:
+        self.actions_of["freeze"].setChecked(held)
+        if self._stream is not None:
+            self._stream.hold(held)
+
+    def save_picture(self) -> None:
+        """Save what is shown as PNG, as large as it was received."""
+        message = self._message()
+        if message is not None:
+            self.job.save(message)
+
+    def copy_picture(self) -> None:
+        """Put what is shown on the clipboard, as large as it was received."""
+        message = self._message()
+        if message is not None:
+            self.job.copy(message)
+
+    def _message(self) -> Message | None:
+        return self.view.picture.message if self.view.picture is not None else None
+
+    def _saved(self, path: str) -> None:
+        folder = QUrl.fromLocalFile(str(Path(path).parent))
+        self.context.toast(
+            f"Saved {Path(path).name}", "Open folder", lambda: QDesktopServices.openUrl(folder)
+        )
+
+    def _copied(self, image: QImage) -> None:
+        QGuiApplication.clipboard().setImage(image)
+        self.context.toast(f"Copied the picture, {image.width()}\u00d7{image.height()}")
+
+    def _failed(self, sentence: str) -> None:
+        self.session.console.add("error", "image", f"the picture can't be kept: {sentence}")
+        self.session.alerts.put(
+            "snapshot", "error", "The picture can't be kept.", sentence, button="Look at the console",
+            action="panel:console",
+        )  # fmt: skip
+
+    def _show_actions(self, at: QPoint) -> None:
+        menu = Menu(self.theme, self)
+        menu.addActions(self.more_actions())
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(self.view.mapToGlobal(at))
+
+    def _inspect(self) -> None:
+        self.context.run(f"inspect:{self._topic}")
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
@@ -110,16 +202,20 @@ class ImagePanel(PanelWidget):
     def more_actions(self) -> list[QAction]:
         inspect = QAction(self.theme.icon("list-tree"), "Show in the inspector", self)
         inspect.setEnabled(bool(self._topic))
-        inspect.triggered.connect(lambda: self.context.run("panel.inspector"))
-        return [inspect]
+        inspect.triggered.connect(self._inspect)
+        line = QAction(self)
+        line.setSeparator(True)
+        return [*self.actions_of.listed(), line, inspect]
 
     def save_state(self) -> dict[str, object]:
-        return {"topic": self._topic}
+        return {"topic": self._topic, "place": self.view.place.saved()}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         topic = state.get("topic")
         if isinstance(topic, str) and topic:
             self.show_topic(topic)
+        self.view.place.restore(state.get("place"))
+        self.actions_of.show_checks()
 
     def _leave_robot(self) -> None:
         if self._watch is not None:
@@ -127,6 +223,7 @@ class ImagePanel(PanelWidget):
         self._watch, self._watched_robot = None, ""
 
     def shut(self) -> None:
+        self.job.wait()
         self._leave_robot()
         if self._stream is not None:
             self._stream.close()

@@ -1,0 +1,173 @@
+"""Where a picture lies in its view: how far it is zoomed, moved, turned and flipped. No widgets, no pixels.
+
+Places in the picture are shares of its width and height as it was received, 0 to 1 from its upper left
+corner; places in the view are logical pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, QSizeF
+from PySide6.QtGui import QTransform
+
+SMALLEST, LARGEST = 0.02, 64.0
+FILL_LIMIT = 1.34
+
+
+@dataclass(slots=True)
+class PicturePlace:
+    """How a person looks at a picture.
+
+    ``zoom`` is logical pixels for a pixel of the picture, None as large as fits; ``centre`` what is in the
+    middle of the view, as shares of the turned picture.
+    """
+
+    zoom: float | None = None
+    centre: tuple[float, float] = (0.5, 0.5)
+    turned: int = 0
+    flipped_across: bool = False
+    flipped_down: bool = False
+
+    # -- where --------------------------------------------------------------------------------------------
+
+    def seen_size(self, picture: QSizeF) -> QSizeF:
+        """The size of the turned picture."""
+        return picture.transposed() if self.turned % 180 else picture
+
+    def fitting(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> float:
+        """The zoom at which it fits; ``fill`` lets its edges be cut by a tenth."""
+        seen = self.seen_size(picture)
+        across, down = view.width() / max(1.0, seen.width()), view.height() / max(1.0, seen.height())
+        scale = min(across, down)
+        if fill and scale > 0 and max(across, down) / scale < FILL_LIMIT:
+            return max(across, down)
+        return scale
+
+    def area(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> QRectF:
+        """Where the turned picture lies; it may reach beyond the view, but leaves no needless gap."""
+        scale = self.zoom if self.zoom is not None else self.fitting(view, picture, fill=fill)
+        seen = self.seen_size(picture) * scale
+        x, y = self.centre if self.zoom is not None else (0.5, 0.5)
+        left = _placed(view.width(), seen.width(), x)
+        top = _placed(view.height(), seen.height(), y)
+        return QRectF(left, top, seen.width(), seen.height())
+
+    def orientation(self) -> QTransform:
+        """From a place in the picture to the place in the turned and flipped one, both as shares."""
+        made = QTransform()
+        made.translate(0.5, 0.5)
+        made.scale(-1 if self.flipped_across else 1, -1 if self.flipped_down else 1)
+        made.rotate(self.turned)
+        made.translate(-0.5, -0.5)
+        return made
+
+    def to_view(self, area: QRectF) -> QTransform:
+        """From a place in the picture (shares) to the view."""
+        made = QTransform()
+        made.translate(area.x(), area.y())
+        made.scale(area.width(), area.height())
+        return self.orientation() * made
+
+    def to_picture(self, at: QPointF, area: QRectF) -> QPointF:
+        """What of the picture (shares) is at a point of the view; outside 0 to 1 beside the picture."""
+        back, _good = self.to_view(area).inverted()
+        return back.map(at)
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def zoom_at(self, factor: float, at: QPointF, view: QSizeF, picture: QSizeF) -> None:
+        """Zoom; what is at this point of the view stays there."""
+        area = self.area(view, picture)
+        before = area.width() / max(1.0, self.seen_size(picture).width())
+        smallest = min(SMALLEST, self.fitting(view, picture))
+        after = min(LARGEST, max(smallest, before * factor))
+        share_x = (at.x() - area.x()) / max(1e-9, area.width())
+        share_y = (at.y() - area.y()) / max(1e-9, area.height())
+        seen = self.seen_size(picture) * after
+        self.zoom = after
+        self.centre = (
+            share_x + (view.width() / 2 - at.x()) / max(1e-9, seen.width()),
+            share_y + (view.height() / 2 - at.y()) / max(1e-9, seen.height()),
+        )
+        self._settle(view, picture)
+
+    def move(self, dx: float, dy: float, view: QSizeF, picture: QSizeF) -> None:
+        """Move the picture by some pixels; one that fits stays where it is."""
+        area = self.area(view, picture)
+        if self.zoom is None:
+            return
+        self.centre = (
+            (view.width() / 2 - area.x() - dx) / max(1e-9, area.width()),
+            (view.height() / 2 - area.y() - dy) / max(1e-9, area.height()),
+        )
+        self._settle(view, picture)
+
+    def set_zoom(self, zoom: float | None) -> None:
+        """So many pixels for one of the picture, or as large as fits."""
+        self.zoom = zoom if zoom is None else min(LARGEST, max(SMALLEST, zoom))
+        if zoom is None:
+            self.centre = (0.5, 0.5)
+
+    def turn(self, degrees: int) -> None:
+        """Turn what is seen clockwise by a multiple of 90."""
+        quarter = -degrees if self.flipped_across != self.flipped_down else degrees
+        self.turned = (self.turned + quarter) % 360
+        if degrees % 180:
+            x, y = self.centre
+            self.centre = (1 - y, x) if degrees % 360 == 90 else (y, 1 - x)
+        elif degrees % 360:
+            self.centre = (1 - self.centre[0], 1 - self.centre[1])
+
+    def flip(self, *, across: bool) -> None:
+        """Mirror what is seen, left and right or top and bottom."""
+        x, y = self.centre
+        if across:
+            self.flipped_across, self.centre = not self.flipped_across, (1 - x, y)
+        else:
+            self.flipped_down, self.centre = not self.flipped_down, (x, 1 - y)
+
+    def _settle(self, view: QSizeF, picture: QSizeF) -> None:
+        """Forget a centre that can't be: the next step begins where the picture is seen."""
+        area = self.area(view, picture)
+        self.centre = (
+            (view.width() / 2 - area.x()) / max(1e-9, area.width()),
+            (view.height() / 2 - area.y()) / max(1e-9, area.height()),
+        )
+
+    # -- kept with the layout -----------------------------------------------------------------------------
+
+    def saved(self) -> dict[str, object]:
+        """For a layout."""
+        return {
+            "zoom": self.zoom,
+            "centre": list(self.centre),
+            "turned": self.turned,
+            "across": self.flipped_across,
+            "down": self.flipped_down,
+        }
+
+    def restore(self, saved: object) -> None:
+        """Take over what `saved` gave; whatever does not fit is left out."""
+        if not isinstance(saved, Mapping):
+            return
+        zoom, centre, turned = saved.get("zoom"), saved.get("centre"), saved.get("turned")
+        if isinstance(zoom, (int, float)) and not isinstance(zoom, bool) and zoom > 0:
+            self.set_zoom(float(zoom))
+            if (
+                isinstance(centre, list)
+                and len(centre) == 2
+                and all(isinstance(n, (int, float)) for n in centre)
+            ):
+                self.centre = (float(centre[0]), float(centre[1]))
+        if turned in {0, 90, 180, 270}:
+            self.turned = int(turned)
+        self.flipped_across, self.flipped_down = saved.get("across") is True, saved.get("down") is True
+
+
+def _placed(room: float, length: float, centre: float) -> float:
+    """Where something of this length begins so that ``centre`` of it is in the middle, and no gap is left."""
+    if length <= room:
+        return (room - length) / 2
+    return min(0.0, max(room - length, room / 2 - centre * length))

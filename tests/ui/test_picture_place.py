@@ -1,0 +1,116 @@
+"""Zoom, move, turn and flip: what is at which point of the view."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from PySide6.QtCore import QPointF, QRectF, QSizeF
+
+from app.ui.picture_place import LARGEST, PicturePlace
+
+VIEW, PICTURE = QSizeF(400, 300), QSizeF(800, 400)
+
+
+def place_of(place: PicturePlace, at: QPointF) -> tuple[float, float]:
+    found = place.to_picture(at, place.area(VIEW, PICTURE))
+    return round(found.x(), 6), round(found.y(), 6)
+
+
+def test_at_first_it_fits_in_the_middle_and_may_fill() -> None:
+    place = PicturePlace()
+    assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
+    assert place.area(VIEW, PICTURE, fill=True) == QRectF(0, 50, 400, 200)  # too much would be cut
+    assert place.area(VIEW, QSizeF(640, 420), fill=True).height() == 300
+    place.turn(90)
+    assert place.area(VIEW, PICTURE) == QRectF(125, 0, 150, 300)
+
+
+@pytest.mark.parametrize("turned", [0, 90, 180, 270])
+@pytest.mark.parametrize(("across", "down"), list(itertools.product([False, True], repeat=2)))
+def test_zooming_keeps_what_is_under_the_mouse_however_it_is_turned(turned, across, down) -> None:
+    place = PicturePlace()
+    place.turn(turned)
+    for wanted, flip in ((across, True), (down, False)):
+        if wanted:
+            place.flip(across=flip)
+    area = place.area(VIEW, PICTURE)
+    at = QPointF(area.x() + area.width() * 0.3, area.y() + area.height() * 0.6)
+    before = place_of(place, at)
+    place.zoom_at(7.0, at, VIEW, PICTURE)
+    assert place_of(place, at) == pytest.approx(before, abs=1e-5)
+    place.zoom_at(1 / 1.2, at, VIEW, PICTURE)
+    assert place_of(place, at) == pytest.approx(before, abs=1e-5)
+
+
+def test_moving_takes_the_picture_with_the_mouse_up_to_its_edge() -> None:
+    place = PicturePlace()
+    place.set_zoom(2.0)
+    before = place_of(place, QPointF(100, 100))
+    place.move(50, -20, VIEW, PICTURE)
+    assert place_of(place, QPointF(150, 80)) == pytest.approx(before)
+    place.move(1e6, 1e6, VIEW, PICTURE)
+    assert place.area(VIEW, PICTURE).topLeft() == QPointF(0, 0)
+    place.move(-10, -10, VIEW, PICTURE)  # at once, not after the way beyond the edge
+    assert place.area(VIEW, PICTURE).topLeft() == QPointF(-10, -10)
+
+
+def test_what_fits_cannot_be_moved() -> None:
+    place = PicturePlace()
+    place.move(30, 30, VIEW, PICTURE)
+    assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
+
+
+def test_zoom_has_limits() -> None:
+    place = PicturePlace()
+    middle = QPointF(200, 150)
+    place.zoom_at(1e9, middle, VIEW, PICTURE)
+    assert place.zoom == LARGEST
+    place.zoom_at(1e-9, middle, VIEW, PICTURE)
+    assert place.zoom is not None
+    assert 0 < place.zoom <= 0.02
+
+
+@pytest.mark.parametrize("turns", range(1, 4))
+def test_turning_is_what_is_seen_also_when_flipped(turns: int) -> None:
+    upright, flipped = PicturePlace(), PicturePlace()
+    flipped.flip(across=True)
+    corner = QPointF(0, 0)
+    for place in (upright, flipped):
+        place.turn(90 * turns)
+    # a quarter to the right brings the upper left corner to the upper right
+    seen = [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][turns - 1]
+    mapped = upright.orientation().map(corner)
+    assert (round(mapped.x(), 6), round(mapped.y(), 6)) == seen
+    mapped = flipped.orientation().map(QPointF(1, 0))  # it was seen at the upper left
+    assert (round(mapped.x(), 6), round(mapped.y(), 6)) == seen
+
+
+def test_four_quarters_and_two_flips_are_nothing() -> None:
+    place = PicturePlace()
+    place.set_zoom(2.0)
+    place.move(40, 30, VIEW, PICTURE)
+    before = place.saved()
+    for _ in range(4):
+        place.turn(90)
+    place.turn(180)
+    place.turn(-180)
+    for across in (True, False, True, False):
+        place.flip(across=across)
+    after = place.saved()
+    assert after.pop("centre") == pytest.approx(before.pop("centre"))
+    assert after == before
+
+
+def test_it_comes_back_with_the_layout_and_nonsense_is_left_out() -> None:
+    place = PicturePlace()
+    place.zoom_at(4.0, QPointF(10, 90), VIEW, PICTURE)
+    place.turn(270)
+    place.flip(across=False)
+    again = PicturePlace()
+    again.restore(place.saved())
+    assert again == place
+    for broken in (None, [], {"zoom": True, "turned": 45, "centre": "x"}, {"zoom": -1, "centre": [1]}):
+        fresh = PicturePlace()
+        fresh.restore(broken)
+        assert fresh == PicturePlace()
