@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-PROCESSES = ("app.blocks.child", "app.robots.simulated", "nep")
+PROCESSES = ("app.blocks.child", "app.robots.simulated", "app.robots.turtle", "nep")
 
 
 def window_parser() -> argparse.ArgumentParser:

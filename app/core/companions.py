@@ -15,6 +15,8 @@ from nep.errors import NepError
 from nep.masters import is_running, start_process
 
 END_WAIT_S = 2.0
+VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
+"""The module of each model of virtual robot."""
 TAIL_BYTES = 2000
 
 
@@ -65,15 +67,15 @@ class Companions:
         self._starting = threading.Thread(target=self._start_master, name="studio-companions", daemon=True)
         self._starting.start()
 
-    def start_virtual_robot(self, name: str = "Pepper") -> None:
-        """Start a virtual robot of that name; nothing happens when it runs already."""
+    def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
+        """Start a virtual robot of that name and model; nothing happens when it runs already."""
         with self._lock:
             held = self._robots.get(name)
             if held is not None and held[0].poll() is None:
                 return
             log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  open while the process writes
             command = [
-                *module_command("app.robots.simulated"),
+                *module_command(VIRTUAL_ROBOTS[model]),
                 "--name",
                 name,
                 "--owner-pid",
@@ -97,7 +99,7 @@ class Companions:
                 return
             self._robots[name] = (process, log)
 
-    def restart_virtual_robot(self, name: str) -> None:
+    def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
         """Start it anew; a process of it that still lives but hangs is killed."""
         with self._lock:
             held = self._robots.pop(name, None)
@@ -105,7 +107,7 @@ class Companions:
             held[0].kill()
             held[0].wait()
             held[1].close()
-        self.start_virtual_robot(name)
+        self.start_virtual_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
         """End a virtual robot that was started here."""

@@ -99,3 +99,7 @@ class Call:
         if self.canceled:
             raise Canceled
         self._report(values)
+
+    def last(self, **values: object) -> None:
+        """Tell how far it came, also when it is canceled: a pause does the rest of it later."""
+        self._report(values)

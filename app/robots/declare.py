@@ -34,6 +34,8 @@ class action:  # noqa: N801 - used as a decorator
 
     `text` is its block with ``%parameter`` in it, `says` the same in the third person. `rize` names RIZE's
     primitive; `from_rize` turns RIZE's input and options into the action's input where names alone don't.
+    `repeat_s` is for actions that go on when their function has returned (a speed): the program that asked
+    must stay alive, and `repeat_s` is how often other tools may send it again.
     """
 
     text: str
@@ -46,6 +48,7 @@ class action:  # noqa: N801 - used as a decorator
     timeout_s: float | None = None
     risk: Risk | None = None
     cancellable: bool = True
+    repeat_s: float | None = None
     output: Mapping[str, object] | None = None
     feedback: Mapping[str, object] | None = None
     rize: str | None = None
@@ -67,7 +70,7 @@ class action:  # noqa: N801 - used as a decorator
         if self.feedback:
             part["rb:feedback"] = fields_schema(self.feedback)
         part |= {"rb:cancel": self.cancellable, "rb:uses": list(self.uses), "rb:onBusy": self.on_busy}
-        part |= _given({"rb:timeout": self.timeout_s, "rb:risk": self.risk})
+        part |= _given({"rb:timeout": self.timeout_s, "rb:risk": self.risk, "rb:repeat": self.repeat_s})
         block: Schema = {"category": self.category, "icon": self.icon, "text": {"en": self.text}}
         part["rb:block"] = block | ({"says": {"en": self.says}} if self.says else {})
         return part

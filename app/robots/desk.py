@@ -10,7 +10,8 @@ from app.robots.calls import Call
 from app.robots.inputs import near_miss
 from app.robots.members import as_part, text
 from app.robots.parts import Action, Robot
-from app.robots.tasks import Answer, Task, Tasks
+from app.robots.task import Answer, Task
+from app.robots.tasks import Tasks
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 _LONGEST_ID = 200
@@ -53,7 +54,12 @@ class Desk:
         self._publish({"op": "alive", "id": "", "action": "", "state": "running"})
 
     def task(
-        self, wanted: str, action: Action, given: Mapping[str, object], answer: Callable[[Answer], None]
+        self,
+        wanted: str,
+        action: Action,
+        given: Mapping[str, object],
+        answer: Callable[[Answer], None],
+        program: str | None = None,
     ) -> Task:
         """The task that runs an action of the body with an input that has been checked."""
         typed = {name: _typed(action, name, value) for name, value in action.complete(given).items()}
@@ -72,6 +78,8 @@ class Desk:
             timeout_s=action.timeout_s,
             cancellable=action.cancellable,
             title=action.title,
+            program=program,
+            goes_on=action.repeat_s is not None,
         )
 
     def unknown(self, name: str) -> str:
@@ -98,7 +106,7 @@ class Desk:
             answer(Answer("failed", error="; ".join(sentences)))
             return
         self._open.add(wanted)
-        self._tasks.submit(self.task(wanted, action, as_part(given), answer))
+        self._tasks.submit(self.task(wanted, action, as_part(given), answer, program))
 
     def _cancel(self, wanted: str, name: str) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted)

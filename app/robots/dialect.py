@@ -17,7 +17,8 @@ from app.robots.desk import Desk
 from app.robots.inputs import Parameter
 from app.robots.members import as_part, names, number_of
 from app.robots.parts import Action, Robot
-from app.robots.tasks import Answer, Task, Tasks
+from app.robots.task import Answer, Task
+from app.robots.tasks import Tasks
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 _LONGEST_WAIT_S = 3600.0

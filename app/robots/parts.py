@@ -20,7 +20,10 @@ class Field:
 
 @dataclass(frozen=True)
 class Action:
-    """Something the robot can do; ``text`` is its block: ``%robot`` once, then words and ``%parameter``."""
+    """Something the robot can do; ``text`` is its block: ``%robot`` once, then words and ``%parameter``.
+
+    One with ``repeat_s`` goes on when it has succeeded (a speed), until a stop or the next one.
+    """
 
     name: str
     title: str
@@ -39,6 +42,7 @@ class Action:
     synchronous: bool = False
     feedback: tuple[Field, ...] = ()
     output: tuple[Field, ...] = ()
+    repeat_s: float | None = None
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter of that name, or None."""

@@ -79,6 +79,7 @@ def _action(name: str, action: Mapping[str, object], topics: Topics) -> Action:
         synchronous=action.get("synchronous") is True,
         feedback=_fields(part(action, "rb:feedback")),
         output=_fields(part(action, "output")),
+        repeat_s=number(action.get("rb:repeat")),
     )
 
 

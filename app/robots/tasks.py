@@ -10,71 +10,18 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal, TypeAlias
 
 from app.robots.calls import Call, Canceled, Clock, Failed
+from app.robots.task import Answer, Task
+from app.robots.watchdog import Watchdog
 
-State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "canceled"]
 BEAT_S = 0.5
 """While something runs or waits, the robot says at least so often that it lives."""
 _LONGEST_QUEUE = 50
 _GRACE_S = 1.0
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Answer:
-    """How a task stands; `error` is a sentence for people.
-
-    An accepted one may wait for other actions (`waits_for`) or have ended them (`replaces`).
-    """
-
-    state: State
-    output: Mapping[str, object] = field(default_factory=dict)
-    feedback: Mapping[str, object] = field(default_factory=dict)
-    error: str | None = None
-    waits_for: tuple[str, ...] = ()
-    replaces: tuple[str, ...] = ()
-
-    @property
-    def is_final(self) -> bool:
-        """True when no other answer follows."""
-        return self.state in {"succeeded", "failed", "canceled"}
-
-
-@dataclass(eq=False)
-class Task:
-    """Something to run: `run` gets its :class:`Call` in a thread, `answer` is called in the deciding one."""
-
-    id: str
-    action: str
-    run: Callable[[Call], object]
-    answer: Callable[[Answer], None]
-    uses: tuple[str, ...] = ()
-    on_busy: str = "queue"
-    timeout_s: float | None = None
-    cancellable: bool = True
-    title: str = ""
-    call: Call | None = None
-    thread: threading.Thread | None = None
-    due_s: float | None = None
-    ending: Answer | None = None
-    answered: bool = False
-
-    def end(self, how: Answer) -> None:
-        """Ask the running function to end; `how` is what will be answered, whatever it returns."""
-        self.ending = self.ending or how
-        if self.call is not None:
-            self.call.cancel()
-
-    def finish(self, answer: Answer) -> None:
-        """Give the final answer, once."""
-        if not self.answered:
-            self.answered = True
-            self.answer(answer)
 
 
 class Tasks:
@@ -94,14 +41,13 @@ class Tasks:
         self._name, self._stop_body, self._clock, self._beat = name, stop, clock, beat
         self._next_beat_s = 0.0
         self._patience_s = max(1.0, 5 * within_s)
-        self._watchdog_s = watchdog_s
+        self._watchdog = Watchdog(watchdog_s)
         self._inbox: deque[Callable[[], None]] = deque()
         self._wake = threading.Event()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._decide, name=f"{name} commands", daemon=True)
         self._running: list[Task] = []
         self._queue: list[Task] = []
-        self._alive: dict[str, float] = {}
         self._stopper: threading.Thread | None = None
         self._stop_answers: list[tuple[float, Callable[[Answer], None]]] = []
 
@@ -174,14 +120,13 @@ class Tasks:
 
     def sign_of_life(self, program: str, *, watch: bool) -> None:
         """A program said something; `watch` begins to expect more (it asked the robot to act)."""
-        if watch or program in self._alive:
-            self._alive[program] = self._clock.now()
+        self._watchdog.hear(program, self._clock.now(), watch=watch)
 
     def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
         """End everything; `answer` is called when the robot stands still and every function has ended."""
         if answer is not None:
             self._stop_answers.append((self._clock.now() + self._patience_s, answer))
-        self._alive.clear()
+        self._watchdog.reset()
         ended = Answer("canceled", error=why)
         self._drop(list(self._queue), ended)
         for task in self._running:
@@ -203,8 +148,7 @@ class Tasks:
     def _next_due(self) -> float | None:
         due = [task.due_s for task in self._running if task.due_s is not None]
         due += [limit for limit, _ in self._stop_answers]
-        if self._watchdog_s is not None:
-            due += [seen + self._watchdog_s for seen in self._alive.values()]
+        due += self._watchdog.due()
         if self._beat is not None and self._is_busy:
             due.append(self._next_beat_s)
         return max(0.0, min(due) - self._clock.now()) if due else None
@@ -225,9 +169,9 @@ class Tasks:
         names = ", ".join(task.action for task in self._running) or "the stop itself"
         for answer in late:
             answer(Answer("failed", error=f"{self._name} may still move: {names} did not end"))
-        silent = [name for name, seen in self._alive.items() if now - seen >= (self._watchdog_s or now)]
-        if silent:
-            self.stop(None, f"no sign of life from its program for {self._watchdog_s:g} s")
+        acting = [task.program for task in (*self._running, *self._queue)]
+        if self._watchdog.bites(now, acting):
+            self.stop(None, f"no sign of life from its program for {self._watchdog.patience_s:g} s")
 
     def _end(self, task: Task, how: Answer) -> None:
         """Ask for the end; a function that goes on all the same is answered for after a second."""
@@ -262,6 +206,7 @@ class Tasks:
         task.call = Call(task.action, self._clock, report)
         task.due_s = None if task.timeout_s is None else self._clock.now() + task.timeout_s
         self._running.append(task)
+        self._watchdog.begins(task)
         task.answer(Answer("running"))
         name = f"{self._name} {task.action}"
         task.thread = threading.Thread(target=self._work, args=(task, task.call), name=name, daemon=True)
@@ -288,6 +233,8 @@ class Tasks:
         if task.thread is not None:
             task.thread.join(_JOIN_S)
         self._running.remove(task)
+        if done.state == "succeeded" and task.ending is None:
+            self._watchdog.ends_well(task)
         # A function that was told to end may return as if it had finished: what was asked counts.
         task.finish(done if task.ending is None or done.state == "failed" else task.ending)
         self._start_ready()

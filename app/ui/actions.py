@@ -71,8 +71,10 @@ TABLE: tuple[Row, ...] = (
     Row("run.pause", "Run", "Pause", "F8", "pause"),
     Row("run.step", "Run", "Step", "F10", "step-forward"),
     Row("run.stop", "Run", "Stop the program and all robots", "F12", "square", above=True, everywhere=True),
-    Row("robots.virtual", "Robots", "Use the virtual robot", "", "bot"),
-    Row("robots.show", "Robots", "Try what a robot can do", "", "eye"),
+    Row("robots.virtual", "Robots", "Use the virtual Pepper", "", "bot"),
+    Row("robots.turtle", "Robots", "Use the virtual Turtle", "", "bot"),
+    Row("robots.show", "Robots", "Try what a robot can do", "", "eye", above=True),
+    Row("robots.ask", "Robots", "Ask again before real robots move", "", "footprints"),
     Row("help.shortcuts", "Help", "Keyboard shortcuts", "F1", "keyboard"),
     Row("help.about", "Help", "About NEP Studio", "", "info"),
 )

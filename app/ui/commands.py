@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 
 from PySide6.QtCore import Qt
 
+from app.core.companions import VIRTUAL_ROBOTS
 from app.ui.actions import Actions, Handler
 from app.ui.docks import Dock
 from app.ui.files import Asks, Files, SystemDialogs
@@ -86,6 +87,8 @@ class Commands:
             "run.step": lambda: files.with_newest(session.runs.step),
             "run.stop": session.runs.stop,
             "robots.virtual": self._virtual_robot,
+            "robots.turtle": self._virtual_turtle,
+            "robots.ask": self._ask_before_moving,
             "robots.show": lambda: window.open_panel("robots"),
             "help.about": lambda: self._sheet("NEP Studio", [(line, "") for line in ABOUT]),
         }
@@ -144,10 +147,12 @@ class Commands:
 
     def _connect_robot(self, name: str) -> None:
         """A virtual robot starts; for a real one the list of robots shows."""
-        description = self._session.document.robots.get(name, {})
-        virtual = description.get("rb:robot")
-        if isinstance(virtual, Mapping) and virtual.get("virtual") is True:
-            self._session.companions.restart_virtual_robot(name)
+        link = self._session.fleet.link(name)
+        described = link.robot.source if link is not None else self._session.document.robots.get(name, {})
+        kind = described.get("rb:robot")
+        model = str(kind.get("model")) if isinstance(kind, Mapping) and kind.get("virtual") is True else ""
+        if model in VIRTUAL_ROBOTS:
+            self._session.companions.restart_virtual_robot(name, model)
         else:
             self._window.open_panel("robots")
 
@@ -183,6 +188,16 @@ class Commands:
     def _virtual_robot(self) -> None:
         self._start_robot()
         self._show("behaviour")
+
+    def _virtual_turtle(self) -> None:
+        self._session.companions.start_virtual_robot("Turtle", "diffdrive")
+        if self._window.bench is None:
+            self._show("behaviour")
+        self._window.toast.say("The virtual Turtle is coming")
+
+    def _ask_before_moving(self) -> None:
+        self._session.fleet.moving.forget()
+        self._window.toast.say("Studio asks again before a real robot moves")
 
     def _sheet(self, title: str, lines: list[tuple[str, str]]) -> None:
         Sheet(self._window.theme, self._window, title, lines).show_over()

@@ -43,6 +43,7 @@ class Acting(Senses):
                 call.feedback(to_go=round(abs(motion.remaining), 2))
         except Canceled:
             self._brake(motion)
+            call.last(to_go=round(abs(motion.remaining), 3))
             raise
         return motion
 

@@ -22,14 +22,21 @@ def drawable(body: Body) -> dict[str, object]:
         **{f"elbow_{side}_deg": round(joint.angle, 1) for side, joint in body.elbows.items()},
         "moving": not body.still,
         "touched": sorted(body.touched),
-        "objects": _objects(body.room),
+        **surroundings(body.room),
+    }
+
+
+def surroundings(room: Room) -> dict[str, object]:
+    """The room and what is in it."""
+    return {
+        "objects": _objects(room),
         "room": {
-            "x_min": body.room.x_min,
-            "x_max": body.room.x_max,
-            "y_min": body.room.y_min,
-            "y_max": body.room.y_max,
-            "height": body.room.height,
-            "openings": [vars(opening) for opening in body.room.openings],
+            "x_min": room.x_min,
+            "x_max": room.x_max,
+            "y_min": room.y_min,
+            "y_max": room.y_max,
+            "height": room.height,
+            "openings": [vars(opening) for opening in room.openings],
         },
     }
 

@@ -135,8 +135,8 @@ class Life:
 
     # ---- time and people --------------------------------------------------------------------------
 
-    def _beat(self, rate_hz: float) -> _Beat:
-        return _Beat(self._clock, self._ended, 1 / rate_hz)
+    def _beat(self, rate_hz: float) -> Beat:
+        return Beat(self._clock, self._ended, 1 / rate_hz)
 
     def act(self, change: Mapping[str, object]) -> None:
         """A person does something to the world: touch, move, say, reset."""
@@ -153,14 +153,14 @@ class Life:
                 self.body.reset(self._start_room)
 
 
-class _Beat:
+class Beat:
     """Times of a steady beat, until an event is set; beats that are late are left out, not made up for."""
 
     def __init__(self, clock: Clock, ended: threading.Event, period_s: float) -> None:
         self._clock, self._ended, self._period_s = clock, ended, period_s
         self._next = clock.now()
 
-    def __iter__(self) -> _Beat:
+    def __iter__(self) -> Beat:
         return self
 
     def __next__(self) -> float:

@@ -1,0 +1,283 @@
+"""A robot on two wheels with a camera: what it can do, and how it does it with any base that has a speed.
+
+A driver gives it its wheels (:class:`Wheels`): a real base over its own line, or the virtual one of
+:mod:`app.robots.turtle`. Distances are measured with the base's own place (odometry).
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping
+from typing import Annotated, Literal, Protocol
+
+from app.robots.calls import Call, Canceled, Failed, Link
+from app.robots.declare import Kind, action, event, picture, safe_stop, sensor
+from app.robots.typed import Colour, Range, Title
+
+MOVEMENT, LIGHTS = "Movement", "Lights"
+STEP_S = 1 / 30
+FEEDBACK_STEPS = 6
+SPEED, TURN_SPEED = 0.35, 80.0
+SLOWEST, SLOWEST_TURN = 0.03, 6.0
+SLOW_DOWN, TURN_SLOW_DOWN = 0.5, 200.0  # m/s², °/s²
+ARRIVED_M, ARRIVED_DEG = 0.008, 0.8
+FAR_ENOUGH_M = 0.03
+STAND_STILL_S = 1.0
+REACH_M = 5.0
+
+Distance = Annotated[float, Range(-REACH_M, REACH_M, 0.05, "m")]
+
+
+class Wheels(Protocol):
+    """What the robot needs of its base. Each may be called from any thread."""
+
+    def drive(self, speed: float, turn_speed: float) -> None:
+        """Go at this speed (m/s, forwards positive) and turn (°/s, left positive); 0, 0 brakes."""
+
+    def pose(self) -> tuple[float, float, float]:
+        """Where it is: metres, metres, degrees."""
+
+    def still(self) -> bool:
+        """Whether it stands still."""
+
+    def bumped(self) -> str:
+        """The side that touches something, or "" for none."""
+
+    def light(self, colour: str) -> None:
+        """Give its light a colour, ``#rrggbb``."""
+
+    def close(self) -> None:
+        """Let go of the base."""
+
+
+class DiffDrive:
+    """Declares the robot and drives its wheels."""
+
+    pose = sensor(
+        {
+            "x": Annotated[float, Range(unit="m")],
+            "y": Annotated[float, Range(unit="m")],
+            "theta": Annotated[float, Range(unit="deg"), Title("facing")],
+        },
+        title="position",
+        icon="navigation",
+        rate_hz=30,
+    )
+    distance = sensor(
+        Annotated[float, Range(0, 4, unit="m")], title="distance", text="distance", icon="ruler", rate_hz=10
+    )
+    bumper = sensor(bool, title="bumper", text="touches something", icon="octagon-alert", rate_hz=10)
+    battery = sensor(
+        Annotated[int, Range(0, 100, unit="%")], title="battery", text="battery", icon="battery-medium"
+    )
+    camera = picture(title="camera", width=320, height=240, rate_hz=15, hfov_deg=56.3)
+    bump = event(
+        "when %robot bumps on the %side",
+        title="bumped",
+        icon="octagon-alert",
+        fields={"side": Literal["left", "right", "front", "back"]},
+        choose=("side",),
+    )
+    colour = event(
+        "when %robot sees something %name",
+        title="colour seen",
+        icon="palette",
+        fields={
+            "name": Literal["red", "green", "blue"],
+            "x": Annotated[float, Range(-1, 1)],
+            "area": Annotated[float, Range(0, 1)],
+        },
+        choose=("name",),
+    )
+
+    def __init__(self, link: Link, wheels: Wheels) -> None:
+        """`wheels` are its base; it is closed with the robot."""
+        self.link, self.wheels = link, wheels
+        self._steering = threading.Lock()
+
+    def close(self) -> None:
+        """Let go of the base."""
+        self.wheels.close()
+
+    # ---- actions ----------------------------------------------------------------------------------
+
+    @action(
+        "drive at %speed m/s turning %turn °/s",
+        MOVEMENT,
+        "joystick",
+        says="drives at %speed m/s",
+        uses=("base",),
+        on_busy="replace",
+        risk="locomotes",
+        cancellable=False,
+        repeat_s=0.2,
+    )
+    def drive(
+        self,
+        call: Call,
+        speed: Annotated[float, Range(-0.5, 0.5, 0.05, "m/s", "slider")] = 0.2,
+        turn: Annotated[float, Range(-90, 90, 5, "deg/s", "slider")] = 0.0,
+    ) -> None:
+        """Keep moving until the next drive or stop; the watchdog stops it when its program falls silent."""
+        self._go(call, speed, turn)
+
+    @action(
+        "move %distance m",
+        MOVEMENT,
+        "footprints",
+        says="moves %distance m",
+        uses=("base",),
+        on_busy="replace",
+        timeout_s=60,
+        risk="locomotes",
+        feedback={"moved": Annotated[float, Range(unit="m")]},
+        output={"moved": Annotated[float, Range(unit="m")]},
+    )
+    def move(self, call: Call, distance: Distance = 0.5) -> Mapping[str, object]:
+        """Move straight, backwards when the distance is negative."""
+        return {"moved": round(self._roll(call, distance, lambda moved: {"moved": moved}), 3)}
+
+    @action(
+        "turn %angle °",
+        MOVEMENT,
+        "rotate-ccw",
+        says="turns %angle °",
+        uses=("base",),
+        on_busy="replace",
+        timeout_s=60,
+        risk="locomotes",
+        feedback={"turned": Annotated[float, Range(unit="deg")]},
+    )
+    def turn(self, call: Call, angle: Annotated[float, Range(-360, 360, 5, "deg", "angle")] = 90.0) -> None:
+        """Turn on the spot, to the left when positive."""
+        self._spin(call, angle, lambda turned: {"turned": turned})
+
+    @action(
+        "go to x %x m y %y m",
+        MOVEMENT,
+        "map-pin",
+        title="go to",
+        says="goes to %x, %y m",
+        uses=("base",),
+        on_busy="replace",
+        timeout_s=60,
+        risk="locomotes",
+        feedback={"to_go": Annotated[float, Range(unit="m"), Title("to go")]},
+    )
+    def go_to(self, call: Call, x: Distance = 0.0, y: Distance = 0.0) -> None:
+        """Turn to a place and move there straight; it does not drive round what is in the way."""
+        here_x, here_y, facing = self.wheels.pose()
+        away = math.hypot(x - here_x, y - here_y)
+        if away < FAR_ENOUGH_M:
+            return
+        turn = math.degrees(math.atan2(y - here_y, x - here_x)) - facing
+        self._spin(call, (turn + 180.0) % 360.0 - 180.0, lambda _: {"to_go": round(away, 2)})
+        self._roll(call, away, lambda moved: {"to_go": round(max(0.0, away - moved), 2)})
+
+    @action(
+        "light %colour",
+        LIGHTS,
+        "lightbulb",
+        says="lights up",
+        uses=("light",),
+        on_busy="replace",
+        cancellable=False,
+    )
+    def light(self, call: Call, colour: Colour = "#35c26b") -> None:  # noqa: ARG002 - it needs no call
+        """Give its light a colour."""
+        self.wheels.light(colour)
+
+    @safe_stop(watchdog_s=0.5, within_s=0.1)
+    def stop(self) -> None:
+        """Brake; returns when it stands still."""
+        with self._steering:  # what was being done has been canceled: it does not steer any more
+            self.wheels.drive(0.0, 0.0)
+        waited = threading.Event()
+        for _ in range(round(STAND_STILL_S / 0.005)):
+            if self.wheels.still():
+                return
+            waited.wait(0.005)
+        raise Failed("its wheels go on turning")
+
+    # ---- steering ---------------------------------------------------------------------------------
+
+    def _go(self, call: Call, speed: float, turn_speed: float) -> None:
+        with self._steering:
+            if call.canceled:
+                raise Canceled
+            self.wheels.drive(speed, turn_speed)
+
+    def _brake(self) -> None:
+        with self._steering:
+            self.wheels.drive(0.0, 0.0)
+
+    def _roll(self, call: Call, distance: float, told: Callable[[float], dict[str, object]]) -> float:
+        """Go straight; the metres that were made. Failed when something is in the way."""
+        start_x, start_y, _ = self.wheels.pose()
+
+        def made() -> float:
+            x, y, _ = self.wheels.pose()
+            return math.hypot(x - start_x, y - start_y)
+
+        def steer(left: float) -> None:
+            speed = min(SPEED, max(SLOWEST, math.sqrt(2 * SLOW_DOWN * left)))
+            self._go(call, math.copysign(speed, distance), 0.0)
+
+        def tell(moved: float) -> None:
+            call.feedback(**told(round(moved, 2)))
+
+        self._steer(call, abs(distance), ARRIVED_M, made, steer, tell)
+        return made()
+
+    def _spin(self, call: Call, angle: float, told: Callable[[float], dict[str, object]]) -> None:
+        """Turn on the spot by an angle, whole turns included."""
+        last = [self.wheels.pose()[2]]
+        turned = [0.0]
+
+        def made() -> float:
+            now = self.wheels.pose()[2]
+            turned[0] += (now - last[0] + 180.0) % 360.0 - 180.0
+            last[0] = now
+            return abs(turned[0])
+
+        def steer(left: float) -> None:
+            speed = min(TURN_SPEED, max(SLOWEST_TURN, math.sqrt(2 * TURN_SLOW_DOWN * left)))
+            self._go(call, 0.0, math.copysign(speed, angle))
+
+        def tell(done: float) -> None:
+            call.feedback(**told(round(done, 1)))
+
+        self._steer(call, abs(angle), ARRIVED_DEG, made, steer, tell)
+
+    def _steer(
+        self,
+        call: Call,
+        amount: float,
+        near: float,
+        made: Callable[[], float],
+        steer: Callable[[float], None],
+        tell: Callable[[float], None],
+    ) -> None:
+        steps = 0
+        try:
+            while (left := amount - made()) > near:
+                if steps and self.wheels.bumped() and self.wheels.still():
+                    raise Failed(f"{call.action}: something is in the way")
+                steer(left)
+                if steps % FEEDBACK_STEPS == 0:
+                    tell(made())
+                steps += 1
+                call.wait(STEP_S)
+        finally:
+            self._brake()
+
+
+DIFFDRIVE = Kind(
+    model="diffdrive",
+    title="Differential-drive robot with a camera",
+    body=DiffDrive,
+    kinds=("mobile",),
+    driver="python",
+    description="Two wheels, a camera, a distance sensor and a bumper.",
+)

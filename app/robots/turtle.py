@@ -1,0 +1,176 @@
+"""The virtual robot on two wheels: ``python -m app.robots.turtle --name Turtle`` is its process.
+
+It lives in the same kind of room as the virtual Pepper and is drawn in it from ``/<name>/state``.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import cv2
+
+from app.robots.calls import Clock, Link, MonotonicClock
+from app.robots.diffdrive import DIFFDRIVE, DiffDrive
+from app.robots.process import main as drive
+from app.robots.virtual.camera import Camera
+from app.robots.virtual.colours import colours_in
+from app.robots.virtual.drawing import surroundings
+from app.robots.virtual.lens import Lens
+from app.robots.virtual.life import Beat
+from app.robots.virtual.wheels import RADIUS, WheelBody
+
+BODY_HZ, CAMERA_HZ = 60.0, 15.0
+_STATE_EVERY, _SLOW_EVERY, _CALM_EVERY = 2, 6, 60
+_LONGEST_STEP_S = 0.25
+_EYE_HEIGHT = 0.22
+_EYE_PITCH = -6.0
+_JOIN_S = 2.0
+
+
+class VirtualWheels:
+    """The body, the thread that moves it 60 times a second, and the one that looks 15 times."""
+
+    def __init__(self, link: Link, clock: Clock) -> None:
+        self.body = WheelBody()
+        self._link, self._clock = link, clock
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        self._start_room = self.body.room
+        self._camera = Camera(self.body.room)
+        self._seen: set[str] = set()
+        self._threads = [
+            threading.Thread(target=self._move, name=f"{link.name} wheels", daemon=True),
+            threading.Thread(target=self._look, name=f"{link.name} camera", daemon=True),
+        ]
+        link.on_world(self.act)
+
+    def start(self) -> None:
+        """Begin to live."""
+        cv2.setNumThreads(1)
+        for thread in self._threads:
+            thread.start()
+
+    # ---- Wheels -----------------------------------------------------------------------------------
+
+    def drive(self, speed: float, turn_speed: float) -> None:
+        """Ask for speeds."""
+        with self._lock:
+            self.body.drive(speed, turn_speed)
+
+    def pose(self) -> tuple[float, float, float]:
+        """Where it is."""
+        with self._lock:
+            return self.body.x, self.body.y, self.body.theta_deg
+
+    def still(self) -> bool:
+        """Whether it stands still."""
+        with self._lock:
+            return self.body.still
+
+    def bumped(self) -> str:
+        """The side that touches something."""
+        return self.body.bumped
+
+    def light(self, colour: str) -> None:
+        """The colour of its light."""
+        with self._lock:
+            self.body.light = colour
+
+    def close(self) -> None:
+        """End both threads."""
+        self._ended.set()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join(_JOIN_S)
+
+    # ---- living -----------------------------------------------------------------------------------
+
+    def _move(self) -> None:
+        last = self._clock.now()
+        for step, now in enumerate(Beat(self._clock, self._ended, 1 / BODY_HZ)):
+            seconds, last = min(now - last, _LONGEST_STEP_S), now
+            with self._lock:
+                self.body.step(seconds)
+                happenings = list(self.body.happenings)
+                self.body.happenings.clear()
+                state, distance = self._drawable(), self.body.distance
+            for happening in happenings:
+                self._link.happen(happening.event, **happening.data)
+            if step % _STATE_EVERY == 0:
+                self._link.tell("state", state)
+                self._link.sense("pose", {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]})
+            if step % _SLOW_EVERY == 0:
+                self._link.sense("distance", round(distance, 2))
+                self._link.sense("bumper", bool(state["bumped"]))
+            if step % _CALM_EVERY == 0:
+                self._link.sense("battery", int(self.body.battery))
+
+    def _drawable(self) -> dict[str, object]:
+        body = self.body
+        return {
+            "figure": "turtle",
+            "x": round(body.x, 3),
+            "y": round(body.y, 3),
+            "theta_deg": round(body.theta_deg, 1),
+            "eyes": body.light,
+            "moving": not body.still,
+            "bumped": body.bumped,
+            "radius": RADIUS,
+            **surroundings(body.room),
+        }
+
+    def _look(self) -> None:
+        for count, _ in enumerate(Beat(self._clock, self._ended, 1 / CAMERA_HZ)):
+            is_watched = self._link.watchers("camera") > 0
+            if not is_watched and count % 3:
+                continue
+            with self._lock:
+                body = self.body
+                room, lens = body.room, Lens((body.x, body.y, _EYE_HEIGHT), body.theta_deg, _EYE_PITCH)
+            taken = self._camera.picture(room, lens)
+            if is_watched:
+                self._link.sense("camera", taken)
+            found = colours_in(taken)
+            for name in found.keys() - self._seen:
+                self._link.happen("colour", name=name, x=found[name].x, area=found[name].area)
+            self._seen = set(found)
+
+    def act(self, change: Mapping[str, object]) -> None:
+        """A person moves things of its room, or puts all back."""
+        moved, x, y = change.get("move"), change.get("x"), change.get("y")
+        with self._lock:
+            if isinstance(moved, str) and isinstance(x, (int, float)) and isinstance(y, (int, float)):
+                self.body.room = self.body.room.moved(moved, float(x), float(y))
+            if change.get("reset") is True:
+                self.body.reset(self._start_room)
+
+
+class VirtualTurtle(DiffDrive):
+    """The robot on two wheels, in its room."""
+
+    def __init__(self, link: Link) -> None:
+        wheels = VirtualWheels(link, MonotonicClock())
+        super().__init__(link, wheels)
+        wheels.start()
+
+
+ROBOT = replace(
+    DIFFDRIVE,
+    title="Turtle",
+    body=VirtualTurtle,
+    virtual=True,
+    driver="virtual",
+    description="A virtual robot on two wheels in a small room: camera, distance, bumper, light.",
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Drive the virtual robot; the arguments are the kit's."""
+    return drive(ROBOT, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,112 @@
+"""The body of the virtual robot on two wheels: speeds, stepped in time; no clock, no threads."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+from app.robots.virtual.body import Happening
+from app.robots.virtual.room import Room
+
+RADIUS = 0.17
+START = (-0.9, -0.9, 35.0)
+LIGHT = "#35c26b"
+FULL_RANGE = 4.0
+ACCELERATION, BRAKING = 1.5, 10.0  # m/s²
+TURNING, TURN_BRAKING = 360.0, 2400.0  # °/s²
+_LONGEST_STEP_S = 0.01
+_DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
+_ASIDE_DEG = 50.0
+
+
+@dataclass
+class WheelBody:
+    """Where the robot is and how fast. The owner holds a lock around every call."""
+
+    room: Room = field(default_factory=Room)
+    x: float = START[0]
+    y: float = START[1]
+    theta_deg: float = START[2]
+    speed: float = 0.0
+    turn_speed: float = 0.0
+    light: str = LIGHT
+    battery: float = 91.3
+    bumped: str = ""
+    happenings: deque[Happening] = field(default_factory=lambda: deque(maxlen=200))
+    _wanted: tuple[float, float] = (0.0, 0.0)
+
+    def drive(self, speed: float, turn_speed: float) -> None:
+        """Ask for a speed (m/s, forwards positive) and a turn (°/s, left positive); 0, 0 brakes."""
+        self._wanted = (speed, turn_speed)
+
+    @property
+    def still(self) -> bool:
+        """True when nothing moves and nothing is asked for."""
+        return self._wanted == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
+
+    @property
+    def distance(self) -> float:
+        """From its rim to what is ahead, at most 4 m."""
+        ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
+        return min(FULL_RANGE, max(0.0, ahead))
+
+    def reset(self, room: Room) -> None:
+        """Back to the start, in this room."""
+        self.room, self._wanted, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
+        (self.x, self.y, self.theta_deg), self.light, self.bumped = START, LIGHT, ""
+
+    def step(self, seconds: float) -> None:
+        """Let time pass, in small steps so that nothing is driven through."""
+        while seconds > 1e-9:
+            dt = min(seconds, _LONGEST_STEP_S)
+            seconds -= dt
+            self._step(dt)
+
+    def _step(self, dt: float) -> None:
+        speed, turn_speed = self._wanted
+        self.speed = _towards(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
+        self.turn_speed = _towards(self.turn_speed, turn_speed, TURNING * dt, TURN_BRAKING * dt)
+        self.theta_deg = (self.theta_deg + self.turn_speed * dt + 180.0) % 360.0 - 180.0
+        if self.speed:
+            self._roll(self.speed * dt)
+        drain = _DRAIN_PER_S if self.still else _DRAIN_MOVING_PER_S
+        self.battery = max(0.0, self.battery - dt * drain)
+
+    def _roll(self, way: float) -> None:
+        x = self.x + way * math.cos(math.radians(self.theta_deg))
+        y = self.y + way * math.sin(math.radians(self.theta_deg))
+        if self.room.free(x, y, RADIUS):
+            self.x, self.y, self.bumped = x, y, ""
+            self.room = self.room.pushed_ball(x, y, RADIUS)
+            return
+        self.speed, self.turn_speed, self._wanted = 0.0, 0.0, (0.0, 0.0)
+        side = self._side(way)
+        if side != self.bumped:
+            self.bumped = side
+            self.happenings.append(Happening("bump", {"side": side}))
+
+    def _side(self, way: float) -> str:
+        """Where it touches: at the left, at the right, in front or at the back."""
+        if way < 0:
+            return "back"
+        touches = {
+            side: not self._free_towards(self.theta_deg + aside)
+            for side, aside in (("left", _ASIDE_DEG), ("right", -_ASIDE_DEG))
+        }
+        if touches["left"] == touches["right"]:
+            return "front"
+        return "left" if touches["left"] else "right"
+
+    def _free_towards(self, direction_deg: float) -> bool:
+        x = self.x + 0.03 * math.cos(math.radians(direction_deg))
+        y = self.y + 0.03 * math.sin(math.radians(direction_deg))
+        return self.room.free(x, y, RADIUS)
+
+
+def _towards(now: float, wanted: float, faster: float, slower: float) -> float:
+    """The speed after a moment: braking (also to turn round) is quicker than going faster."""
+    brakes = abs(wanted) < abs(now) or now * wanted < 0
+    change = slower if brakes else faster
+    goal = 0.0 if now * wanted < 0 else wanted
+    return goal if abs(goal - now) <= change else now + math.copysign(change, goal - now)
