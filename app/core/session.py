@@ -240,8 +240,9 @@ class Session:
     def _on_graph(self, view: GraphView, now: float) -> None:
         if self._learning.still(self.graph, view, now):
             return
-        if self.graph is not None:
-            for line in arrivals(self.graph, view):
+        before = self.graph
+        if before is not None and (before.epoch, before.revision) != (view.epoch, view.revision):
+            for line in arrivals(before, view):
                 self.console.add("info", "master", line)
         self.graph = view
         self.topics.update(view, now)

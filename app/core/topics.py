@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import platform
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 
 from app.core.mailbox import Batch
 from nep.errors import NepError
@@ -15,6 +16,7 @@ from nep.views import GraphView, TopicInfo
 
 GONE_SHOWN_S = 10.0
 RATES_KEPT = 60
+AT_ONCE = 1500
 
 
 @dataclass(slots=True, eq=False)
@@ -52,6 +54,7 @@ class Topic:
     gone_since: float | None = None
     last_stamp_ns: int | None = None
     last_received: float | None = None
+    info: TopicInfo | None = None
 
     @property
     def shown_of(self) -> tuple[int, int]:
@@ -74,6 +77,9 @@ class Topics:
         self._own = own if own is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
         self._first_graph = True
+        self._seen = (-1, -1)
+        self._view: GraphView | None = None
+        self._aged = 0
         self.revision = 0
         self.values_revision = 0
 
@@ -113,7 +119,19 @@ class Topics:
             self.revision += 1
 
     def update(self, view: GraphView, now: float) -> None:
-        """Take over a new graph; ``now`` is a monotonic clock in s."""
+        """Take over a new graph; ``now`` is a monotonic clock in s.
+
+        Where nobody came or went only the figures are renewed, of very many topics by and by (`age`).
+        """
+        seen = (view.epoch, view.revision)
+        if seen != self._seen:
+            self._take_all(view, now)
+        elif len(self._topics) <= AT_ONCE:
+            _renew(self._topics.values(), view)
+        self._seen, self._view = seen, view
+        self.values_revision += 1
+
+    def _take_all(self, view: GraphView, now: float) -> None:
         own = {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
         shown = {
             name: info
@@ -130,7 +148,6 @@ class Topics:
             if name not in shown and topic.gone_since is None:
                 self._vanish(topic, now)
         self._first_graph = False
-        self.values_revision += 1
 
     def forget(self, now: float) -> None:
         """The master is gone: nothing is known to be there."""
@@ -139,8 +156,17 @@ class Topics:
                 self._vanish(topic, now)
 
     def age(self, now: float, now_ns: int) -> None:
-        """Let time pass: ages grow, what vanished ten seconds ago leaves."""
-        for topic in list(self._topics.values()):
+        """Let time pass: ages grow, what vanished ten seconds ago leaves.
+
+        Of very many topics each call takes the next `AT_ONCE`, and renews their figures.
+        """
+        if self._aged >= len(self._topics):
+            self._aged = 0
+        begin, self._aged = self._aged, self._aged + AT_ONCE
+        some = list(islice(self._topics.values(), begin, self._aged))
+        if self._view is not None and len(self._topics) > AT_ONCE:
+            _renew(some, self._view)
+        for topic in some:
             if topic.gone_since is not None:
                 topic.gone_s = now - topic.gone_since
                 if topic.gone_s >= GONE_SHOWN_S and not topic.watched:
@@ -200,15 +226,27 @@ class Topics:
         topic.msg_type, topic.codec = info.msg_type, info.codec
         topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
         topic.publisher_nodes = _names(info, view)
-        topic.rate_hz, topic.bandwidth_Bps = info.rate_hz, info.bandwidth_Bps
-        topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
-        if info.last_stamp_ns is not None:
-            topic.last_stamp_ns = max(info.last_stamp_ns, topic.last_stamp_ns or 0)
         topic.gone_since = topic.gone_s = None
-        if info.rate_hz is not None:
-            topic.rates.append(info.rate_hz)
+        _take_figures(topic, info)
         if topic.facts() != before:
             self.revision += 1
+
+
+def _renew(topics: Iterable[Topic], view: GraphView) -> None:
+    for topic in topics:
+        info = view.topics.get(topic.name)
+        if info is not None and info is not topic.info and topic.gone_since is None:
+            _take_figures(topic, info)
+
+
+def _take_figures(topic: Topic, info: TopicInfo) -> None:
+    topic.info = info
+    topic.rate_hz, topic.bandwidth_Bps = info.rate_hz, info.bandwidth_Bps
+    topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
+    if info.last_stamp_ns is not None:
+        topic.last_stamp_ns = max(info.last_stamp_ns, topic.last_stamp_ns or 0)
+    if info.rate_hz is not None:
+        topic.rates.append(info.rate_hz)
 
 
 def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:

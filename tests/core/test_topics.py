@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import count
+
 from app.core.mailbox import Batch
 from app.core.topics import GONE_SHOWN_S, Topics, total_rate_hz
 from nep.message import Message
@@ -19,8 +21,13 @@ def info(name: str, *, publishers: int = 1, **values: object) -> TopicInfo:
     return TopicInfo(name, "json", "json", tuple(publisher() for _ in range(publishers)), **given)  # type: ignore[arg-type]
 
 
-def view(*topics: TopicInfo) -> GraphView:
-    return GraphView(1, 1, {"n1": NODE}, {topic.name: topic for topic in topics})
+REVISIONS = count(100)
+
+
+def view(*topics: TopicInfo, revision: int | None = None) -> GraphView:
+    """A graph; somebody came or went since the one before, unless it has the same revision."""
+    number = next(REVISIONS) if revision is None else revision
+    return GraphView(1, number, {"n1": NODE}, {topic.name: topic for topic in topics})
 
 
 def message(number: int, data: bytes = b"{}", stamp_ns: int | None = None) -> Message:
@@ -128,3 +135,31 @@ def test_age_without_stamps_counts_from_the_arrival() -> None:
 def test_the_total_rate_is_unknown_when_nobody_tells_one() -> None:
     assert total_rate_hz([info("/a", rate_hz=None)]) is None
     assert total_rate_hz([info("/a"), info("/b", rate_hz=None)]) == 10.0
+
+
+def test_where_nobody_came_or_went_only_figures_are_renewed() -> None:
+    topics = Topics()
+    topics.update(view(info("/a", rate_hz=10.0), revision=7), 0)
+    before = topics.revision
+    topics.update(view(info("/a", rate_hz=12.0, lost=3, last_stamp_ns=2_000_000_000), revision=7), 1)
+    topic = topics["/a"]
+    assert (topic.rate_hz, topic.lost, topic.last_stamp_ns) == (12.0, 3, 2_000_000_000)
+    assert list(topic.rates) == [10.0, 12.0]
+    assert (topics.revision, topic.publisher_nodes) == (before, ("camera_driver",))
+
+
+def test_of_very_many_topics_every_one_is_renewed_and_ages_within_some_calls() -> None:
+    topics = Topics()
+    names = [f"/{number}" for number in range(4000)]
+    topics.update(view(*map(info, names), revision=7), 0)
+    topics.update(view(*[info(name, rate_hz=12.0) for name in names], revision=7), 0)
+    for _ in range(3):
+        topics.age(0, 4_000_000_000)
+    assert {(topic.age_s, topic.rate_hz) for topic in topics} == {(3.0, 12.0)}
+    for _ in range(3):
+        topics.age(0, 5_000_000_000)
+    assert {tuple(topic.rates) for topic in topics} == {(10.0, 12.0)}
+    topics.update(GraphView(1, 2, {"n1": NODE}, {}), 10.0)
+    for _ in range(6):
+        topics.age(10.0 + GONE_SHOWN_S, 0)
+    assert len(topics) == 0
