@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 
 from nep.errors import NepError
 
@@ -10,6 +11,7 @@ __all__ = ["DEFAULT_MASTER", "endpoint_of", "host_of", "is_loopback", "master_ad
 
 DEFAULT_MASTER = "127.0.0.1:7780"
 _DEFAULT_PORT = 7780
+_HOST = re.compile(r"[\w.-]+|\*|\[[\w:.%]+\]", re.ASCII)
 
 
 def master_address(address: str | None = None) -> str:
@@ -17,8 +19,8 @@ def master_address(address: str | None = None) -> str:
     chosen = (address or os.environ.get("NEP_MASTER") or DEFAULT_MASTER).removeprefix("tcp://")
     host, colon, port = chosen.rpartition(":")
     if not colon:
-        return f"{chosen}:{_DEFAULT_PORT}"
-    if not host or not port.isdigit() or int(port) > 65535:
+        chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
+    if not _HOST.fullmatch(host) or not port.isdigit() or int(port) > 65535:
         raise NepError(f"'{chosen}' is no address of a master; write it as '{DEFAULT_MASTER}'")
     return chosen
 

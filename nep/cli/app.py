@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from nep.cli import masters, nodes, topics
+from nep.cli import log, masters, nodes, topics
 from nep.cli.screen import say_error
 from nep.errors import NepError
 
@@ -15,12 +15,12 @@ app = typer.Typer(
     name="nep",
     help="See and make messages between robots, programs and people.",
     no_args_is_help=True,
-    add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
 app.command("master")(masters.master)
+app.command("log")(log.log)
 app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
 

@@ -4,24 +4,41 @@ from __future__ import annotations
 
 import itertools
 import textwrap
+from collections.abc import Callable
 from datetime import datetime, timezone
+from functools import partial
 from typing import Annotated
 
 import orjson
 import typer
 
+from nep.cli.complete import complete_field, complete_topic
 from nep.cli.graphs import node_for
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import UNKNOWN, console, json_painter, say, show_json, size
-from nep.errors import DecodeError, WaitTimeoutError
+from nep.cli.table_file import Fields, Table
+from nep.errors import DecodeError, WaitTimeoutError, did_you_mean
 from nep.message import Message
+from nep.nodes import Node
 from nep.pubsub import Subscriber
 
 _SHOWN_BYTES = 64
 
 
 def echo(
-    topic: Annotated[str, typer.Argument(help="The topic to look into.", show_default=False)],
+    topic: Annotated[
+        str,
+        typer.Argument(help="The topic to look into.", show_default=False, autocompletion=complete_topic),
+    ],
+    fields: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="FIELD",
+            help="Show these fields only, such as pose.x or joints\\[3].",
+            show_default=False,
+            autocompletion=complete_field,
+        ),
+    ] = None,
     count: Annotated[
         int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N messages; 0 goes on.")
     ] = 0,
@@ -33,21 +50,42 @@ def echo(
     ] = None,
     master: MasterOption = None,
     as_json: JsonOption = False,
+    as_csv: Annotated[
+        bool, typer.Option("--csv", help="Write the fields as comma-separated values, with their time.")
+    ] = False,
 ) -> None:
     """Show the messages of a topic as they come. Ctrl+C ends it.
 
     Pictures are shown by their size, and what cannot be read as its bytes.
     """
+    if as_csv and not fields:
+        raise typer.BadParameter(f"name the fields: nep topic echo {topic} pose.x pose.y --csv")
+    if as_csv and as_json:
+        raise typer.BadParameter("--csv and --json are two ways to write; choose one")
+    picked = Fields(fields or ())
     with node_for("echo", master) as node:
         known = node.graph().topics.get(topic)
         if known is None or not known.publishers:
-            say(f"nobody publishes '{topic}' yet; waiting, Ctrl+C ends it")
-        show = show_record if as_json else Lines()
+            say(f"nobody publishes '{topic}' yet; {_near(node, topic)}waiting, Ctrl+C ends it")
+        show: Callable[[Message], object] = Lines(picked)
+        if as_csv:
+            show = Table(picked)
+        elif as_json:
+            show = partial(show_record, fields=picked)
         with node.new_sub(topic, known.msg_type if known else "json") as subscriber:
-            for number in itertools.count(1):
-                show(_next(subscriber, topic, timeout_s))
-                if number == count:
-                    return
+            try:
+                for number in itertools.count(1):
+                    show(_next(subscriber, topic, timeout_s))
+                    if number == count:
+                        return
+            finally:
+                picked.say_missing()
+
+
+def _near(node: Node, topic: str) -> str:
+    """Whether another topic was meant."""
+    near = did_you_mean(topic, [name for name in node.graph().topics if name != topic])
+    return f"{near} " if near.startswith("did") else ""
 
 
 def _next(subscriber: Subscriber, topic: str, timeout_s: float | None) -> Message:
@@ -58,8 +96,8 @@ def _next(subscriber: Subscriber, topic: str, timeout_s: float | None) -> Messag
     return message
 
 
-def show_record(message: Message) -> None:
-    """One message as one line of JSON."""
+def show_record(message: Message, fields: Fields | None = None) -> None:
+    """One message as one line of JSON; with `fields` these in the place of the payload."""
     record: dict[str, object] = {
         "topic": message.topic,
         "msg_type": message.msg_type,
@@ -69,7 +107,12 @@ def show_record(message: Message) -> None:
         "publisher": message.publisher,
         "size_bytes": message.size_bytes,
     }
-    if message.codec == "image":
+    if fields is not None and fields.names:
+        values = fields.of(message)
+        if values is None:
+            return
+        record["fields"] = fields.plain(values)
+    elif message.codec == "image":
         record["payload"] = dict(message.extension)
     else:
         try:
@@ -83,14 +126,21 @@ def show_record(message: Message) -> None:
 class Lines:
     """Messages for people: when, which, how big, and what, coloured on a terminal."""
 
-    def __init__(self) -> None:
+    def __init__(self, fields: Fields | None = None) -> None:
+        self._fields = fields
         self._console = console()
         self._paint = json_painter() if self._console.is_terminal else None
 
     def __call__(self, message: Message) -> None:
         """Show one message."""
         head = _head(message)
-        body = _body(message, self._console.width - len(head) - 2)
+        if self._fields is not None and self._fields.names:
+            values = self._fields.of(message)
+            if values is None:
+                return
+            body = _dump(self._fields.plain(values))
+        else:
+            body = _body(message, self._console.width - len(head) - 2)
         if self._paint is None:
             print(f"{head}  {body}", flush=True)
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import sys
 from types import FrameType
@@ -10,10 +11,10 @@ from typing import Annotated
 import typer
 
 from nep.addresses import host_of, is_loopback, master_address
-from nep.cli.screen import console, show_alerts
+from nep.cli.alert_printer import AlertLog, AlertPrinter
+from nep.cli.screen import console
 from nep.errors import AddressInUseError, NepError
 from nep.gateway.attachment import GatewayAttachment
-from nep.graph import Alert, GraphView
 from nep.masters import Attachment, Master, is_running
 
 
@@ -44,8 +45,8 @@ def master(
     Messages never pass through it; while it is away, programs that have found each other go on.
     """
     address = _address(port)
-    printer = AlertPrinter()
-    attachments: list[Attachment] = [printer]
+    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    attachments: list[Attachment] = [AlertPrinter(), AlertLog()]
     if gateway:
         attachments.insert(0, GatewayAttachment())
     try:
@@ -62,28 +63,6 @@ def master(
         running.wait()
     finally:
         running.close()
-
-
-class AlertPrinter:
-    """Attached to the master: writes each alert when it comes, and when it is cured."""
-
-    def __init__(self) -> None:
-        self._shown: dict[str, Alert] = {}
-
-    def start(self, _master: Master) -> None:
-        """See `Attachment`."""
-
-    def changed(self, view: GraphView) -> None:
-        """See `Attachment`."""
-        now = {alert.id: alert for alert in view.alerts}
-        for id in [known for known in self._shown if known not in now]:
-            console(stderr=True).print(f"cured: {self._shown.pop(id).sentence}", style="green", markup=False)
-        new = [alert for id, alert in now.items() if self._shown.get(id) != alert]
-        self._shown.update({alert.id: alert for alert in new})
-        show_alerts(new)
-
-    def close(self) -> None:
-        """See `Attachment`."""
 
 
 def _address(port: int | None) -> str:

@@ -12,6 +12,7 @@ from typing import Annotated
 import orjson
 import typer
 
+from nep.cli.complete import complete_topic
 from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say
@@ -24,7 +25,10 @@ _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 
 
 def publish(
-    topic: Annotated[str, typer.Argument(help="The topic to publish.", show_default=False)],
+    topic: Annotated[
+        str,
+        typer.Argument(help="The topic to publish.", show_default=False, autocompletion=complete_topic),
+    ],
     payload: Annotated[
         str,
         typer.Argument(

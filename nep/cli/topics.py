@@ -10,12 +10,15 @@ from nep.cli.echo import echo
 from nep.cli.graphs import look
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
+from nep.cli.rates import bw, hz
 from nep.cli.screen import UNKNOWN, Column, rate, say, show_alerts, show_json, show_table, size
 from nep.graph import GraphView, TopicInfo
 
-app = typer.Typer(no_args_is_help=True, help="What is published: list it, look into it, publish by hand.")
+app = typer.Typer(no_args_is_help=True, help="What is published: list it, look into it, measure it, publish.")
 app.command("echo")(echo)
 app.command("pub")(publish)
+app.command("hz")(hz)
+app.command("bw")(bw)
 _COLUMNS = (
     Column("topic", style="bold", is_whole=True),
     Column("type"),

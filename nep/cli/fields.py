@@ -1,0 +1,76 @@
+"""Field paths: `pose.x`, `joints[3]`, `["a key"].b`, and `.` for the whole message."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+
+from nep.errors import NepError
+
+__all__ = ["MISSING", "Path", "leaves", "parse_path", "pick"]
+
+Path = tuple[str | int, ...]
+MISSING = object()
+"""What `pick` gives for a field that a message does not have."""
+
+_STEP = re.compile(r"""\.?(?:\[(-?\d+)\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
+_PLAIN = re.compile(r"[^.\[\]\"\s]+")
+
+
+def parse_path(text: str) -> Path:
+    """The steps of a path. Raises `NepError` with a sentence."""
+    if text == ".":
+        return ()
+    steps: list[str | int] = []
+    at = 0
+    while at < len(text):
+        found = _STEP.match(text, at)
+        if found is None or (text[at] != "." and text[at] != "[" and at > 0):
+            raise NepError(f"'{text}' is no field; write it like 'pose.x', 'joints[3]' or '.' for everything")
+        index, quoted, plain = found.groups()
+        if index is not None:
+            steps.append(int(index))
+        else:
+            steps.append(plain if quoted is None else re.sub(r"\\(.)", r"\1", quoted))
+        at = found.end()
+    if not steps:
+        raise NepError("a field needs a name, like 'pose.x'")
+    return tuple(steps)
+
+
+def pick(payload: object, path: Path) -> object:
+    """The value at the path, or `MISSING`."""
+    value = payload
+    for step in path:
+        if isinstance(step, int) and isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
+            if not -len(value) <= step < len(value):
+                return MISSING
+            value = value[step]
+        elif isinstance(value, Mapping) and step in value:
+            value = value[step]
+        else:
+            return MISSING
+    return value
+
+
+def leaves(payload: object, most: int = 200) -> Iterator[str]:
+    """The paths of all single values in a message, `most` of them at most."""
+    left = [most]
+    yield from _leaves(payload, "", left)
+
+
+def _leaves(value: object, so_far: str, left: list[int]) -> Iterator[str]:
+    if left[0] <= 0:
+        return
+    if isinstance(value, Mapping) and value:
+        for key, each in value.items():
+            name = str(key)
+            step = name if _PLAIN.fullmatch(name) else '["' + re.sub(r'(["\\])', r"\\\1", name) + '"]'
+            joint = "." if so_far and not step.startswith("[") else ""
+            yield from _leaves(each, f"{so_far}{joint}{step}", left)
+    elif isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
+        for number, each in enumerate(value[:10]):
+            yield from _leaves(each, f"{so_far}[{number}]", left)
+    else:
+        left[0] -= 1
+        yield so_far or "."

@@ -1,0 +1,97 @@
+"""`nep log`: what programs log, as it comes."""
+
+from __future__ import annotations
+
+import itertools
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nep.cli.complete import complete_node
+from nep.cli.graphs import node_for
+from nep.cli.options import JsonOption, MasterOption
+from nep.cli.screen import console, say, show_json
+from nep.errors import DecodeError, did_you_mean
+from nep.logs import LEVELS, LOG_TOPIC, LOG_TYPE, LogRecord, level_of
+from nep.pubsub import Subscriber
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+_STYLES = {"debug": "dim", "warning": "yellow", "error": "red", "critical": "bold red"}
+
+
+def _complete_level(incomplete: str) -> list[str]:
+    return [level for level in LEVELS if level.startswith(incomplete)]
+
+
+def log(
+    level: Annotated[
+        str,
+        typer.Option(
+            "--level", "-l", metavar="LEVEL", help="From this level on.", autocompletion=_complete_level
+        ),
+    ] = "info",
+    node: Annotated[
+        str | None,
+        typer.Option(
+            "--node", metavar="NAME", help="Of this node.", show_default=False, autocompletion=complete_node
+        ),
+    ] = None,
+    count: Annotated[
+        int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N records; 0 goes on.")
+    ] = 0,
+    master: MasterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what programs log, as it comes. Ctrl+C ends it.
+
+    Robots' drivers, behaviours and the master log here; in a program of your own use node.log.
+    """
+    if level.lower() not in {*LEVELS, "warn"}:
+        raise typer.BadParameter(f"no level '{level}'; {did_you_mean(level, LEVELS)}", param_hint="--level")
+    least = LEVELS.index(level_of(level))
+    with node_for("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
+        if not as_json:
+            say("waiting for log records; Ctrl+C ends it")
+        for number in itertools.count(1):
+            record = _next(subscriber, least, node)
+            show_json(record.to_plain()) if as_json else _show(record)
+            if number == count:
+                return
+
+
+def _next(subscriber: Subscriber, least: int, node: str | None) -> LogRecord:
+    """The next record that is wanted."""
+    while True:
+        message = subscriber.receive()
+        if message is None:
+            continue
+        try:
+            record = LogRecord.from_plain(message.payload, message.stamp_ns)
+        except DecodeError as error:
+            record = LogRecord("warning", str(error), "nep", LOG_TOPIC, message.stamp_ns or 0)
+        if LEVELS.index(record.level) >= least and node in {None, record.node}:
+            return record
+
+
+def _show(record: LogRecord) -> None:
+    out = console()
+    moment = datetime.fromtimestamp(record.stamp_ns / 1e9, tz=timezone.utc).astimezone()
+    stamp = moment.strftime("%H:%M:%S.%f")[:-3]
+    logger = f" [{record.name}]" if record.name and record.name != record.node else ""
+    if not out.is_terminal:
+        print(f"{stamp}  {record.level:<8}  {record.node}{logger}  {record.text}", flush=True)
+        return
+    out.print(_painted(stamp, record, logger))
+
+
+def _painted(stamp: str, record: LogRecord, logger: str) -> Text:
+    from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
+
+    style = _STYLES.get(record.level, "")
+    return Text.assemble(
+        (stamp, "dim"), "  ", (f"{record.level:<8}", style), "  ", (record.node, "bold"), (logger, "dim"),
+        "  ", (record.text, style),
+    )  # fmt: skip

@@ -1,0 +1,85 @@
+"""What `nep topic hz` and `nep topic bw` work out: figures of the messages of the last seconds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import threading
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+__all__ = ["MOST", "Frequency", "Traffic", "Window"]
+
+MOST = 100_000
+"""Messages that a window holds at most; a faster topic is measured over a shorter time."""
+
+
+@dataclass(frozen=True)
+class Frequency:
+    """How often: messages a second, and the shortest, longest and standard deviation of the gaps (s)."""
+
+    rate_hz: float
+    min_s: float
+    max_s: float
+    std_s: float
+    messages: int
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """How much: bytes a second, and the mean, smallest and largest size of a message (bytes)."""
+
+    bandwidth_Bps: float  # noqa: N815 - B/s
+    mean_bytes: float
+    min_bytes: int
+    max_bytes: int
+    messages: int
+
+
+class Window:
+    """The messages of one topic that arrived within the last `seconds`. Works in any thread."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._lock = threading.Lock()
+        self._kept: deque[tuple[float, float, int]] = deque(maxlen=MOST)
+        self.total = 0
+
+    def add(self, arrived: float, stamp_s: float | None, size_bytes: int) -> None:
+        """A message arrived (s, monotonic), was published (s, its publisher's clock) and has so many bytes.
+
+        Without a stamp (programs of the original NEP) its arrival stands for it.
+        """
+        with self._lock:
+            self.total += 1
+            self._kept.append((arrived, arrived if stamp_s is None else stamp_s, size_bytes))
+
+    def frequency(self, now: float) -> Frequency | None:
+        """None as long as there are fewer than two messages."""
+        moments = sorted(stamp for _, stamp, _ in self._recent(now))
+        if len(moments) < 2 or moments[-1] <= moments[0]:
+            return None
+        gaps = [later - earlier for earlier, later in itertools.pairwise(moments)]
+        mean = (moments[-1] - moments[0]) / len(gaps)
+        deviation = math.sqrt(sum((gap - mean) ** 2 for gap in gaps) / len(gaps))
+        return Frequency(1 / mean, min(gaps), max(gaps), deviation, len(moments))
+
+    def traffic(self, now: float) -> Traffic | None:
+        """None as long as there are fewer than two messages."""
+        recent = self._recent(now)
+        if len(recent) < 2:
+            return None
+        sizes = [size for _, _, size in recent]
+        span = recent[-1][0] - recent[0][0]
+        if span <= 0:
+            return None
+        # the first message came at the beginning of the span: it belongs to the time before
+        bandwidth = sum(sizes[1:]) / span
+        return Traffic(bandwidth, sum(sizes) / len(sizes), min(sizes), max(sizes), len(sizes))
+
+    def _recent(self, now: float) -> Sequence[tuple[float, float, int]]:
+        with self._lock:
+            while self._kept and now - self._kept[0][0] > self._seconds:
+                self._kept.popleft()
+            return list(self._kept)

@@ -1,0 +1,162 @@
+"""`nep topic hz` and `nep topic bw`: how often topics are published, and how much that is."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from nep.cli.complete import complete_topic
+from nep.cli.graphs import known_topics, node_for
+from nep.cli.measure import Frequency, Traffic, Window
+from nep.cli.options import JsonOption, MasterOption
+from nep.cli.screen import UNKNOWN, rate, say, show_json, size
+from nep.message import Message
+from nep.nodes import Node
+from nep.pubsub import Subscriber
+
+_EVERY_S = 1.0
+_SLICE_S = 0.1
+_NARROWEST = 12
+
+TopicsArgument = Annotated[
+    list[str],
+    typer.Argument(
+        help="The topics to measure.",
+        metavar="TOPIC",
+        show_default=False,
+        autocompletion=complete_topic,
+    ),
+]
+WindowOption = Annotated[
+    float,
+    typer.Option(
+        "--window", "-w", metavar="SECONDS", help="Measure over the last seconds.", min=1.0, max=3600.0
+    ),
+]
+CountOption = Annotated[
+    int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N reports; 0 goes on.")
+]
+Figures = Mapping[str, object]
+
+
+def hz(
+    topics: TopicsArgument,
+    window_s: WindowOption = 10.0,
+    count: CountOption = 0,
+    master: MasterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show how often topics are published: rate, and the gaps between messages. Ctrl+C ends it.
+
+    Gaps are told by the publishers' clocks, so this program's own pace does not count; of programs of the
+    original NEP, which send no time, by when their messages arrive here.
+    """
+    heads = ("rate", "shortest", "longest", "std dev", "messages", "lost")
+    _Report(topics, window_s, heads, _frequency_cells).run(count, master, as_json=as_json)
+
+
+def bw(
+    topics: TopicsArgument,
+    window_s: WindowOption = 10.0,
+    count: CountOption = 0,
+    master: MasterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show how much topics carry: bytes a second, and how large their messages are. Ctrl+C ends it."""
+    heads = ("bandwidth", "mean", "smallest", "largest", "messages", "lost")
+    _Report(topics, window_s, heads, _traffic_cells).run(count, master, as_json=as_json)
+
+
+class _Report:
+    """Windows of some topics, and a report of them every second."""
+
+    def __init__(
+        self,
+        topics: Sequence[str],
+        window_s: float,
+        heads: Sequence[str],
+        figures: Callable[[Window, float], tuple[Frequency | Traffic | None, Sequence[str]]],
+    ) -> None:
+        self._windows = {topic: Window(window_s) for topic in topics}
+        self._heads = heads
+        self._figures = figures
+        self._subscribers: dict[str, Subscriber] = {}
+        self._width = max(_NARROWEST, *(len(topic) for topic in topics))
+
+    def run(self, count: int, master: str | None, *, as_json: bool) -> None:
+        """Report until Ctrl+C, or `count` times. Raises `NepError` for a topic that is not there."""
+        with ExitStack() as opened, node_for("measure", master) as node:
+            types = known_topics(node, list(self._windows))
+            for topic, msg_type in types.items():
+                self._subscribers[topic] = opened.enter_context(self._listen(node, topic, msg_type))
+            if not as_json:
+                say("measuring; Ctrl+C ends it")
+                print(self._line("topic", self._heads), flush=True)
+            never, started = threading.Event(), time.monotonic()
+            for number in itertools.count(1):
+                while (left := started + number * _EVERY_S - time.monotonic()) > 0:
+                    never.wait(min(left, _SLICE_S))
+                for topic in self._windows:
+                    (self._show_json if as_json else self._show)(topic)
+                if number == count:
+                    return
+
+    def _listen(self, node: Node, topic: str, msg_type: str) -> Subscriber:
+        window = self._windows[topic]
+
+        def take(messages: Sequence[Message]) -> None:
+            now = time.monotonic()
+            for message in messages:
+                stamp_s = None if message.stamp_ns is None else message.stamp_ns / 1e9
+                window.add(now, stamp_s, message.size_bytes)
+
+        return node.new_sub(topic, msg_type, sink=take)
+
+    def _show(self, topic: str) -> None:
+        found, cells = self._figures(self._windows[topic], time.monotonic())
+        lost = self._subscribers[topic].lost
+        known = str(found.messages) if found else "0"
+        print(self._line(topic, (*cells, known, UNKNOWN if lost is None else str(lost))), flush=True)
+
+    def _show_json(self, topic: str) -> None:
+        found, _ = self._figures(self._windows[topic], time.monotonic())
+        window = self._windows[topic]
+        figures: Figures = asdict(found) if found else {"messages": 0}
+        lost = self._subscribers[topic].lost
+        show_json(
+            {"topic": topic, "stamp_ns": time.time_ns(), **figures, "total": window.total, "lost": lost}
+        )
+
+    def _line(self, topic: str, cells: Sequence[str]) -> str:
+        return topic.ljust(self._width) + "".join(cell.rjust(12) for cell in cells)
+
+
+def _frequency_cells(window: Window, now: float) -> tuple[Frequency | None, Sequence[str]]:
+    found = window.frequency(now)
+    if found is None:
+        return None, (UNKNOWN,) * 4
+    return found, (rate(found.rate_hz), *(gap(each) for each in (found.min_s, found.max_s, found.std_s)))
+
+
+def _traffic_cells(window: Window, now: float) -> tuple[Traffic | None, Sequence[str]]:
+    found = window.traffic(now)
+    if found is None:
+        return None, (UNKNOWN,) * 4
+    sizes = (size(each) for each in (found.mean_bytes, found.min_bytes, found.max_bytes))
+    return found, (size(found.bandwidth_Bps, "/s"), *sizes)
+
+
+def gap(seconds: float) -> str:
+    """A time between messages, with three digits that count."""
+    if seconds >= 1:
+        return f"{seconds:.3g} s"
+    if seconds >= 1e-3:
+        return f"{seconds * 1e3:.3g} ms"
+    return f"{seconds * 1e6:.3g} us"

@@ -1,0 +1,109 @@
+"""`nep topic echo TOPIC FIELD... --csv`: picked fields as a table for other programs (RFC 4180)."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import orjson
+
+from nep.cli.fields import MISSING, Path, parse_path, pick
+from nep.cli.screen import say
+from nep.errors import DecodeError
+from nep.message import Message
+
+__all__ = ["Fields", "Table"]
+
+STAMP = "stamp_s"
+
+
+class Writes(Protocol):
+    """A text stream."""
+
+    def write(self, text: str, /) -> object:
+        """Write it."""
+
+    def flush(self) -> object:
+        """Write it now."""
+
+
+class Fields:
+    """Some fields of messages; those that a message does not have are counted."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Raises `NepError` for what is no field."""
+        self.names = tuple(names)
+        self._paths: tuple[Path, ...] = tuple(parse_path(name) for name in names)
+        self.missing: Counter[str] = Counter()
+        self.messages = 0
+        self.unreadable = 0
+
+    def of(self, message: Message) -> list[object] | None:
+        """Their values, `MISSING` among them; None for a message that cannot be read."""
+        try:
+            payload = dict(message.extension) if message.codec == "image" else message.payload
+        except DecodeError:
+            self.unreadable += 1
+            return None
+        self.messages += 1
+        values = [pick(payload, path) for path in self._paths]
+        self.missing.update(name for name, value in zip(self.names, values, strict=True) if value is MISSING)
+        return values
+
+    def plain(self, values: Sequence[object]) -> dict[str, object]:
+        """Values that `of` gave, by name; those that were missing are left out."""
+        return {name: value for name, value in zip(self.names, values, strict=True) if value is not MISSING}
+
+    def say_missing(self) -> None:
+        """What was missing, on the error stream."""
+        for name in self.names:
+            if self.missing[name]:
+                say(f"'{name}' was missing in {self.missing[name]} of {self.messages} messages")
+        if self.unreadable:
+            said = "1 message" if self.unreadable == 1 else f"{self.unreadable} messages"
+            say(f"{said} could not be read and left out")
+
+
+class Table:
+    """Rows of comma-separated values: when each message was published (s since 1970), then its fields."""
+
+    def __init__(self, fields: Fields, out: Writes | None = None) -> None:
+        self._fields = fields
+        self._out = out or _unchanged_stdout()
+        self._write = csv.writer(self._out, lineterminator="\r\n").writerow
+        self._write([STAMP, *fields.names])
+        self._out.flush()
+
+    def __call__(self, message: Message) -> None:
+        """Write one message."""
+        values = self._fields.of(message)
+        if values is not None:
+            self._write([_stamp(message.stamp_ns), *map(_cell, values)])
+            self._out.flush()
+
+
+def _unchanged_stdout() -> Writes:
+    """The standard output without translation of line ends, which Windows would double."""
+    reconfigure = getattr(sys.stdout, "reconfigure", None)
+    if reconfigure is not None:
+        reconfigure(newline="", encoding="utf-8")
+    return sys.stdout
+
+
+def _stamp(stamp_ns: int | None) -> str:
+    return "" if stamp_ns is None else f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+
+
+def _cell(value: object) -> str:
+    if value is MISSING or value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (Mapping, list, tuple)):
+        return orjson.dumps(value, default=str, option=orjson.OPT_NON_STR_KEYS).decode()
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return bytes(value).hex()
+    return str(value)

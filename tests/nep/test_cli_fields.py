@@ -1,0 +1,150 @@
+"""Field paths, and picked fields as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import orjson
+import pytest
+import typer
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nep
+from nep.cli.echo import echo
+from nep.cli.fields import MISSING, leaves, parse_path, pick
+from nep.cli.table_file import Fields, Table
+from nep.errors import NepError
+from nep.message import Message
+
+ODOM = {"pose": {"x": 1.5, "y": None}, "joints": [0.1, 0.2, {"name": 'knee "left", bent'}], "a key": True}
+
+
+def message(payload, stamp_ns=1_700_000_000_000_000_001, codec="json", **more):
+    data = payload if isinstance(payload, bytes) else orjson.dumps(payload)
+    return Message("t", data, codec, codec, stamp_ns=stamp_ns, **more)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("pose.x", 1.5),
+        ("joints[1]", 0.2),
+        ("joints[-3]", 0.1),
+        ("joints[2].name", 'knee "left", bent'),
+        ('["a key"]', True),
+        ("pose.y", None),
+        (".", ODOM),
+        ("pose.z", MISSING),
+        ("joints[3]", MISSING),
+        ("joints.x", MISSING),
+        ("pose[0]", MISSING),
+        ("pose.x.deeper", MISSING),
+    ],
+)
+def test_a_path_picks_a_value(text, value):
+    assert pick(ODOM, parse_path(text)) == value
+
+
+@pytest.mark.parametrize("text", ["", "joints[x]", "joints[", "a..b", "a.", "]", 'a["b'])
+def test_what_is_no_path_is_a_sentence(text):
+    with pytest.raises(NepError, match="field"):
+        parse_path(text)
+
+
+def test_every_leaf_of_a_message_has_a_path_that_finds_it():
+    paths = list(leaves(ODOM))
+    assert paths == ["pose.x", "pose.y", "joints[0]", "joints[1]", "joints[2].name", '["a key"]']
+    assert list(leaves(7)) == ["."]
+    assert len(list(leaves(list(range(5)) * 100, most=3))) == 3
+
+
+@given(
+    st.recursive(
+        st.none() | st.integers() | st.text(),
+        lambda inner: st.dictionaries(st.text(), inner, max_size=3) | st.lists(inner, max_size=3),
+        max_leaves=8,
+    )
+)
+def test_paths_of_any_message_lead_back(payload):
+    for path in leaves(payload):
+        assert pick(payload, parse_path(path)) is not MISSING
+
+
+def rows(out):
+    return list(csv.reader(io.StringIO(out, newline="")))
+
+
+def test_the_table_has_a_header_the_time_and_quoted_cells():
+    out = io.StringIO(newline="")
+    table = Table(Fields(["pose.x", "joints[2].name", "a", "."]), out)
+    table(message({"pose": {"x": 1.5}, "joints": [0, 0, {"name": 'say "hi",\nbye'}], "a": False}))
+    table(message({"a": None}, stamp_ns=None))
+    text = out.getvalue()
+    assert text.startswith("stamp_s,pose.x,joints[2].name,a,.\r\n")
+    assert '"say ""hi"",\nbye"' in text
+    head, first, second = rows(text)
+    assert first[:4] == ["1700000000.000000001", "1.5", 'say "hi",\nbye', "false"]
+    assert orjson.loads(first[4])["pose"] == {"x": 1.5}
+    assert second == ["", "", "", "", '{"a":null}']
+    assert len(head) == 5
+
+
+def test_what_is_missing_or_cannot_be_read_is_counted(capsys):
+    fields = Fields(["x", "y"])
+    table = Table(fields, io.StringIO())
+    for each in (message({"x": 1}), message({"x": 1, "y": 2}), message(b"{oops"), message({})):
+        table(each)
+    fields.say_missing()
+    said = capsys.readouterr().err
+    assert "'x' was missing in 1 of 3 messages" in said
+    assert "'y' was missing in 2 of 3 messages" in said
+    assert "1 message could not be read and left out" in said
+
+
+def test_a_pictures_fields_are_its_shape():
+    fields = Fields(["shape[0]"])
+    picture = message(b"\xff", codec="image", extension={"shape": [240, 320, 3]})
+    assert fields.of(picture) == [240]
+
+
+@pytest.fixture
+def odom(master):
+    with nep.node("talker") as node:
+        node.new_pub("/odom", latched=True).publish(ODOM)
+        yield master.address
+
+
+def test_echo_writes_a_table(odom, capfd):
+    echo("/odom", ["pose.x", "pose.z"], 1, None, odom, as_json=False, as_csv=True)
+    shown = capfd.readouterr()
+    head, row = rows(shown.out)
+    assert head == ["stamp_s", "pose.x", "pose.z"]
+    assert row[1:] == ["1.5", ""]
+    assert float(row[0]) > 1_700_000_000
+    assert "'pose.z' was missing in 1 of 1 messages" in shown.err
+
+
+def test_echo_shows_picked_fields_to_people_and_programs(odom, capfd):
+    echo("/odom", ["pose.x"], 1, None, odom)
+    assert '{"pose.x":1.5}' in capfd.readouterr().out
+    echo("/odom", ["pose.x", "no"], 1, None, odom, as_json=True)
+    record = orjson.loads(capfd.readouterr().out)
+    assert (record["fields"], record["seq"]) == ({"pose.x": 1.5}, 1)
+    assert "payload" not in record
+
+
+def test_wrong_wishes_are_sentences(odom):
+    with pytest.raises(typer.BadParameter, match="name the fields"):
+        echo("/odom", None, 1, None, odom, as_csv=True)
+    with pytest.raises(typer.BadParameter, match="choose one"):
+        echo("/odom", ["x"], 1, None, odom, as_json=True, as_csv=True)
+    with pytest.raises(NepError, match="is no field"):
+        echo("/odom", ["x["], 1, None, odom, as_csv=True)
+
+
+def test_a_topic_that_is_not_there_is_waited_for_and_the_nearest_is_named(odom, capfd):
+    with pytest.raises(nep.WaitTimeoutError):
+        echo("/odm", None, 1, 0.1, odom)
+    assert "did you mean '/odom'?" in capfd.readouterr().err

@@ -1,0 +1,118 @@
+"""`nep topic hz` and `bw`: the figures, and the commands over real topics."""
+
+from __future__ import annotations
+
+import json
+import threading
+
+import pytest
+
+import nep
+from nep.cli.measure import MOST, Window
+from nep.cli.rates import bw, gap, hz
+from nep.errors import BadTopicError, NepError
+
+
+def test_gaps_are_those_of_the_publishers_clock():
+    window = Window(10.0)
+    for number, stamp in enumerate((0.0, 0.1, 0.2, 0.4)):
+        window.add(5.0 + number * 0.005, stamp, 10)  # they arrived in one heap
+    found = window.frequency(6.0)
+    assert found.messages == 4
+    assert found.rate_hz == pytest.approx(3 / 0.4)
+    assert (found.min_s, found.max_s) == pytest.approx((0.1, 0.2))
+    assert found.std_s == pytest.approx(0.0471, abs=1e-3)
+
+
+def test_without_stamps_the_arrival_counts_and_order_does_not():
+    window = Window(10.0)
+    for arrived in (1.0, 2.0, 3.0):
+        window.add(arrived, None, 10)
+    assert window.frequency(3.0).rate_hz == pytest.approx(1.0)
+    mixed = Window(10.0)
+    for stamp in (3.0, 1.0, 2.0):  # two publishers
+        mixed.add(5.0, stamp, 10)
+    assert mixed.frequency(5.0).rate_hz == pytest.approx(1.0)
+
+
+def test_what_is_older_than_the_window_counts_no_more():
+    window = Window(2.0)
+    for arrived in range(10):
+        window.add(float(arrived), None, 100)
+    assert window.frequency(9.0).messages == 3
+    assert window.total == 10
+    assert window.frequency(100.0) is None
+    assert window.traffic(100.0) is None
+
+
+def test_bytes_a_second_and_sizes():
+    window = Window(10.0)
+    for arrived, size in ((0.0, 900), (1.0, 100), (2.0, 300)):
+        window.add(arrived, None, size)
+    found = window.traffic(2.0)
+    assert (found.bandwidth_Bps, found.mean_bytes) == pytest.approx((200.0, 1300 / 3))
+    assert (found.min_bytes, found.max_bytes, found.messages) == (100, 900, 3)
+
+
+def test_one_message_is_no_rate_and_a_flood_is_bounded():
+    window = Window(10.0)
+    window.add(0.0, None, 1)
+    assert (window.frequency(0.0), window.traffic(0.0)) == (None, None)
+    for number in range(MOST + 10):
+        window.add(number * 1e-6, None, 1)
+    assert window.frequency(0.2).messages == MOST
+
+
+def test_gaps_have_the_unit_that_fits():
+    assert [gap(each) for each in (2.5, 0.0204, 0.000_31)] == ["2.5 s", "20.4 ms", "310 us"]
+
+
+@pytest.fixture
+def published(master):
+    """Two topics, published 50 times a second until the end."""
+    end = threading.Event()
+    with nep.node("talker") as node:
+        pubs = [node.new_pub("/odom"), node.new_pub("words", "string")]
+
+        def talk():
+            while not end.wait(0.02):
+                pubs[0].publish({"x": 1.0})
+                pubs[1].publish("hello")
+
+        thread = threading.Thread(target=talk)
+        thread.start()
+        yield master.address
+        end.set()
+        thread.join()
+
+
+def test_hz_reports_each_topic_as_a_line_of_json(published, capfdbinary):
+    hz(["/odom", "words"], 10.0, 1, published, as_json=True)
+    lines = [json.loads(line) for line in capfdbinary.readouterr().out.splitlines()]
+    assert [line["topic"] for line in lines] == ["/odom", "words"]
+    for line in lines:
+        assert 10 < line["rate_hz"] < 60
+        assert line["min_s"] <= 1 / line["rate_hz"] <= line["max_s"]
+        assert (line["lost"], line["messages"]) == (0, line["total"])
+
+
+def test_bw_reports_sizes_to_people(published, capsys):
+    bw(["words"], 10.0, 1, published, as_json=False)
+    shown = capsys.readouterr()
+    head, line = shown.out.splitlines()
+    assert head.split()[:3] == ["topic", "bandwidth", "mean"]
+    assert line.split()[0] == "words"
+    assert line.split()[3:9] == ["5", "B", "5", "B", "5", "B"]
+    assert "Ctrl+C" in shown.err
+
+
+def test_a_topic_that_is_not_there_is_a_sentence_with_the_nearest(published):
+    with pytest.raises(NepError, match=r"no topic '/odm'; did you mean '/odom'\?"):
+        hz(["/odm"], 10.0, 1, published)
+    with pytest.raises(BadTopicError):
+        bw(["bad topic"], 10.0, 1, published)
+
+
+def test_with_no_topics_at_all_it_says_so(master):
+    with pytest.raises(NepError, match="nobody publishes anything yet"):
+        hz(["/odom"], 10.0, 1, master.address)
