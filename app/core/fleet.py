@@ -51,6 +51,7 @@ class Fleet:
         self._alive = Heartbeat(SENDER)
         self.moving = moving if moving is not None else Moving()
         self._tries = Tries(self._send, self._alive.rest, clock)
+        self._chosen = ""
         self.revision = 0
 
     @property
@@ -66,6 +67,21 @@ class Fleet:
     def link(self, name: str) -> RobotLink | None:
         """The robot of that name, or None."""
         return self._links.get(name)
+
+    @property
+    def shown(self) -> RobotLink | None:
+        """The robot that panels of one robot show: the chosen one, else a virtual one, else the first."""
+        chosen = self._links.get(self._chosen)
+        if chosen is not None and chosen.connected:
+            return chosen
+        there = self.connected
+        return next((link for link in there if link.virtual), there[0] if there else chosen)
+
+    def choose(self, name: str) -> None:
+        """Let the panels of one robot show this one."""
+        if name != self._chosen:
+            self._chosen = name
+            self.revision += 1
 
     # -- what a person does ----------------------------------------------------------------------------------
 

@@ -11,7 +11,9 @@ from app.ui.robot_figure import HEAD, limbs, paint_figure
 from app.ui.robot_room import WIDTH, Spot, Stage, paint_room
 from app.ui.robot_state import RobotState, Thing
 from app.ui.robot_things import paint_thing, thing_area
+from app.ui.robot_turtle import TOP, paint_turtle
 
+TURTLE = "turtle"
 BUBBLE_WIDTH = 190.0
 BUBBLE_LINES = 4
 
@@ -51,7 +53,7 @@ class RobotDrawing:
             painter.save()
             painter.translate(robot.u, robot.v)
             painter.scale(robot.scale, robot.scale)
-            paint_figure(painter, state)
+            (paint_turtle if state.figure == TURTLE else paint_figure)(painter, state)
             painter.restore()
         if state.speech:
             self._bubble(painter, stage, robot, state.speech)
@@ -65,11 +67,9 @@ class RobotDrawing:
         unit = stage.unit(point)
         robot = stage.spot(state.x, state.y)
         own = (unit - QPointF(robot.u, robot.v)) / robot.scale
-        for limb in limbs(state):
-            if _near(own, limb.hand, 11.0):
-                return f"{limb.side}_hand"
-        if _near(own, HEAD, 36.0):
-            return "head"
+        part = _part_at(own, state) if state.figure != TURTLE else None
+        if part is not None:
+            return part
         for spot, thing in reversed(_placed(stage, state)):
             if thing_area(thing, spot).adjusted(-3, -3, 3, 3).contains(unit):
                 return thing.name or thing.kind
@@ -84,6 +84,7 @@ class RobotDrawing:
         stage = Stage(area, state.room)
         robot = stage.spot(state.x, state.y)
         own = {f"{limb.side}_hand": limb.hand for limb in limbs(state)} | {"head": HEAD}
+        own = {"body": TOP} if state.figure == TURTLE else own
         if part in own:
             unit = QPointF(robot.u, robot.v) + own[part] * robot.scale
             return stage.origin + unit * stage.scale
@@ -177,6 +178,14 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
     painter.setBrush(QColor(92, 88, 170, 46 if not state.moving else 78))
     painter.drawEllipse(QPointF(0, 0), 113, 21)
     painter.restore()
+
+
+def _part_at(own: QPointF, state: RobotState) -> str | None:
+    """The part of the large figure at a point of its own."""
+    for limb in limbs(state):
+        if _near(own, limb.hand, 11.0):
+            return f"{limb.side}_hand"
+    return "head" if _near(own, HEAD, 36.0) else None
 
 
 def _near(point: QPointF, centre: QPointF, radius: float) -> bool:

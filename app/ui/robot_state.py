@@ -38,6 +38,7 @@ class RobotState:
 
     ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
     grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
+    ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something.
     """
 
     x: float = 0.0
@@ -53,6 +54,8 @@ class RobotState:
     arm_right_deg: float = 0.0
     moving: bool = False
     touched: tuple[str, ...] = ()
+    figure: str = "pepper"
+    bumped: str = ""
     objects: tuple[Thing, ...] = ()
     room: Room = field(default_factory=Room)
 
@@ -73,6 +76,8 @@ class RobotState:
             arm_left_deg=_number(data.get("arm_left_deg")),
             arm_right_deg=_number(data.get("arm_right_deg")),
             moving=data.get("moving") is True,
+            figure=str(data.get("figure") or "pepper"),
+            bumped=str(data.get("bumped") or ""),
             touched=_touched(data.get("touched", data.get("touch"))),
             objects=_things(data.get("objects")),
             room=_room(data.get("room")),

@@ -202,6 +202,7 @@ class Fleet:
         self.looked_at: list[str] = []
         self.refuse: tuple[str, ...] = ()
         self.moving = Moving()
+        self.chosen = ""
 
     @property
     def connected(self) -> list[RobotLink]:
@@ -214,6 +215,17 @@ class Fleet:
 
     def link(self, name: str) -> RobotLink | None:
         return next((link for link in self.links if link.name == name), None)
+
+    @property
+    def shown(self) -> RobotLink | None:
+        chosen = next((link for link in self.connected if link.name == self.chosen), None)
+        virtual = next((link for link in self.connected if link.virtual), None)
+        return chosen or virtual or next(iter(self.connected), None)
+
+    def choose(self, name: str) -> None:
+        if name != self.chosen:
+            self.chosen = name
+            self.revision += 1
 
     def look_at(self, name: str) -> Watch:
         self.looked_at.append(name)

@@ -14,6 +14,7 @@ from app.ui.robot_drawing import RobotDrawing
 from app.ui.robot_state import RobotState
 from app.ui.theme import Theme
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
+from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
@@ -122,7 +123,11 @@ class RobotPanel(PanelWidget):
         self.reset = IconButton(self.theme, "rotate-cw", "Put the robot and its room back", size=30)
         self.reset.clicked.connect(lambda: self._change({"reset": True}))
         self.reset.setVisible(False)
-        self.chips = [self.chip]
+        self.choose = IconButton(self.theme, "chevron-down", "Choose a robot", size=26)
+        self.choose.setProperty("place", "start")
+        self.choose.clicked.connect(self._show_menu)
+        self.choose.setVisible(False)
+        self.chips = [self.choose, self.chip]
         self.header = [self.reset]
         self.view = RoomView(self.theme)
         self.view.setAccessibleName("The robot in its room")
@@ -143,9 +148,8 @@ class RobotPanel(PanelWidget):
         fleet = self.session.fleet
         if fleet.revision != self._revision:
             self._revision = fleet.revision
-            there = list(fleet.connected)
-            first = next((link for link in there if link.virtual), there[0] if there else None)
-            self._choose(first if first is not None else fleet.link(self._robot))
+            self.choose.setVisible(len(fleet.links) > 1)
+            self._choose(fleet.shown or fleet.link(self._robot))
         link = fleet.link(self._robot) if self._robot else None
         if link is None:
             return
@@ -153,6 +157,16 @@ class RobotPanel(PanelWidget):
         if link.drawing is not None:
             self.view.show_state(link.drawing)
             self.pages.setCurrentWidget(self.view)
+
+    def _show_menu(self) -> None:
+        menu = Menu(self.theme, self)
+        for link in self.session.fleet.links:
+            action = menu.addAction(link.name)
+            action.setCheckable(True)
+            action.setChecked(link.name == self._robot)
+            action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.choose(name))
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        drop_below(menu, self.choose)
 
     def _choose(self, link: RobotLink | None) -> None:
         if link is None or link.name == self._robot:

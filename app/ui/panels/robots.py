@@ -145,6 +145,7 @@ class RobotsPanel(PanelWidget):
     def choose(self, name: str) -> None:
         """Show the actions of another robot."""
         self.shut()
+        self.session.fleet.choose(name)
         self._robot, self._revision = name, self.session.fleet.revision
         self._watch = self.session.fleet.look_at(name)
         self._seen.pop("cards", None)

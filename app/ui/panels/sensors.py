@@ -87,7 +87,7 @@ class SensorRow(QWidget):
 
 
 class SensorsPanel(PanelWidget):
-    """The sensors of the first robot that has any."""
+    """The sensors of the robot that is shown."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Sensors now")
@@ -121,7 +121,7 @@ class SensorsPanel(PanelWidget):
         fleet = self.session.fleet
         if fleet.revision != self._revision:
             self._revision = fleet.revision
-            self._choose(next((link for link in fleet.connected if _shown(link)), fleet.link(self._robot)))
+            self._choose(fleet.shown or fleet.link(self._robot))
         link = fleet.link(self._robot) if self._robot else None
         if link is not None:
             now = time.monotonic()
