@@ -1,7 +1,8 @@
 """The process of a program: ``python -m app.blocks.child``. It talks JSON lines with the runner.
 
 In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "master": …, "name": …,
-"paused": bool}``, then ``{"do": "pause" | "go" | "step" | "stop"}``. Out: ``{"is": "ready" | "running" |
+"paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" | "stop"}`` or ``{"do": "pace",
+"pace_s": seconds}`` (slow motion). Out: ``{"is": "ready" | "running" |
 "paused" | "error" | "print" | "ended", …}``. When its input ends, the program ends, and its robots are told.
 """
 
@@ -115,6 +116,7 @@ class Run:
         self._runtime = Runtime(out.print, labels=self._program.labels, readings=self._program.readings)
         self._began = time.monotonic()
         self._stop_answer_s = STOP_ANSWER_S
+        self.set_pace(order)
         if order.get("paused") is True:
             self._runtime.scheduler.pause()
 
@@ -127,6 +129,12 @@ class Run:
             "step": scheduler.step_once,
             "stop": self.stop,
         }
+
+    def set_pace(self, order: Mapping[str, object]) -> None:
+        """Slow motion, or none."""
+        pace_s = order.get("pace_s")
+        if isinstance(pace_s, (int, float)):
+            self._runtime.scheduler.set_pace(pace_s)
 
     def stop(self) -> None:
         """End the scripts; `run` then ends at once: who asked for it waits for the robots' answers."""
@@ -230,6 +238,8 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
 def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
     obeyed = run.orders()
     for order in incoming:
+        if order.get("do") == "pace":
+            run.set_pace(order)
         do = obeyed.get(str(order.get("do")))
         if do is not None:
             do()

@@ -18,7 +18,10 @@ class Call:
     action: str
     state: str = "sent"  # then accepted, running, succeeded, failed, canceled
     output: Mapping[str, object] = field(default_factory=dict)
+    feedback: Mapping[str, object] = field(default_factory=dict)  # the newest that said anything
     error: str = ""
+    began: bool = False  # the robot has begun to do it
+    held: bool = False  # a pause has taken it back
 
     @property
     def done(self) -> bool:

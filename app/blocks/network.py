@@ -221,6 +221,9 @@ class Network:
         output = answer.get("output")
         call.output = output if isinstance(output, Mapping) else {}
         call.error = str(answer.get("error") or "")
+        feedback = answer.get("feedback")
+        call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
+        call.began = call.began or answer.get("state") == "running"
         call.state = str(answer.get("state"))
         if call.state in LAST_STATES:
             self._calls.pop(call.id, None)

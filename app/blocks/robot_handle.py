@@ -8,6 +8,7 @@ from typing import Protocol
 
 from app.blocks import values
 from app.blocks.explain import BehaviourError
+from app.blocks.holding import rest_of
 from app.blocks.link import Call, Link
 from app.blocks.scheduler import Scheduler
 from app.robots.description import Action, Parameter, Robot
@@ -16,6 +17,8 @@ FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0
 LONGEST_S = 60.0
 MARGIN_S = 2.0
+HOLD_S = 3.0
+"""How long a robot may take to end what a pause takes back; its own kit answers within about a second."""
 
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 
@@ -102,23 +105,46 @@ class RobotHandle:
         if wrong:
             raise BehaviourError(f"{self._name} can't do this: {wrong[0]}.")
         self._runtime.tell(sentence(robot, action, input))
-        call = self._runtime.linked().invoke(self._name, name, action.complete(input))
         try:
-            self._await(robot, action, call)
+            call = self._do(robot, action, action.complete(input))
         finally:
             self._runtime.tell("")
         if call.state == "failed":
             raise BehaviourError(_ended(f"{self._name}: {call.error or f'“{action.title}” failed'}"))
         return call
 
+    def _do(self, robot: Robot, action: Action, input: Mapping[str, object]) -> Call:
+        """One command, or several when a pause takes it back and what is left is done afterwards."""
+        while True:
+            call = self._runtime.linked().invoke(self._name, action.name, input)
+            self._await(robot, action, call)
+            if not call.held or call.state != "canceled":
+                return call
+            self._runtime.scheduler.hold()
+            rest = rest_of(action, input, call)
+            if rest is None:
+                return call
+            input = rest
+
     def _await(self, robot: Robot, action: Action, call: Call) -> None:
-        wait_for = self._runtime.scheduler.wait_for
-        if robot.dialect == "native" and not wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
+        scheduler = self._runtime.scheduler
+        if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
             raise BehaviourError(f"{self._name} does not answer. Check that it is on and in the same Wi-Fi.")
+        can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or LONGEST_S
-        if not wait_for(lambda: call.done, limit + MARGIN_S):
+        in_time = scheduler.wait_for(lambda: call.done or (can_hold and scheduler.holds()), limit + MARGIN_S)
+        if in_time and not call.done:
+            self._hold(call)
+        elif not in_time:
             self._runtime.linked().cancel(call)
             raise BehaviourError(f"{self._name} has not ended “{action.title}” within {limit:g} s.")
+
+    def _hold(self, call: Call) -> None:
+        """The pause takes the command back; a robot that does not end it is no longer under control."""
+        call.held = True
+        self._runtime.linked().cancel(call)
+        if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
+            raise BehaviourError(f"{self._name} does not hold still, so the behaviour was stopped.")
 
 
 def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:

@@ -11,34 +11,11 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from app.blocks.scripts import Script, Snapshot
+from app.blocks.scripts import Stopped as Stopped
 
 POLL_S = 0.02
-
-
-class Stopped(BaseException):
-    """Raised inside a script when the program ends; nothing in a program catches it."""
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """What the scripts do now. ``paused`` is True once every script stands still."""
-
-    blocks: tuple[str, ...]
-    next_block: str | None
-    paused: bool
-
-
-class Script:
-    """One script: a thread, where it is, and how it is woken."""
-
-    def __init__(self, name: str, lock: threading.Lock) -> None:
-        self.name = name
-        self.wake = threading.Condition(lock)
-        self.block: str | None = None
-        self.idle = True  # waits for its event: it does nothing now
-        self.busy = False  # waits for something that goes on while paused: a robot's answer
-        self.frozen = False  # waits for time or a condition, and stands while paused
 
 
 class Scheduler:
@@ -53,6 +30,7 @@ class Scheduler:
         self._parked: deque[Script] = deque()  # before a block
         self._resuming: deque[Script] = deque()  # inside a block, after a wait
         self._paused = False
+        self._pace_s = 0.0
         self._stepping: Script | None = None
         self._stopping = False
 
@@ -100,7 +78,10 @@ class Scheduler:
             self._leave(script)
 
     def step(self, block: str) -> None:
-        """The script comes to this block: others get their turn, a pause holds it here."""
+        """The script comes to this block: others get their turn, a pause holds it here.
+
+        In slow motion it stays here for the time of a block first.
+        """
         script = self._script()
         with self._lock:
             if self._stopping:
@@ -108,6 +89,10 @@ class Scheduler:
             script.block = block
             if self._stepping is script:
                 self._stepping = None
+            if self._pace_s and not self._paused:
+                self._stay(script, lambda: self._pace_s, step_ends=True)
+            if self._stepping is script:
+                return  # a step was asked for while it stayed here
             if not self._parked and not self._resuming and not self._paused:
                 return
             self._leave(script, then_park=True)
@@ -138,20 +123,8 @@ class Scheduler:
 
     def _doze(self, script: Script, seconds: float | None) -> float:
         """Give the turn away for that long; the seconds that counted are returned."""
-        used = 0.0
         with self._lock:
-            script.frozen = True
-            self._leave(script)
-            while not self._stopping and (seconds is None or used < seconds):
-                if self._paused and self._stepping is not script:
-                    script.wake.wait()
-                    continue
-                began = self._clock()
-                script.wake.wait(None if seconds is None else seconds - used)
-                used += self._clock() - began
-            script.frozen = False
-            self._enter(script)
-        return used
+            return self._stay(script, lambda: seconds)
 
     def wait_for(
         self, ready: Callable[[], bool], timeout_s: float | None = None, *, idle: bool = False
@@ -177,6 +150,15 @@ class Scheduler:
                 self._enter(script)
             return ready()
 
+    def holds(self) -> bool:
+        """Whether a pause wants the calling script to stand still; may be asked with the lock held."""
+        return self._paused and self._stepping is not self._script()
+
+    def hold(self) -> None:
+        """Stand still inside a block that the pause interrupted, until it ends or a step is for this one."""
+        with self._lock:
+            self._stay(self._script(), lambda: None if self._paused else 0.0, step_ends=True)
+
     def poke(self) -> None:
         """Something arrived: whoever waits looks again."""
         with self._lock:
@@ -196,6 +178,11 @@ class Scheduler:
             self._paused, self._stepping = False, None
             self._grant()
             self._wake_all()
+
+    def set_pace(self, seconds: float) -> None:
+        """Slow motion: so long each script stays at a block before it is done; 0 for none."""
+        self._pace_s = max(0.0, seconds)
+        self.poke()
 
     def step_once(self) -> None:
         """While paused: run one block, of the script that has waited longest."""
@@ -240,6 +227,25 @@ class Scheduler:
             return Snapshot(blocks, following, self._paused and still and not self._resuming)
 
     # ---- the turn; the lock is held
+
+    def _stay(self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False) -> float:
+        """Give the turn away until the limit is used up; the seconds used. A step lets them go on or ends all."""
+        used = 0.0
+        script.frozen = True
+        self._leave(script)
+        while not self._stopping and not (step_ends and self._stepping is script):
+            most = limit_s()
+            if most is not None and used >= most:
+                break
+            if self._paused and self._stepping is not script:
+                script.wake.wait()
+                continue
+            began = self._clock()
+            script.wake.wait(None if most is None else most - used)
+            used += self._clock() - began
+        script.frozen = False
+        self._enter(script)
+        return used
 
     def _script(self) -> Script:
         script = getattr(self._mine, "script", None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -260,3 +261,8 @@ def stop_words(robot: RobotStop, clock: str) -> str:
     if robot.answered:
         return f"answered in {max(1, round(robot.elapsed_ms or 0))} ms, at {clock}"
     return f"not answered, at {clock}"
+
+
+def clock_words(now: time.struct_time) -> str:
+    """``8:41``."""
+    return f"{now.tm_hour}:{now.tm_min:02d}"

@@ -13,14 +13,13 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal
 
 from app.blocks.program import Program
+from app.core.runner_event import RunnerEvent as RunnerEvent
 from app.errors import RunnerError
 
-Kind = Literal["ready", "running", "paused", "error", "print", "ended"]
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
 ASK_S = 0.04
@@ -31,26 +30,6 @@ LONGEST_LINE = 1_000_000
 ERRORS_KEPT = 40
 
 _runs = itertools.count(1)
-
-
-@dataclass(frozen=True)
-class RunnerEvent:
-    """What a program's process said.
-
-    ``run`` is the number of the runner's program. ``blocks`` run now (kind running), are held (paused; the
-    first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
-    in words); ``text`` a printed line, an error's sentence, or at the end why it did not end well. ``ok``: it
-    ended, and no block failed. ``silent``: robots that did not answer the program's own stop at its end.
-    """
-
-    kind: Kind
-    run: int
-    blocks: tuple[str, ...] = ()
-    says: str = ""
-    text: str = ""
-    ok: bool = True
-    elapsed_s: float | None = None
-    silent: tuple[str, ...] = ()
 
 
 class Runner:
@@ -92,10 +71,11 @@ class Runner:
         *,
         name: str | None = None,
         paused: bool = False,
+        pace_s: float = 0.0,
     ) -> None:
-        """Start the program.
+        """Start the program; `robots` are the descriptions of those that are connected.
 
-        `robots` are the descriptions of those that are connected. RunnerError if not.
+        `pace_s` is slow motion (`set_pace`). RunnerError if its process can't be started.
         """
         if self._process is not None:
             raise RunnerError("this runner has run its program; make another one")
@@ -121,6 +101,7 @@ class Runner:
                 "robots": list(robots),
                 "master": master,
                 "paused": paused,
+                "pace_s": pace_s,
             }
         )
         self._thread(self._write, "input")
@@ -133,8 +114,12 @@ class Runner:
         thread.start()
         return thread
 
+    def set_pace(self, seconds: float) -> None:
+        """Slow motion: how long each script stays at a block before it is done; 0 for none."""
+        self._orders.put({"do": "pace", "pace_s": seconds})
+
     def pause(self) -> None:
-        """Hold the program at its next block; the event "paused" says when it stands still."""
+        """Hold the program, and what its robots do; the event "paused" says when all stand still."""
         self._orders.put({"do": "pause"})
 
     def go_on(self) -> None:

@@ -13,7 +13,8 @@ from app.core.document import Document
 from app.core.fleet import Fleet
 from app.core.moving import wanted_by
 from app.core.run_needs import Behaviours, Network
-from app.core.run_view import RunState, RunView, place_of, result_words, stop_words, unanswered_words, view_of
+from app.core.run_view import RunState, RunView, clock_words, place_of, result_words, stop_words, view_of
+from app.core.run_view import unanswered_words as unanswered_words_of
 from app.core.runner import Runner, RunnerEvent
 from app.core.stop_events import OneStopped, RobotAnswered, StopDone
 from app.core.stopping import RobotStop, RobotStopper, StopReport
@@ -39,16 +40,13 @@ class Runs:
         """Nothing runs yet."""
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
-        self.document: Document | None = None
-        """The behaviour that the run belongs to; its blocks glow, fail and stop."""
+        self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
+        self.pace_s = 0.0
         self._runner: Runner | None = None
         self._used: tuple[str, ...] = ()
         self._program_id: str | None = None  # the last one's: robots refuse what still comes from it
         self.kept: frozenset[str] = frozenset()
-        """Robots that must stay within reach of a stop, also when they are away.
-
-        Those that the program uses, until they have proven that they stand still.
-        """
+        """Robots that the program used, until proven to stand still; a stop reaches them also when away."""
         self._labels: Mapping[str, str] = {}
         self._run = RunState()
         self._stop_number = 0
@@ -68,7 +66,7 @@ class Runs:
     def view(self) -> RunView:
         """What the run bar says now."""
         names = [link.name for link in self._fleet.connected]
-        elsewhere = self.document is not None and self.document is not self._documents.current
+        elsewhere = self.document not in {None, self._documents.current}
         return view_of(self._run, names, self._clock(), elsewhere=elsewhere)
 
     def run(self) -> None:
@@ -87,8 +85,14 @@ class Runs:
         elif self._run.state == "paused" and self._runner is not None:
             self._runner.step()
 
+    def set_pace(self, seconds: float) -> None:
+        """Slow motion, also of the program that runs: each block waits so long before it is done."""
+        self.pace_s = seconds
+        if self._runner is not None:
+            self._runner.set_pace(seconds)
+
     def pause(self) -> None:
-        """Hold the program at its next block; its robots keep still, its clock stands."""
+        """Hold the program; its robots stand still (docs/adr/0006), its clock stands."""
         if self._run.state == "running" and self._runner is not None:
             self._runner.pause()
 
@@ -104,7 +108,7 @@ class Runs:
             self._mark(stopped=())
 
     def stop(self) -> None:
-        """End the program and tell every robot to stop; what they answer is the run bar's result."""
+        """End the program and stop every robot; what they answer is the run bar's result."""
         self._fleet.moving.withdraw()
         self._stop(None)
 
@@ -194,21 +198,22 @@ class Runs:
                 self._set_errors(wrong)
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
-            again = self.step if paused else self.run
-            if not self._fleet.moving.permits(wanted_by(program.runnable, used), again):
+            wanted = wanted_by(program.runnable, used)
+            if not self._fleet.moving.permits(wanted, self.step if paused else self.run):
                 return  # a person is asked first; the question stands in the window
             runner = Runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
-            runner.start(program, robots, self._network.address, name=document.name, paused=paused)
+            runner.start(
+                program, robots, self._network.address, name=document.name, paused=paused, pace_s=self.pace_s
+            )
         except AppError as error:
             self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self.kept, self._program_id = frozenset(program.robots), runner.program_id
         self._console.leave_out(runner.pid)
-        self._run = RunState(
-            "running", document.name, started_s=self._clock(), last_words=self._run.last_words
-        )
+        last = self._run.last_words
+        self._run = RunState("running", document.name, started_s=self._clock(), last_words=last)
         self._console.add("info", self._run.name, "started")
 
     def _on_error(self, event: RunnerEvent) -> None:
@@ -276,13 +281,12 @@ class Runs:
             self._console.add("info", origin, words)
             self._alerts.cure("stop")
         else:
-            title, detail, _, _ = unanswered_words(report)
+            title, detail, _, _ = unanswered_words_of(report)
             self._console.add("error", origin, f"{words}: {title}")
             self._alerts.put("stop", "error", f"{title}.", detail, button="Stop again", action="run.stop")
 
     def _tell_fleet(self, report: StopReport) -> None:
-        now = time.localtime()
-        clock = f"{now.tm_hour}:{now.tm_min:02d}"
+        clock = clock_words(time.localtime())
         self._fleet.stopped({robot.name: stop_words(robot, clock) for robot in report.robots})
 
     def _set_errors(self, errors: Mapping[str, str]) -> None:

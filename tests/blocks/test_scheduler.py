@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 
@@ -255,3 +256,52 @@ def test_nobody_looks_at_conditions_while_paused(stage):
 def test_who_is_no_script_is_told(stage):
     with pytest.raises(RuntimeError, match="only a script"):
         stage.scheduler.step("x")
+
+
+def test_slow_motion_stays_at_each_block_and_others_run_meanwhile(stage):
+    stage.scheduler.set_pace(0.05)
+    began = time.monotonic()
+    stage.script("a", stage.steps("a1", "a2"))
+    stage.script("b", stage.steps("b1", "b2"))
+    until(lambda: set(stage.scheduler.snapshot().blocks) == {"a1", "b1"})
+    stage.join()
+    assert sorted(stage.did) == ["a1", "a2", "b1", "b2"]
+    assert 0.1 <= time.monotonic() - began < 5.0
+
+
+def test_slow_motion_ends_when_it_is_told(stage):
+    stage.scheduler.set_pace(60.0)
+    stage.script("a", stage.steps("a1", "a2", "a3"))
+    until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
+    stage.scheduler.set_pace(0.0)
+    stage.scheduler.pause()
+    until(lambda: stage.scheduler.snapshot().paused)
+    assert stage.did == []
+    stage.scheduler.step_once()  # a step does not wait for the rest of the minute
+    until(lambda: stage.scheduler.snapshot().paused and stage.did == ["a1"])
+    stage.scheduler.go_on()
+    stage.join()
+    assert stage.did == ["a1", "a2", "a3"]
+
+
+def test_what_a_pause_interrupts_stands_still_until_go_on_or_its_step(stage):
+    def work(_name: str) -> None:
+        stage.scheduler.step("drive")
+        stage.scheduler.wait_for(stage.scheduler.holds)
+        stage.did.append("held")
+        stage.scheduler.hold()
+        stage.did.append("rest")
+        stage.scheduler.step("next")
+        stage.did.append("next")
+
+    stage.script("a", work)
+    until(lambda: "drive" in stage.scheduler.snapshot().blocks)
+    stage.scheduler.pause()
+    until(lambda: stage.did == ["held"] and stage.scheduler.snapshot().paused)
+    assert stage.scheduler.snapshot().next_block == "drive"
+    stage.scheduler.step_once()
+    until(lambda: stage.did == ["held", "rest"] and stage.scheduler.snapshot().paused)
+    assert stage.scheduler.snapshot().next_block == "next"
+    stage.scheduler.go_on()
+    stage.join()
+    assert stage.did == ["held", "rest", "next"]
