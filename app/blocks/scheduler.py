@@ -229,7 +229,7 @@ class Scheduler:
     # ---- the turn; the lock is held
 
     def _stay(self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False) -> float:
-        """Give the turn away until the limit is used up; the seconds used. A step lets them go on or ends all."""
+        """Give the turn away until the limit is used up; the seconds used. A step may end it."""
         used = 0.0
         script.frozen = True
         self._leave(script)
