@@ -170,7 +170,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
         lambda r: len(r.node.publishes), figures=True, yields=1,
     ),
     Column(
-        "subscribes", "Subscribes", 76, _of_node(lambda n: str(len(n.subscribes))),
+        "subscribes", "Subscribes", 86, _of_node(lambda n: str(len(n.subscribes))),
         lambda r: len(r.node.subscribes), figures=True, yields=2,
     ),
     Column("since", "Here for", 62, _of_node(_since), lambda r: r.node.since_ns, figures=True, yields=6),

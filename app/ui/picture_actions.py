@@ -28,7 +28,7 @@ ROWS: tuple[PictureRow, ...] = (
     PictureRow("larger", "Zoom in", ("+", "Ctrl++"), "zoom-in"),
     PictureRow("smaller", "Zoom out", ("-", "Ctrl+-"), "zoom-out"),
     PictureRow("fit", "Whole picture", ("0", "Ctrl+0"), "maximize"),
-    PictureRow("exact", "One pixel for one", ("1",), "scan"),
+    PictureRow("exact", "One pixel for one", ("1",)),
     PictureRow("right", "Turn right", ("R",), "rotate-cw", above=True),
     PictureRow("left", "Turn left", ("Shift+R",), "rotate-ccw"),
     PictureRow("across", "Flip left and right", ("H",), "move-horizontal", check=True),

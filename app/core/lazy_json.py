@@ -1,0 +1,271 @@
+"""JSON that is looked into without decoding all of it: only what somebody opens is decoded.
+
+A text of 10 MB is scanned once for its brackets, commas and colons (with numpy, which lets other threads run
+meanwhile); objects and lists are then `LazyObject` and `LazyList`, whose values are decoded when asked for.
+Decoding all at once would hold every thread of the program for a tenth of a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, overload
+
+import orjson
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Places = NDArray[np.int64]
+
+CHUNK = 1 << 20
+DEEPEST = 1000
+OPEN, CLOSE = b"{[", b"}]"
+QUOTE, BACKSLASH, COMMA, COLON = b'"\\,:'
+SPACE = b" \t\r\n"
+
+
+class Unreadable:
+    """A value whose text is no JSON."""
+
+    def __init__(self, text: bytes) -> None:
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"no JSON: {self.text[:60].decode('utf-8', 'replace')}"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Unreadable) and other.text == self.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+
+class JsonIndex:
+    """Where everything is in one JSON text. Raises ValueError when its brackets do not match."""
+
+    def __init__(self, data: memoryview) -> None:
+        """Scan it; safe in any thread."""
+        import numpy as np  # noqa: PLC0415  heavy, and only large messages need it
+
+        self.data = data
+        self._places, kinds = _structure(data)
+        opens, closes = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
+        after = np.cumsum(opens.astype(np.int32) - closes)
+        if not len(after) or after[-1] != 0 or after.min() < 0:
+            raise ValueError("its brackets do not match")
+        level = after + closes
+        if level.max() > DEEPEST:
+            raise ValueError(f"it is nested deeper than {DEEPEST} levels")
+        order = np.argsort(level.astype(np.int16), kind="stable")
+        bounds = np.searchsorted(np.take(level, order), np.arange(1, int(level.max()) + 2))
+        self._levels = [  # `take` lets other threads run, an index in brackets does not
+            (np.take(self._places, order[a:b]), np.take(kinds, order[a:b])) for a, b in pairwise(bounds)
+        ]
+        self._ends = [places[np.isin(kinds, list(CLOSE))] for places, kinds in self._levels]
+
+    @property
+    def root(self) -> object:
+        """The whole text as a value."""
+        return self.value(0, len(self.data), 0)
+
+    def value(self, start: int, end: int, level: int) -> object:
+        """What stands between two places: decoded, or lazy when it is an object or a list."""
+        while start < end and self.data[start] in SPACE:
+            start += 1
+        first = self.data[start] if start < end else 0
+        if first == OPEN[0]:
+            return LazyObject(self, start, level)
+        if first == OPEN[1]:
+            return LazyList(self, start, level)
+        text = bytes(self.data[start:end])
+        try:
+            found: object = orjson.loads(text)
+        except orjson.JSONDecodeError:
+            return Unreadable(text)
+        return found
+
+    def inside(self, start: int, level: int) -> tuple[int, Places, Places]:
+        """Of the container that opens at ``start``: where it closes, its commas and its colons."""
+        import numpy as np  # noqa: PLC0415
+
+        places, kinds = self._levels[level]
+        ends = self._ends[level]
+        end = int(ends[np.searchsorted(ends, start)])
+        first, last = np.searchsorted(places, start) + 1, np.searchsorted(places, end)
+        own, kind = places[first:last], kinds[first:last]
+        return end, own[kind == COMMA], own[kind == COLON]
+
+    def path_to(self, place: int) -> tuple[str | int, ...]:
+        """The keys that lead to what stands at this place of the text."""
+        path: list[str | int] = []
+        here = self.root
+        while isinstance(here, _Lazy):
+            row = here.row_at(place)
+            if row is None:
+                break
+            path.append(here.key_at(row))
+            here = here.value_at(row)
+        return tuple(path)
+
+
+class _Lazy:
+    """What objects and lists share: where their parts begin and end."""
+
+    def __init__(self, index: JsonIndex, start: int, level: int) -> None:
+        self._index, self._start, self._level = index, start, level
+
+    @cached_property
+    def _parts(self) -> tuple[int, Places, Places]:
+        return self._index.inside(self._start, self._level)
+
+    @cached_property
+    def _count(self) -> int:
+        end, commas, _colons = self._parts
+        if len(commas) or bytes(self._index.data[self._start + 1 : end]).strip(SPACE):
+            return len(commas) + 1
+        return 0
+
+    def _bounds(self, row: int) -> tuple[int, int]:
+        end, commas, _colons = self._parts
+        start = self._start + 1 if row == 0 else int(commas[row - 1]) + 1
+        return start, int(commas[row]) if row < len(commas) else end
+
+    def row_at(self, place: int) -> int | None:
+        """Which child stands at this place of the text; None when none does."""
+        end, commas, _colons = self._parts
+        if not self._start < place < end or not self._count:
+            return None
+        return int(commas.searchsorted(place))
+
+    def key_at(self, row: int) -> str | int:
+        """The key of a child."""
+        return row
+
+    def value_at(self, row: int) -> object:
+        """A child."""
+        start, end = self._bounds(row)
+        return self._index.value(start, end, self._level + 1)
+
+    @cached_property
+    def text(self) -> bytes:
+        """Its JSON text."""
+        return bytes(self._index.data[self._start : self._parts[0] + 1])
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, type(self)) and other.text == self.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+
+class LazyList(_Lazy, Sequence[object]):
+    """A list whose values are decoded when they are asked for."""
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, row: int) -> object: ...
+
+    @overload
+    def __getitem__(self, row: slice) -> list[object]: ...
+
+    def __getitem__(self, row: int | slice) -> object:
+        if isinstance(row, slice):
+            return [self.value_at(each) for each in range(*row.indices(self._count))]
+        place = row + self._count if row < 0 else row
+        if not 0 <= place < self._count:
+            raise IndexError(row)
+        return self.value_at(place)
+
+
+class LazyObject(_Lazy, Mapping[str, object]):
+    """An object whose values are decoded when they are asked for; of equal keys the last one counts."""
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __getitem__(self, key: str) -> object:
+        return self.value_at(self._rows[key])
+
+    def key_at(self, row: int) -> str:
+        """See `_Lazy`."""
+        start, _end = self._bounds(row)
+        text = bytes(self._index.data[start : self._colon(row)])
+        try:
+            return str(orjson.loads(text))
+        except orjson.JSONDecodeError:
+            return text.decode("utf-8", "replace").strip()
+
+    def value_at(self, row: int) -> object:
+        """See `_Lazy`."""
+        _start, end = self._bounds(row)
+        colon = self._colon(row)
+        if colon == end:
+            return Unreadable(b"")
+        return self._index.value(colon + 1, end, self._level + 1)
+
+    def _colon(self, row: int) -> int:
+        """Where a child's colon is; its end when it has none."""
+        start, end = self._bounds(row)
+        colons = self._parts[2]
+        at = int(colons.searchsorted(start))
+        return int(colons[at]) if at < len(colons) and colons[at] < end else end
+
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        return {self.key_at(row): row for row in range(self._count)}
+
+    def __eq__(self, other: object) -> bool:
+        return _Lazy.__eq__(self, other)
+
+    def __hash__(self) -> int:
+        return _Lazy.__hash__(self)
+
+
+def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
+    """The places of all brackets, commas and colons outside of texts, and which they are."""
+    import numpy as np  # noqa: PLC0415
+
+    wanted = np.zeros(256, bool)
+    wanted[list(OPEN + CLOSE + bytes((COMMA, COLON)))] = True
+    places, kinds = [], []
+    in_text, escaped = 0, False
+    for begin in range(0, len(data), CHUNK):
+        part = np.frombuffer(data[begin : begin + CHUNK], np.uint8)
+        quotes = part == QUOTE
+        slashes = np.flatnonzero(part == BACKSLASH)
+        if escaped or len(slashes):
+            skipped, escaped = _escaped(slashes, len(part), escaped)
+            quotes[skipped] = False
+        inside = (np.cumsum(quotes, dtype=np.int32) + in_text) & 1
+        found = np.flatnonzero(np.take(wanted, part) & (inside == 0))
+        places.append(found + begin)
+        kinds.append(part[found])
+        in_text = int(inside[-1])
+    if in_text or not places:
+        raise ValueError("a text in it does not end")
+    return np.concatenate(places), np.concatenate(kinds)
+
+
+def _escaped(slashes: Places, length: int, first: bool) -> tuple[list[int] | Places, bool]:
+    """The places after a backslash that counts, and whether the next part begins with such a place."""
+    import numpy as np  # noqa: PLC0415
+
+    if first and len(slashes) and slashes[0] == 0:
+        slashes = slashes[1:]  # it is escaped itself
+    if not len(slashes):
+        return ([0] if first else []), False
+    run = np.concatenate(([True], np.diff(slashes) != 1))
+    starts = np.flatnonzero(run)
+    within = np.arange(len(slashes)) - np.repeat(starts, np.diff(np.append(starts, len(slashes))))
+    counting = slashes[within % 2 == 0] + 1
+    over = bool(counting[-1] == length)
+    found = counting[:-1] if over else counting
+    return (np.append(found, 0) if first else found), over
