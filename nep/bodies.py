@@ -20,6 +20,7 @@ from nep.requests import (
     Found,
     Join,
     Leave,
+    Listen,
     Look,
     Ping,
     Probe,
@@ -46,6 +47,7 @@ _REQUESTS: Mapping[str, type[Request]] = {
     "leave": Leave,
     "renew": Renew,
     "missing": ReportMissing,
+    "listen": Listen,
     "look": Look,
     "ping": Ping,
 }

@@ -26,6 +26,7 @@ from nep.requests import (
     Found,
     Join,
     Leave,
+    Listen,
     Look,
     Ping,
     Probe,
@@ -157,7 +158,7 @@ class Graph:
             return Seen(self.epoch, self.revision, self.view())
         if isinstance(request, ReportAlerts):
             self._census.report_alerts(request.source, request.alerts)
-        elif not isinstance(request, Ping):
+        elif not isinstance(request, Ping | Listen):
             self._note(request, out)
         return Done(self.epoch, self.revision)
 

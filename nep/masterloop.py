@@ -8,15 +8,17 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import zmq
 
 from nep.addresses import endpoint_of
 from nep.bodies import Asked, decode_request, encode_answer
-from nep.errors import AddressInUseError, ClosedError, WaitTimeoutError
+from nep.errors import AddressInUseError, ClosedError, NepError, WaitTimeoutError
 from nep.graph import Graph, GraphView
-from nep.outgoing import Outgoing, without
-from nep.requests import Join, Refused, Reply, Request, node_of
+from nep.listening import Listening
+from nep.outgoing import Outgoing, with_hosts, without
+from nep.requests import Done, Join, Listen, Refused, Reply, ReportAlerts, Request, node_of
 from nep.starting import Owner
 from nep.waker import Waker
 
@@ -24,6 +26,8 @@ __all__ = ["MasterLoop"]
 
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
+_FOLLOW_S = 2.0
+"""How often the addresses of this computer are looked at while other computers are served."""
 
 
 class _Submission:
@@ -72,6 +76,8 @@ class MasterLoop:
             self._release()
             raise AddressInUseError(address) from error
         self.address = self._router.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
+        self._listening = Listening(self._router, int(self.address.rpartition(":")[2]))
+        self._follow_at = 0.0
 
     # ---- from other threads
 
@@ -144,6 +150,12 @@ class MasterLoop:
         self._send(self._graph.silent(now))
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
             self._closing = True
+        if self._listening.hosts and now >= self._follow_at:
+            self._follow_at = now + _FOLLOW_S
+            self._report_lost_addresses()
+
+    def _report_lost_addresses(self) -> None:
+        self._graph.apply(ReportAlerts("listening", self._listening.follow()), 0, time.monotonic(), "")
 
     def _is_needed(self) -> bool:
         """Whether a node of a process other than the owner and this one is registered."""
@@ -160,15 +172,22 @@ class MasterLoop:
     def _serve_router(self) -> None:
         for _ in range(1000):  # then time for the rest of the loop
             try:
-                sender, *body = self._router.recv_multipart(zmq.DONTWAIT)
+                (sender, *body), is_near = self._receive()
             except zmq.Again:
                 return
             except zmq.ZMQError:
                 _logger.exception("the master could not read a request")
                 return
-            self._serve(sender, body)
+            self._serve(sender, body, is_near)
 
-    def _serve(self, sender: bytes, body: list[bytes]) -> None:
+    def _receive(self) -> tuple[list[bytes], bool]:
+        """The parts of a request, and whether it comes from this computer."""
+        if not self._listening.hosts:
+            return self._router.recv_multipart(zmq.DONTWAIT), True
+        frames = self._router.recv_multipart(zmq.DONTWAIT, copy=False)
+        return [frame.bytes for frame in frames], frames[0].get("Peer-Address") == "127.0.0.1"
+
+    def _serve(self, sender: bytes, body: list[bytes], is_near: bool) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         request = asked.request
         if not isinstance(request, str):
@@ -177,6 +196,8 @@ class MasterLoop:
                 asked = Asked(asked.call, "a node speaks for itself only")
             elif isinstance(request, Join) and request.managed:
                 asked = Asked(asked.call, "only what is attached to the master manages nodes")
+            elif isinstance(request, Listen) and not is_near:
+                asked = Asked(asked.call, "who may connect is decided on the master's own computer")
         name = sender.decode("utf-8", "surrogateescape")
         self._apply(asked, name)
 
@@ -185,6 +206,8 @@ class MasterLoop:
             if isinstance(asked.request, str):
                 refused = Refused(self._graph.epoch, self._graph.revision, asked.request)
                 self._send((Outgoing(sender, refused, asked.call),))
+            elif isinstance(asked.request, Listen):
+                self._send((Outgoing(sender, self._listen(asked.request), asked.call),))
             else:
                 self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
         except Exception:  # one request must never end the master
@@ -192,6 +215,14 @@ class MasterLoop:
             reason = "the master could not carry this out; its log says why"
             refused = Refused(self._graph.epoch, self._graph.revision, reason)
             self._send((Outgoing(sender, refused, asked.call),))
+
+    def _listen(self, request: Listen) -> Reply:
+        try:
+            self._listening.serve(request.hosts)
+        except NepError as error:
+            return Refused(self._graph.epoch, self._graph.revision, str(error))
+        self._report_lost_addresses()
+        return Done(self._graph.epoch, self._graph.revision)
 
     def _send(self, outgoing: Sequence[Outgoing]) -> None:
         """Send in order; nodes that turn out to be dead on the way are dropped, and nobody waits for them."""
@@ -207,12 +238,13 @@ class MasterLoop:
     def _reply_inside(self, each: Outgoing) -> None:
         submission = self._pending.pop(each.call or 0, None)
         if submission is not None:
-            submission.reply = each.answer  # type: ignore[assignment]
+            submission.reply = with_hosts(each.answer, self._listening.hosts)  # type: ignore[assignment]
             submission.done.set()
 
     def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
         """Send one answer; False when its node has no connection any more."""
-        body = encode_answer(without(each.answer, dead), each.call or 0)
+        answer = with_hosts(without(each.answer, dead), self._listening.hosts)
+        body = encode_answer(answer, each.call or 0)
         try:
             self._router.send_multipart((each.to.encode("utf-8", "surrogateescape"), body), zmq.DONTWAIT)
         except zmq.Again:
@@ -224,7 +256,7 @@ class MasterLoop:
     def _tell_listeners(self) -> None:
         if self._listeners and self._graph.revision != self._told_revision:
             self._told_revision = self._graph.revision
-            view = self._graph.view()
+            view = replace(self._graph.view(), listens=self._listening.hosts)
             for changed in self._listeners:
                 try:
                     changed(view)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from nep.requests import Added, Found, Push, Reply
+from nep.requests import Added, Found, Push, Renewed, Reply, Seen
 
-__all__ = ["Outgoing", "without"]
+__all__ = ["Outgoing", "with_hosts", "without"]
 
 
 class Outgoing(NamedTuple):
@@ -30,4 +30,15 @@ def without(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
             expected=tuple(each for each in answer.expected if each.node_id not in node_ids),
             hung=tuple(each for each in answer.hung if each.node_id not in node_ids),
         )
+    return answer
+
+
+def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
+    """`answer` that tells at which addresses the master serves other computers."""
+    if not hosts:
+        return answer
+    if isinstance(answer, Added | Found | Renewed):
+        return replace(answer, hosts=hosts)
+    if isinstance(answer, Seen):
+        return replace(answer, view=replace(answer.view, listens=hosts))
     return answer

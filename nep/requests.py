@@ -114,6 +114,16 @@ class ReportAlerts:
 
 
 @dataclass(frozen=True)
+class Listen:
+    """Serve other computers at these addresses of this one; none: serve this computer only.
+
+    Answered by `Done`. Refused when it comes from another computer.
+    """
+
+    hosts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Look:
     """Ask for the whole graph. Answered by `Seen`."""
 
@@ -133,6 +143,7 @@ Request = (
     | Renew
     | ReportMissing
     | ReportAlerts
+    | Listen
     | Look
     | Ping
 )
@@ -150,12 +161,17 @@ class Done:
 
 @dataclass(frozen=True)
 class Added:
-    """A publisher is registered. It waits for `expected`; `hung` are known not to answer at present."""
+    """A publisher is registered. It waits for `expected`; `hung` are known not to answer at present.
+
+    `hosts` (here and below) are the addresses at which the master serves other computers: publishers on the
+    master's own computer serve there, too.
+    """
 
     epoch: int
     revision: int
     expected: tuple[Expected, ...] = ()
     hung: tuple[Expected, ...] = ()
+    hosts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -165,6 +181,7 @@ class Found:
     epoch: int
     revision: int
     publishers: tuple[RemotePublisher, ...] = ()
+    hosts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -188,6 +205,7 @@ class Renewed:
     again: bool = False
     topics: tuple[TopicPublishers, ...] = ()
     last_seqs: Mapping[int, int] = field(default_factory=dict)
+    hosts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -253,6 +271,6 @@ def node_of(request: Request) -> str | None:
     """The id of the node that a request speaks for; None when it speaks for nobody."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id
-    if isinstance(request, ReportAlerts | Look | Ping):
+    if isinstance(request, ReportAlerts | Listen | Look | Ping):
         return None
     return request.node_id

@@ -13,10 +13,10 @@ import zmq
 
 from nep.addresses import endpoint_of, master_address
 from nep.bodies import decode_answer, encode_request
-from nep.errors import MasterUnreachable, WireError
-from nep.requests import Done, Ping
+from nep.errors import MasterUnreachable, RequestRefusedError, WireError
+from nep.requests import Done, Listen, Ping, Refused, Reply, Request
 
-__all__ = ["Owner", "is_running", "start_process"]
+__all__ = ["Owner", "is_running", "listen", "start_process"]
 
 
 class Owner:
@@ -41,22 +41,43 @@ class Owner:
 
 def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
     """Whether a master answers at `address` (default: see `master_address`) within `timeout_s` seconds."""
+    return isinstance(_ask(Ping(), master_address(address), timeout_s), Done)
+
+
+def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 2.0) -> None:
+    """Let the master on this computer serve others at these addresses of it ("0.0.0.0": all); none: no more.
+
+    Whoever reaches one of them may then read and command everything: there is no password. Raises
+    `RequestRefusedError` with the reason, `MasterUnreachable` when none answers within `timeout_s` seconds.
+    """
+    chosen = master_address(address)
+    reply = _ask(Listen(tuple(hosts)), chosen, timeout_s)
+    if reply is None:
+        raise MasterUnreachable(chosen, timeout_s)
+    if isinstance(reply, Refused):
+        raise RequestRefusedError(reply.reason)
+
+
+def _ask(request: Request, address: str, timeout_s: float) -> Reply | None:
+    """A master's reply to one request; None when there is none that answers in time."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.DEALER)
     try:
         socket.setsockopt(zmq.LINGER, 0)
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
-        socket.connect(endpoint_of(master_address(address)))
-        socket.send(encode_request(Ping(), 1))
+        socket.connect(endpoint_of(address))
+        socket.send(encode_request(request, 1))
         deadline = time.monotonic() + timeout_s
         while (left := deadline - time.monotonic()) > 0:
             if not socket.poll(int(min(left, 0.1) * 1000) + 1):
                 continue
             try:
-                return isinstance(decode_answer(socket.recv())[1], Done)
+                answer = decode_answer(socket.recv())[1]
             except WireError:
-                return False
-        return False
+                return None
+            if isinstance(answer, Reply):
+                return answer
+        return None
     finally:
         socket.close()
         context.term()

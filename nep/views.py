@@ -82,13 +82,17 @@ class TopicInfo:
 
 @dataclass(frozen=True)
 class GraphView:
-    """The whole graph at one moment. `revision` grows when somebody comes or goes, not with statistics."""
+    """The whole graph at one moment. `revision` grows when somebody comes or goes, not with statistics.
+
+    `listens`: the addresses at which the master serves other computers; none when it serves its own only.
+    """
 
     epoch: int
     revision: int
     nodes: Mapping[str, NodeInfo] = field(default_factory=dict)
     topics: Mapping[str, TopicInfo] = field(default_factory=dict)
     alerts: tuple[Alert, ...] = ()
+    listens: tuple[str, ...] = ()
 
     def to_plain(self) -> dict[str, object]:
         """The view as maps and lists, for the wire and for `--json`."""
@@ -98,4 +102,5 @@ class GraphView:
             "nodes": [asdict(node) for node in self.nodes.values()],
             "topics": [asdict(topic) for topic in self.topics.values()],
             "alerts": [asdict(alert) for alert in self.alerts],
+            "listens": list(self.listens),
         }

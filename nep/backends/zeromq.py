@@ -16,7 +16,7 @@ from nep.backends.native.io import IoThread
 from nep.backends.native.link import MasterLink
 from nep.backends.native.outlet import NativeOutlet
 from nep.backends.native.reading import SocketInlet
-from nep.backends.native.sockets import Socket, bind_free_port, host_towards
+from nep.backends.native.sockets import Socket
 from nep.backends.native.subsocket import SubSocket
 from nep.configuration import Configuration, Direct
 from nep.errors import NepError
@@ -63,10 +63,10 @@ class ZeromqCarrier:
         closer = self._outlet_closer(lambda: link.remove_publisher(spec.id, outlet.count))
         outlet = NativeOutlet(socket, spec, closer, self._io.serve_soon)
         with _closed_on_error(socket):
-            endpoint = bind_free_port(socket, host_towards(link.address))
+            endpoints = outlet.move(link.hosts)
         self._hold(outlet)
         record = PublisherRecord(
-            spec.id, spec.topic, spec.msg_type, spec.codec.name, (endpoint,), spec.is_latched
+            spec.id, spec.topic, spec.msg_type, spec.codec.name, endpoints, spec.is_latched
         )
         try:
             reply = link.add_publisher(record, outlet, spec.wait_s)

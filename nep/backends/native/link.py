@@ -8,14 +8,17 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Iterable
+from dataclasses import replace
 
+from nep.addresses import is_loopback
 from nep.backends.native.calls import Calls
 from nep.backends.native.inlet import NativeInlet
 from nep.backends.native.io import IoThread, Rest
 from nep.backends.native.outlet import NativeOutlet
-from nep.backends.native.sockets import Socket
-from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError
+from nep.backends.native.sockets import LOOPBACK, Socket, host_towards
+from nep.errors import AddressInUseError, ClosedError, MasterUnreachable, RequestRefusedError
 from nep.load import CpuLoad
+from nep.network import nearest
 from nep.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
 from nep.requests import (
     Added,
@@ -64,8 +67,21 @@ class MasterLink:
         self._renew_at = 0.0
         self._was_connected = False
         self._is_closed = False
+        self._is_near = is_loopback(address)
+        self._served: tuple[str, ...] = ()
+        self._own_host = LOOPBACK if self._is_near else host_towards(address) or LOOPBACK
+        self._moved_to = self.hosts
         self._load = CpuLoad()
         self.fd = self._calls.fd
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """The addresses of this computer at which publishers are to be reached.
+
+        On the master's computer these are the loopback address and those at which the master serves others;
+        elsewhere it is the one from which the way to the master begins.
+        """
+        return (LOOPBACK, *self._served) if self._is_near else (self._own_host,)
 
     # ---- for the carrier, in any thread
 
@@ -80,7 +96,12 @@ class MasterLink:
             raise
         with self._lock:
             self._confirmed.add(record.id)
-        return reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
+        added = reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
+        self._served = added.hosts  # a node's first publisher tells it whom the master serves
+        endpoints = outlet.move(self.hosts)
+        if endpoints == record.endpoints or not endpoints:
+            return added
+        return self.add_publisher(replace(record, endpoints=endpoints), outlet, wait_s)
 
     def add_subscriber(self, record: SubscriberRecord, inlet: NativeInlet, wait_s: float | None) -> Found:
         """Register; the publishers to connect to. Raises as `Calls.ask` does."""
@@ -93,7 +114,9 @@ class MasterLink:
             raise
         with self._lock:
             self._confirmed.add(record.id)
-        return reply if isinstance(reply, Found) else Found(reply.epoch, reply.revision)
+        if not isinstance(reply, Found):
+            return Found(reply.epoch, reply.revision)
+        return replace(reply, publishers=self._in_reach(reply.publishers))
 
     def remove_publisher(self, publisher: int, last_seq: int) -> None:
         """Unregister; does not wait."""
@@ -158,13 +181,47 @@ class MasterLink:
         self._was_connected = is_connected
         if now >= self._renew_at:
             self._renew_at = now + RENEW_S
+            self._follow_addresses()
             self._renew()
         return Rest(due=self._renew_at)
 
+    def _follow_addresses(self) -> None:
+        """Move all publishers when this computer has another address, or the master serves at another."""
+        if not self._is_near:
+            self._own_host = host_towards(self.address) or self._own_host
+        if self.hosts == self._moved_to:
+            return
+        self._moved_to = self.hosts
+        with self._lock:
+            for id, (record, outlet) in self._publishers.items():
+                try:
+                    moved = replace(record, endpoints=outlet.move(self.hosts))
+                except AddressInUseError:
+                    self._moved_to = ()  # tried again with the next renewal
+                    continue
+                if moved != record and moved.endpoints:
+                    self._publishers[id] = (moved, outlet)
+                    if id in self._confirmed:
+                        self._calls.tell(AddPublisher(self._node, moved))
+
+    def _in_reach(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
+        """Publishers, each with the one endpoint that this node can reach."""
+        return tuple(self._near(remote) for remote in remotes)
+
+    def _near(self, remote: RemotePublisher) -> RemotePublisher:
+        endpoints = remote.publisher.endpoints
+        if not endpoints or (self._is_near and len(endpoints) == 1):
+            return remote
+        chosen = nearest(endpoints, self.address)
+        return replace(remote, publisher=replace(remote.publisher, endpoints=(chosen,) if chosen else ()))
+
     def _obey(self, answer: Reply | Push, now: float) -> None:
+        if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served:
+            self._served = answer.hosts
+            self._renew_at = now
         if isinstance(answer, PublisherCame):
             for inlet in self._inlets(answer.publisher.publisher.topic):
-                inlet.connect((answer.publisher,))
+                inlet.connect((self._near(answer.publisher),))
         elif isinstance(answer, PublisherGone):
             for inlet in self._inlets(answer.topic):
                 inlet.gone(answer.id, answer.last_seq, is_closed=answer.is_closed)
@@ -198,7 +255,7 @@ class MasterLink:
         self._revision = answer.revision
         for topic in answer.topics:
             for inlet in self._inlets(topic.topic):
-                inlet.reconcile(topic.publishers)
+                inlet.reconcile(self._in_reach(topic.publishers))
         for _record, inlet in self._all_inlets():
             inlet.tick(now, answer.last_seqs.items())
 
@@ -223,7 +280,7 @@ class MasterLink:
             self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())
         by_topic: dict[str, list[RemotePublisher]] = {}
         for remote in reply.publishers:
-            by_topic.setdefault(remote.publisher.topic, []).append(remote)
+            by_topic.setdefault(remote.publisher.topic, []).append(self._near(remote))
         for record, inlet in self._all_inlets():
             inlet.reconcile(by_topic.get(record.topic, ()))
 

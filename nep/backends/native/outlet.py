@@ -9,12 +9,13 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import zmq
 
 from nep.backends.base import PublisherSpec
 from nep.backends.native.io import Rest, Served
+from nep.backends.native.places import Places
 from nep.backends.native.sockets import SendMark, Socket, wait_until
 from nep.encoded import Encoded
 from nep.errors import ClosedError
@@ -67,6 +68,7 @@ class NativeOutlet:
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
+        self._places = Places(socket)
         # Without pyzmq's layer for routing ids and groups, which takes half of the time.
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
         self._bytes = 0
@@ -121,6 +123,11 @@ class NativeOutlet:
         """The statistics for a renewal."""
         with self._changed:
             return PublisherCount(self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns)
+
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
+        """Be reached at these addresses of this computer from now on; the endpoints. See `Places.move`."""
+        with self._lock:
+            return () if self._socket.closed else self._places.move(hosts)
 
     # ---- sending
 

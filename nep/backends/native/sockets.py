@@ -13,12 +13,14 @@ from nep.addresses import endpoint_of, host_of, is_loopback
 from nep.errors import AddressInUseError
 
 __all__ = [
+    "LOOPBACK",
     "SHORT_WAIT_S",
     "SendMark",
     "bind",
     "bind_free_port",
     "connect",
     "host_towards",
+    "keep_alive",
     "receive_mark",
     "wait_shortly",
     "wait_until",
@@ -26,6 +28,7 @@ __all__ = [
 
 Socket = zmq.Socket[bytes]
 
+LOOPBACK = "127.0.0.1"
 SHORT_WAIT_S = 0.005
 """How long a reader may wait in a subscriber's socket, holding its lock. A shorter time is not quicker: a
 timer that ends before the kernel's next tick costs more than the wait."""
@@ -102,16 +105,30 @@ def connect(owner: Socket, address: str) -> str:
     return endpoint
 
 
-def host_towards(address: str) -> str:
-    """The address of this computer under which a master at `address` sees it."""
+def host_towards(address: str) -> str | None:
+    """The address of this computer under which a master at `address` sees it; None without a way to it."""
     if is_loopback(address):
-        return "127.0.0.1"
+        return LOOPBACK
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect((host_of(address), 9))  # sends nothing: it only chooses the way
         except OSError:
-            return "127.0.0.1"
+            return None
         return str(probe.getsockname()[0])
+
+
+def keep_alive(owner: Socket, endpoint: str) -> None:
+    """Notice within a dozen seconds when the computer behind the next connection has vanished.
+
+    The kernel answers for a program that a debugger holds; a heartbeat of ZeroMQ would cut it off. Only for
+    other computers: on this one the kernel tells of every end.
+    """
+    is_far = not is_loopback(endpoint.removeprefix("tcp://"))
+    owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if is_far else -1)
+    if is_far:
+        owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
+        owner.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
+        owner.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
 
 
 def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout_s: float) -> bool:

@@ -14,7 +14,7 @@ import zmq
 from nep.backends.base import SubscriberSpec
 from nep.backends.native.readable import Into
 from nep.backends.native.refusals import Refusals
-from nep.backends.native.sockets import Socket, receive_mark, wait_shortly
+from nep.backends.native.sockets import Socket, keep_alive, receive_mark, wait_shortly
 from nep.backends.native.sources import Sources
 from nep.codecs import codec_for, codec_numbered
 from nep.errors import WireError
@@ -92,19 +92,27 @@ class SubSocket:
         source.form = 0  # its next message is looked at: the type may be another one
         source.is_lapsed = False
         source.ends_at = None
-        if not source.endpoint and remote.publisher.endpoints:
-            source.endpoint = remote.publisher.endpoints[0]
-            self._socket.connect(source.endpoint)
+        endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
+        if endpoint and endpoint != source.endpoint:
+            if source.endpoint:  # its computer has another address now
+                self._disconnect(source.endpoint)
+                source.has_echoed = False
+            source.endpoint = endpoint
+            keep_alive(self._socket, endpoint)
+            self._socket.connect(endpoint)
 
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and forget it."""
         source = self.sources.pop(publisher)
         if source is not None and source.endpoint:
-            try:
-                self._socket.disconnect(source.endpoint)
-            except zmq.ZMQError as error:
-                if error.errno != errno.ENOENT:  # it was not connected any more
-                    raise
+            self._disconnect(source.endpoint)
+
+    def _disconnect(self, endpoint: str) -> None:
+        try:
+            self._socket.disconnect(endpoint)
+        except zmq.ZMQError as error:
+            if error.errno != errno.ENOENT:  # it was not connected any more
+                raise
 
     def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
         """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.

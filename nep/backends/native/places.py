@@ -1,0 +1,48 @@
+"""Places: the addresses of this computer at which a publisher's socket is bound, one endpoint each."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+import zmq
+
+from nep.backends.native.sockets import Socket, bind_free_port
+from nep.errors import AddressInUseError
+
+__all__ = ["Places"]
+
+_logger = logging.getLogger("nep")
+
+
+class Places:
+    """Belongs to the owner of `socket` and is used under its lock."""
+
+    def __init__(self, socket: Socket) -> None:
+        self._socket = socket
+        self._bound: dict[str, str] = {}
+
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
+        """Bind at these hosts and no others, each with a port of its own; the endpoints, in their order.
+
+        A host at which nothing can be bound is left out; raises `AddressInUseError` when none is left.
+        """
+        for host in [known for known in self._bound if known not in hosts]:
+            self._leave(host)
+        problem: AddressInUseError | None = None
+        for host in hosts:
+            if host not in self._bound:
+                try:
+                    self._bound[host] = bind_free_port(self._socket, host)
+                except AddressInUseError as error:
+                    problem = error
+        if problem is not None and not self._bound:
+            raise problem
+        return tuple(self._bound[host] for host in hosts if host in self._bound)
+
+    def _leave(self, host: str) -> None:
+        endpoint = self._bound.pop(host)
+        try:
+            self._socket.unbind(endpoint)
+        except zmq.ZMQError as error:  # the address is gone: there was nothing to give back
+            _logger.debug("'%s' could not be unbound: %s", endpoint, error)

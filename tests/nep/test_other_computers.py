@@ -1,0 +1,205 @@
+"""A master that serves other computers, and nodes whose address changes: with loopback addresses for both."""
+
+from __future__ import annotations
+
+import sys
+import threading
+
+import pytest
+import zmq
+
+import nep
+from nep.backends.native import link
+from nep.bodies import decode_answer, encode_request
+from nep.errors import NepError, RequestRefusedError
+from nep.listening import check_hosts
+from nep.masters import Master
+from nep.network import ANY, OwnAddress, has_address, nearest, own_addresses
+from nep.requests import Listen, Refused
+from nep.starting import listen
+
+pytestmark = pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
+
+OTHER = "127.0.0.2"
+"""An address that counts as another computer's: no program expects the master's own computer there."""
+HERE = (OwnAddress("192.168.1.20", "wlan0"), OwnAddress("10.8.0.2", "tun0"))
+WAIT_S = 10.0
+
+
+@pytest.fixture
+def far(master):
+    """The address of a master that serves other computers, as they know it."""
+    listen([OTHER], master.address)
+    return f"{OTHER}:{master.address.rpartition(':')[2]}"
+
+
+def wait_for(node, wanted):
+    """The node's graph as soon as it is as wanted."""
+    pause = threading.Event()
+    for _ in range(int(WAIT_S / 0.05)):
+        view = node.graph()
+        if wanted(view):
+            return view
+        pause.wait(0.05)
+    raise AssertionError(view)
+
+
+@pytest.mark.parametrize(
+    ("endpoints", "master", "chosen"),
+    [
+        (["tcp://127.0.0.1:1", "tcp://192.168.1.20:2"], "127.0.0.1:7780", "tcp://127.0.0.1:1"),
+        (["tcp://127.0.0.1:1", "tcp://192.168.1.20:2"], "192.168.1.20:7780", "tcp://192.168.1.20:2"),
+        (["tcp://127.0.0.1:1", "tcp://0.0.0.0:2"], "robot.local:7780", "tcp://robot.local:2"),
+        (["tcp://192.168.1.33:2"], "127.0.0.1:7780", "tcp://192.168.1.33:2"),
+        (["tcp://127.0.0.1:1"], "192.168.1.20:7780", ""),
+        ([], "127.0.0.1:7780", ""),
+    ],
+)
+def test_everybody_connects_to_what_is_in_reach(endpoints, master, chosen):
+    assert nearest(endpoints, master) == chosen
+
+
+def test_only_addresses_of_this_computer_can_be_served():
+    assert check_hosts(["10.8.0.2", ANY, "10.8.0.2"], HERE) == ("10.8.0.2", ANY)
+    with pytest.raises(NepError, match="no IPv4 address"):
+        check_hosts(["robot"], HERE)
+    with pytest.raises(NepError, match=r"it has 10\.8\.0\.2, 192\.168\.1\.20"):
+        check_hosts(["192.168.1.21"], HERE)
+    with pytest.raises(NepError, match="join a network first"):
+        check_hosts(["192.168.1.21"], ())
+
+
+def test_own_addresses_are_none_of_the_loopback():
+    assert not [own for own in own_addresses() if own.host.startswith(("127.", "169.254."))]
+    assert has_address("127.0.0.1")
+    assert not has_address("203.0.113.77")
+
+
+def test_a_master_serves_this_computer_only_until_it_is_told(master):
+    far = f"{OTHER}:{master.address.rpartition(':')[2]}"
+    assert not nep.masters.is_running(far, 0.3)
+    listen([OTHER], master.address)
+    assert nep.masters.is_running(far, 5.0)
+    assert master.view().listens == (OTHER,)
+    listen([], master.address)
+    assert not nep.masters.is_running(far, 0.3)
+    assert master.view().listens == ()
+
+
+def test_a_refusal_changes_nothing_and_says_why(master):
+    listen([OTHER], master.address)
+    with pytest.raises(RequestRefusedError, match="no address of this computer"):
+        listen(["203.0.113.77"], master.address)
+    with pytest.raises(RequestRefusedError, match="no IPv4 address"):
+        listen(["localhost"], master.address)
+    assert master.view().listens == (OTHER,)
+
+
+def test_another_computer_cannot_decide_who_may_connect(far, master):
+    context = zmq.Context()
+    try:
+        with context.socket(zmq.DEALER) as asking:
+            asking.connect(f"tcp://127.0.0.9:0;{far}")  # comes from the first address, goes to the second
+            asking.send(encode_request(Listen(()), 1))
+            assert asking.poll(WAIT_S * 1000)
+            _call, answer = decode_answer(asking.recv())
+    finally:
+        context.destroy(linger=0)
+    assert isinstance(answer, Refused)
+    assert "master's own computer" in answer.reason
+    assert master.view().listens == (OTHER,)
+
+
+def test_messages_go_both_ways_between_two_computers_from_the_first_on(far, master):
+    with nep.node("near") as near, nep.node("far", master=far) as away:
+        heard_far, heard_near = away.new_sub("to_far"), near.new_sub("to_near")
+        to_far, to_near = near.new_pub("to_far"), away.new_pub("to_near")
+        for number in range(40):
+            to_far.publish(number)
+            to_near.publish(number)
+        assert [heard_far.listen(True, timeout_s=WAIT_S)[1] for _ in range(40)] == list(range(40))
+        assert [heard_near.listen(True, timeout_s=WAIT_S)[1] for _ in range(40)] == list(range(40))
+        view = near.graph()
+        hosts = {
+            name: {
+                endpoint.rpartition(":")[0].removeprefix("tcp://")
+                for endpoint in topic.publishers[0].endpoints
+            }
+            for name, topic in view.topics.items()
+        }
+        assert hosts["to_far"] == {"127.0.0.1", OTHER}
+        assert to_far.missing == to_near.missing == ()
+
+
+def test_publishers_that_were_there_before_are_reached_when_the_master_begins_to_serve(master):
+    with nep.node("near") as near:
+        pub = near.new_pub("t", latched=True)
+        pub.publish("before")
+        listen([OTHER], master.address)
+        wait_for(near, lambda view: len(view.topics["t"].publishers[0].endpoints) == 2)
+        with nep.node("far", master=f"{OTHER}:{master.address.rpartition(':')[2]}") as away:
+            assert away.new_sub("t").listen(True, timeout_s=WAIT_S) == (True, "before")
+        listen([], master.address)
+        wait_for(near, lambda view: len(view.topics["t"].publishers[0].endpoints) == 1)
+
+
+def test_a_node_whose_computer_gets_another_address_is_reached_there(far, master, monkeypatch):
+    address = ["127.0.0.3"]
+    monkeypatch.setattr(link, "host_towards", lambda _master: address[0])
+    with nep.node("near") as near, nep.node("far", master=far) as away:
+        sub = near.new_sub("t")
+        pub = away.new_pub("t")
+        pub.publish("on the first address")
+        assert sub.listen(True, timeout_s=WAIT_S) == (True, "on the first address")
+        address[0] = "127.0.0.4"
+        wait_for(near, lambda view: "127.0.0.4" in str(view.topics["t"].publishers[0].endpoints))
+        pause = threading.Event()
+        for number in range(100):
+            pub.publish(number)
+            if sub.listen(timeout_s=0.1)[0]:
+                break
+            pause.wait(0.05)
+        pub.publish("on the second")
+        got = [message.payload for message in iter(lambda: sub.receive(1.0), None)]
+        assert got[-1] == "on the second"
+        assert "127.0.0.3" not in str(near.graph().topics["t"].publishers)
+        address[0] = None  # no way to the master: what is known stays
+        pub.publish("still")
+        assert sub.listen(True, timeout_s=WAIT_S) == (True, "still")
+
+
+def test_the_loss_of_a_served_address_is_an_alert_until_it_is_back():
+    here = [HERE]
+    bound = []
+
+    class Router:
+        def bind(self, endpoint):
+            bound.append(endpoint)
+
+        def unbind(self, endpoint):
+            bound.remove(endpoint)
+
+    listening = nep.listening.Listening(Router(), 7780, lambda: here[0])
+    listening.serve(["192.168.1.20"])
+    assert bound == ["tcp://192.168.1.20:7780"]
+    assert listening.follow() == ()
+    here[0] = HERE[1:]
+    (alert,) = listening.follow()
+    assert "192.168.1.20" in alert.sentence
+    assert "10.8.0.2" in alert.hint
+    assert bound == []
+    here[0] = HERE
+    assert listening.follow() == ()
+    assert bound == ["tcp://192.168.1.20:7780"]
+    listening.serve([ANY])
+    assert sorted(bound) == ["tcp://10.8.0.2:7780", "tcp://192.168.1.20:7780"]
+    here[0] = HERE[:1]
+    assert listening.follow() == ()
+    assert bound == ["tcp://192.168.1.20:7780"]
+
+
+def test_a_taken_port_is_a_sentence(master):
+    port = master.address.rpartition(":")[2]
+    with Master(f"{OTHER}:{port}", learn_s=0.0), pytest.raises(RequestRefusedError, match=OTHER):
+        listen([OTHER], master.address)
+    assert master.view().listens == ()
