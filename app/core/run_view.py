@@ -67,6 +67,7 @@ class RunView:
     last_stop: str | None = None
     confirm: str | None = None
     stop_filled: bool = True
+    slow: bool = False
 
 
 def place_of(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
@@ -76,12 +77,14 @@ def place_of(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str
     return labels.get(blocks[0], says)
 
 
-def view_of(run: RunState, connected: Sequence[str], now: float, *, elsewhere: bool = False) -> RunView:
-    """The run bar for this state, the names of the connected robots, and the time.
+def view_of(
+    run: RunState, connected: Sequence[str], now: float, *, elsewhere: bool = False, slow: bool = False
+) -> RunView:
+    """The run bar for this state, the names of the connected robots, and the time; ``slow``: slow motion.
 
     ``elsewhere``: the run belongs to a behaviour whose tab does not show, so the title names it.
     """
-    view = _view(run, connected, now)
+    view = replace(_view(run, connected, now), slow=slow)
     return _named(view, run) if elsewhere and run.name and run.state != "ready" else view
 
 

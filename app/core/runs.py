@@ -67,7 +67,7 @@ class Runs:
         """What the run bar says now."""
         names = [link.name for link in self._fleet.connected]
         elsewhere = self.document not in {None, self._documents.current}
-        return view_of(self._run, names, self._clock(), elsewhere=elsewhere)
+        return view_of(self._run, names, self._clock(), elsewhere=elsewhere, slow=self.pace_s > 0)
 
     def run(self) -> None:
         """Run the behaviour as it is now; while paused, go on. Problems are told on their blocks."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Protocol, runtime_checkable
 
 from PySide6.QtCore import Qt
@@ -17,6 +18,7 @@ from app.ui.popup import Sheet
 from app.ui.single_window import Asked
 from app.ui.tabs import Tabs
 
+PACES = {"run.full_speed": 0.0, "run.slow": 0.5, "run.very_slow": 1.5}
 ABOUT = (
     "See what robots say, and tell them what to do.",
     "NEP Studio is free software (MIT licence).",
@@ -85,6 +87,7 @@ class Commands:
             "run.run": self._run_or_go_on,
             "run.pause": session.runs.pause,
             "run.step": lambda: files.with_newest(session.runs.step),
+            **{name: partial(session.runs.set_pace, pace_s) for name, pace_s in PACES.items()},
             "run.stop": session.runs.stop,
             "robots.virtual": self._virtual_robot,
             "robots.turtle": self._virtual_turtle,
@@ -103,6 +106,8 @@ class Commands:
             bar.step_pressed.connect(lambda: self.run("run.step"))
             bar.stop_pressed.connect(self._session.runs.stop)
             bar.confirm_pressed.connect(self._session.runs.confirm_still)
+        window.run_bar.offer_paces([self.actions[name] for name in PACES])
+        self.actions.choose("run.full_speed")
         window.use_robot.clicked.connect(self._start_robot)
         start.virtual_robot.connect(self._virtual_robot)
         start.new_behaviour.connect(self.files.new)

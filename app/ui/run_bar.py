@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.core.run_view import RunView
 from app.ui.run_parts import Bar, Mark, Result, Sentence
 from app.ui.theme import Theme
 from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, name_command, paint
+from app.ui.widgets.menus import Menu, drop_below
 
 ROOM_PX = 960  # what the bar needs at 100 % text
 
@@ -32,6 +35,8 @@ class RunBar(Bar):
         name_command(self.run, "run.run", "Runs the behaviour", "F5")
         name_command(self.pause, "run.pause", "Holds the program; robots hold still", "F8")
         name_command(self.step, "run.step", "Runs one block", "F10")
+        self.pace = IconButton(theme, "gauge", "Speed", checkable=True, size=36)
+        self._paces = Menu(theme, self, "Speed")
         self.mark = Mark(theme)
         self.sentence = Sentence(theme)
         self.result = Result(theme)
@@ -42,6 +47,7 @@ class RunBar(Bar):
         self.run.clicked.connect(self.run_pressed)
         self.pause.clicked.connect(self.pause_pressed)
         self.step.clicked.connect(self.step_pressed)
+        self.pace.clicked.connect(lambda: drop_below(self._paces, self.pace))
         self.stop.clicked.connect(self.stop_pressed)
         self.confirm.clicked.connect(self.confirm_pressed)
         theme.changed.connect(self._fit)
@@ -52,7 +58,9 @@ class RunBar(Bar):
         row.setSpacing(8)
         for button in (self.run, self.pause, self.step):
             row.addWidget(button)
-        row.addSpacing(4)
+        row.addSpacing(-4)
+        row.addWidget(self.pace)
+        row.addSpacing(-4)
         row.addWidget(Line(theme, upright=True, length=28))
         row.addSpacing(8)
         row.addWidget(self.mark)
@@ -61,6 +69,10 @@ class RunBar(Bar):
         row.addWidget(self.result)
         row.addSpacing(-4)
         row.addWidget(self.stop)
+
+    def offer_paces(self, actions: Sequence[QAction]) -> None:
+        """What the button for the speed offers: full, slow motion."""
+        self._paces.addActions(list(actions))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -79,6 +91,7 @@ class RunBar(Bar):
         self.run.setEnabled(view.can_run)
         self.pause.setEnabled(view.can_pause)
         self.step.setEnabled(view.can_step)
+        self.pace.setChecked(view.slow)
         self.mark.show_state(view.state)
         self.sentence.show_words(view.title, view.detail)
         self.result.show_view(view)
