@@ -114,11 +114,9 @@ class Block:
         entry: dict[str, object] = {"kind": "block", "type": self.type}
         if fields:
             entry["fields"] = dict(fields)
-        inputs = {
-            argument.name: filling
-            for argument in self.arguments
-            if isinstance(argument, ValueInput) and (filling := argument.filling()) is not None
-        }
+        inputs: dict[str, object] = {}
+        for argument in self.arguments:
+            inputs |= argument.fillings()
         if self.extra:
             entry["extraState"] = dict(self.extra)
         if inputs:
@@ -144,6 +142,10 @@ def _messages(block: Block) -> dict[str, object]:
             lines += [("%1", [argument.to_blockly()]), ("", [])]
             continue
         text, arguments = lines[-1]
+        if isinstance(argument, ValueInput) and argument.only is not None:
+            # Words and fields before a gap belong to it and would go with it.
+            words = f"{words}%{len(arguments) + 1} "
+            arguments = [*arguments, {"type": "input_dummy", "name": f"BEFORE_{argument.name}"}]
         lines[-1] = (f"{text}{words}%{len(arguments) + 1}", [*arguments, argument.to_blockly()])
     lines[-1] = (lines[-1][0] + _escaped(block.text[position:]), lines[-1][1])
     return _numbered(lines)

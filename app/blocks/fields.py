@@ -36,6 +36,10 @@ class Argument:
         """Its entry in Blockly's ``args``."""
         raise NotImplementedError
 
+    def fillings(self) -> dict[str, object]:
+        """What is in its gaps when the block comes out of the toolbox, by the gaps' names."""
+        return {}
+
 
 @dataclass(frozen=True)
 class ValueInput(Argument):
@@ -64,14 +68,13 @@ class ValueInput(Argument):
         """Whether the gap is there, with these saved fields."""
         return self.only is None or str(fields.get(self.only[0], self.only[1])) == self.only[1]
 
-    def filling(self) -> dict[str, object] | None:
-        """What is in the gap when the block comes out of the toolbox."""
+    def fillings(self) -> dict[str, object]:
+        """A variable, or a shadow block."""
         if self.variable is not None:
-            return {
-                "block": {"type": "variables_get", "fields": {"VAR": {"name": self.variable, "type": ""}}}
-            }
+            variable = {"VAR": {"name": self.variable, "type": ""}}
+            return {self.name: {"block": {"type": "variables_get", "fields": variable}}}
         shadow = self.shadow()
-        return None if shadow is None else {"shadow": shadow}
+        return {} if shadow is None else {self.name: {"shadow": shadow}}
 
     def shadow(self) -> dict[str, object] | None:
         """The shadow block that fills the gap until somebody puts a block in."""

@@ -21,6 +21,14 @@ class Items(Argument):
     """Gaps in a row, ``<name>0``, ``<name>1``, …; their hole gets one list of all their values."""
 
     count: int = 3
+    texts: tuple[str, ...] = ()  # what the gaps hold in the toolbox
+
+    def fillings(self) -> dict[str, object]:
+        """A text in each gap."""
+        return {
+            f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": words}}}
+            for number, words in enumerate(self.texts)
+        }
 
     def to_blockly(self) -> dict[str, object]:
         """A place: the editor's mutator puts the gaps there."""

@@ -126,7 +126,8 @@ def test_every_entry_of_the_toolbox_is_defined_and_every_style_is_known():
             if entry["kind"] == "block":
                 definition = BLOCKS[entry["type"]]
                 names = {argument["name"] for n in range(4) for argument in definition.get(f"args{n}", [])}
-                assert set(entry.get("inputs", {})) | set(entry.get("fields", {})) <= names
+                used = {name.rstrip("0123456789") for name in entry.get("inputs", {})}
+                assert used | set(entry.get("fields", {})) <= names
     assert {definition["style"] for definition in BLOCKS.values()} <= set(DEFINITIONS["styles"])  # type: ignore[arg-type]
 
 

@@ -85,13 +85,31 @@ function keyOf(definition: BlockDefinition): string {
 
 function register(definition: BlockDefinition): void {
   const usable = {...definition};
-  delete usable.mutator;
+  if (!usable.mutator || !Blockly.Extensions.isRegistered(usable.mutator)) delete usable.mutator;
+  const comingAndGoing = argsOf(definition).filter((arg) => Array.isArray(arg['only']));
   usable.extensions = (definition.extensions ?? []).filter((each) => Blockly.Extensions.isRegistered(each));
   Blockly.Blocks[definition.type] = {
     init(this: Blockly.Block) {
       this.jsonInit(usable);
+      for (const arg of comingAndGoing) showOnly(this, arg.name ?? '', arg['only'] as [string, string]);
     },
   };
+}
+
+/** Lets a gap be there only while a field has one value. */
+function showOnly(block: Blockly.Block, name: string, [fieldName, wanted]: [string, string]): void {
+  const field = block.getField(fieldName);
+  const show = (value: unknown) => {
+    const input = block.getInput(name);
+    if (!input || input.isVisible() === (value === wanted)) return;
+    input.setVisible(value === wanted);
+    if (block instanceof Blockly.BlockSvg && block.rendered) block.queueRender();
+  };
+  field?.setValidator((value: unknown) => {
+    show(value);
+    return undefined;
+  });
+  show(field?.getValue());
 }
 
 /** A value block that is nothing but a text field gets “ ” around it. */

@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {drawIcon, iconName} from './icons';
 
 const SVG = 'http://www.w3.org/2000/svg';
+const BUTTON = 24;
 const BLANK = 'data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=';
 
 interface IconConfig extends Blockly.FieldConfig {
@@ -33,6 +34,34 @@ export class FieldIcon extends Blockly.FieldImage {
   static override fromJson(config: Blockly.FieldConfig): FieldIcon {
     const {icon, name, size, alt} = config as IconConfig;
     return new FieldIcon(icon ?? name ?? '', size ?? 20, alt ?? '');
+  }
+}
+
+/** A small round button on a block, such as “+”. */
+export class FieldButton extends Blockly.FieldImage {
+  constructor(private readonly icon: string, words: string, action: () => void) {
+    super(BLANK, BUTTON, BUTTON, words, action);
+    this.setTooltip(words);
+  }
+
+  override initView(): void {
+    if (!this.fieldGroup_) return;
+    this.fieldGroup_.classList.add('nepButton');
+    const ring = document.createElementNS(SVG, 'circle');
+    for (const [name, value] of Object.entries({cx: BUTTON / 2, cy: BUTTON / 2, r: BUTTON / 2})) {
+      ring.setAttribute(name, String(value));
+    }
+    const glyph = document.createElementNS(SVG, 'g');
+    glyph.setAttribute('transform', 'translate(4, 4)');
+    const inner = document.createElementNS(SVG, 'g');
+    drawIcon(inner, this.icon, BUTTON - 8);
+    glyph.append(inner);
+    this.fieldGroup_.append(ring, glyph);
+    this.recomputeAriaContext();
+  }
+
+  protected override doValueUpdate_(value: string): void {
+    this.value_ = value;
   }
 }
 

@@ -2,6 +2,7 @@
 // like others, and written back exactly as they were read.
 import * as Blockly from 'blockly/core';
 import {type BlockDefinition, definitionOf, fieldNames, inputKinds} from './definitions';
+import {readInputs} from './shapes';
 
 export const KEPT = 'nep_kept';
 
@@ -106,11 +107,21 @@ function fits(state: BlockState, definition: BlockDefinition, shape: Shape | nul
   const connection = shape === 'value' ? 'output' : shape === 'statement' ? 'previousStatement' : null;
   if (connection && !(connection in definition)) return false;
   if (state.next && !('nextStatement' in definition)) return false;
-  if (definition.mutator) return true;
+  if (definition.mutator) return Object.keys(state.inputs ?? {}).every((name) => hasInput(state, definition, name));
   const inputs = inputKinds(definition);
   const fields = fieldNames(definition);
   return Object.keys(state.inputs ?? {}).every((name) => inputs.has(name)) &&
     Object.keys(state.fields ?? {}).every((name) => fields.has(name));
+}
+
+/** Whether a block that people shape themselves has this input, as the file says. */
+function hasInput(state: BlockState, definition: BlockDefinition, name: string): boolean {
+  if (inputKinds(definition).has(name)) return true;
+  const extra = (state.extraState ?? {}) as {items?: unknown; inputs?: unknown};
+  if (definition.mutator === 'nep_call') return readInputs(extra.inputs).some((each) => name === `IN_${each.id}`);
+  const number = /^ITEM(\d{1,3})$/.exec(name)?.[1];
+  return definition.mutator === 'nep_items' && number !== undefined &&
+    Number(number) < Math.min(50, typeof extra.items === 'number' ? extra.items : 3);
 }
 
 function guessInput(name: string, each: Connected): InputKind {

@@ -1,6 +1,7 @@
 // The page of the block editor: what the window tells it (`nepReceive`) and what it tells the window.
 import * as Blockly from 'blockly/core';
 import './fields';
+import './shapes';
 import {iconElement} from './icons';
 import {trimMenu} from './menu';
 import {type Tab} from './tab';

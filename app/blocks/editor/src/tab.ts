@@ -1,6 +1,7 @@
 // One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
 import * as Blockly from 'blockly/core';
 import {FieldChoice} from './choices';
+import {Functions} from './functions';
 import {CHECKER, Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
 import {States} from './states';
@@ -19,6 +20,7 @@ export class Tab {
   readonly workspace: Blockly.WorkspaceSvg;
   readonly program: Program;
   readonly states: States;
+  private readonly functions: Functions;
   key = '';
   generation = 0;
   private readonly frame = document.createElement('div');
@@ -45,6 +47,7 @@ export class Tab {
       selected: (id) => listener.selected(this, id),
     });
     this.states = new States(this.workspace);
+    this.functions = new Functions(this.workspace);
     this.workspace.registerButtonCallback('CREATE_VARIABLE', (button) =>
       Blockly.Variables.createVariableButtonHandler(button.getTargetWorkspace()));
   }
@@ -53,6 +56,7 @@ export class Tab {
   load(generation: number, state: Record<string, unknown>): void {
     this.letGo();
     this.program.load(state);
+    this.functions.refresh();
     this.generation = generation;
     this.states.forget();
   }
@@ -115,6 +119,7 @@ export class Tab {
     if (rebuilt) {
       this.program.flush();
       this.program.rebuild();
+      this.functions.refresh();
     }
     if (this.themeOutdated || rebuilt) this.states.restore();
     const toolbox = this.workspace.getToolbox();

@@ -86,7 +86,8 @@ function withIds(def: Items): Items {
       section = name || section;
       return item;
     }
-    return {...item, toolboxitemid: text(item['toolboxitemid']) || `category ${section} / ${name}`};
+    const dynamic = text(item['dynamic']);
+    return {...item, ...(dynamic && {custom: dynamic}), toolboxitemid: text(item['toolboxitemid']) || `category ${section} / ${name}`};
   });
   return {...def, contents: empty ? [...contents, none] : contents};
 }
@@ -95,6 +96,20 @@ export class Toolbox extends Blockly.Toolbox {
   private shown = '';
   /** What each category was made of; Blockly writes into the contents it is given. */
   private made = new Map<string, string>();
+  private given: Def[] = [];
+
+  /** What a category holds beside what people made themselves. */
+  contentsOf(dynamic: string): unknown[] {
+    return this.given.find((item) => item['dynamic'] === dynamic)?.['contents'] as unknown[] ?? [];
+  }
+
+  /** Shows a category of what people made again, if it is open. */
+  refreshDynamic(dynamic: string): void {
+    const open = this.selectedItem_;
+    if (open && this.given.some((item) => item['dynamic'] === dynamic && item['toolboxitemid'] === open.getId())) {
+      this.refreshSelection();
+    }
+  }
 
   /** Shows new contents; an open category stays open, and nothing happens when nothing changed. */
   update(def: unknown, blocksChanged: boolean): void {
@@ -106,6 +121,7 @@ export class Toolbox extends Blockly.Toolbox {
     const flyout = this.getFlyout();
     const open = this.selectedItem_;
     const before = this.made;
+    this.given = items.contents;
     this.made = new Map(items.contents.map((item) => [text(item['toolboxitemid']), JSON.stringify(item['contents'])]));
     const scroll = flyout?.getWorkspace().scrollY ?? 0;
     if (!sameItems) {

@@ -1,0 +1,244 @@
+// Blocks whose gaps people make themselves: items of a list, inputs of a function.
+import * as Blockly from 'blockly/core';
+import {FieldButton} from './fields';
+
+const MOST_ITEMS = 50;
+const MOST_INPUTS = 12;
+
+/** An input of a function: its id stays, its name changes. */
+export interface FunctionInput {
+  id: string;
+  name: string;
+}
+
+export const DEFINITIONS = ['functions_define', 'functions_define_result'];
+export const CALLS = ['functions_call', 'functions_result'];
+
+/** Changes the shape of a block as one step that can be undone. */
+function reshape(block: Blockly.Block, change: () => void): void {
+  const group = Blockly.Events.getGroup();
+  if (!group) Blockly.Events.setGroup(true);
+  const before = JSON.stringify(block.saveExtraState?.() ?? null);
+  change();
+  const after = JSON.stringify(block.saveExtraState?.() ?? null);
+  if (before !== after) {
+    Blockly.Events.fire(new (Blockly.Events.get(Blockly.Events.BLOCK_CHANGE))(block, 'mutation', null, before, after));
+  }
+  if (!group) Blockly.Events.setGroup(false);
+}
+
+function buttons(block: Blockly.Block, input: Blockly.Input, what: string, change: (by: number) => void): void {
+  const button = (icon: string, words: string, by: number) =>
+    new FieldButton(icon, words, () => reshape(block, () => change(by)));
+  input.appendField(button('minus', `take the last ${what} away`, -1), 'LESS');
+  input.appendField(button('plus', `add one ${what}`, 1), 'MORE');
+}
+
+// ---- a list of n items
+
+interface ItemsBlock extends Blockly.Block {
+  items: number;
+  showItems(count: number): void;
+}
+
+const ITEMS = {
+  saveExtraState(this: ItemsBlock) {
+    return {items: this.items};
+  },
+  loadExtraState(this: ItemsBlock, state: {items?: unknown} | null) {
+    const count = state?.items;
+    this.showItems(typeof count === 'number' && Number.isInteger(count) ? count : this.items);
+  },
+  showItems(this: ItemsBlock, count: number) {
+    const wanted = Math.min(Math.max(count, 0), MOST_ITEMS);
+    for (let number = this.items; number > wanted; number -= 1) this.removeInput(`ITEM${number - 1}`);
+    for (let number = this.items; number < wanted; number += 1) {
+      const gap = this.appendValueInput(`ITEM${number}`);
+      this.moveInputBefore('BUTTONS', null);
+      if (!Blockly.Events.isEnabled()) continue;
+      gap.connection?.setShadowState({type: 'values_text', fields: {TEXT: ''}});
+    }
+    this.items = wanted;
+  },
+};
+
+function startItems(this: ItemsBlock): void {
+  this.items = 0;
+  const row = this.appendDummyInput('BUTTONS');
+  buttons(this, row, 'gap', (by) => this.showItems(this.items + by));
+  const recording = Blockly.Events.isEnabled();
+  if (recording) Blockly.Events.disable();
+  this.showItems(3);
+  if (recording) Blockly.Events.enable();
+}
+
+// ---- a function
+
+/** The name of an input on its function; it is kept with the function's shape. */
+class FieldInputName extends Blockly.FieldTextInput {
+  override SERIALIZABLE = false;
+
+  override isSerializable(): boolean {
+    return false;
+  }
+}
+
+export interface DefinitionBlock extends Blockly.Block {
+  own: FunctionInput[];
+  showInputs(inputs: FunctionInput[]): void;
+}
+
+export function readInputs(saved: unknown): FunctionInput[] {
+  const found = new Map<string, FunctionInput>();
+  for (const each of Array.isArray(saved) ? saved : []) {
+    const {id, name} = (each ?? {}) as Partial<FunctionInput>;
+    if (typeof id === 'string' && id && !found.has(id)) found.set(id, {id, name: String(name || 'input').slice(0, 60)});
+  }
+  return [...found.values()].slice(0, MOST_INPUTS);
+}
+
+/** A name that no other has: "input", "input 2". */
+export function freshName(stem: string, taken: Iterable<string>): string {
+  const all = new Set(taken);
+  let name = stem;
+  for (let number = 2; all.has(name); number += 1) name = `${stem} ${number}`;
+  return name;
+}
+
+const FUNCTION = {
+  saveExtraState(this: DefinitionBlock) {
+    return this.own.length ? {inputs: this.own.map((each) => ({...each}))} : null;
+  },
+  loadExtraState(this: DefinitionBlock, state: {inputs?: unknown} | null) {
+    this.showInputs(readInputs(state?.inputs));
+  },
+  showInputs(this: DefinitionBlock, inputs: FunctionInput[]) {
+    const row = this.getInput('INPUTS');
+    if (!row) return;
+    for (const field of [...row.fieldRow]) if (/^(WITH|INPUT\d+|LESS|MORE)$/.test(field.name ?? '')) row.removeField(field.name!);
+    this.own = inputs.map((each) => ({...each}));
+    if (inputs.length) row.appendField('with', 'WITH');
+    this.own.forEach((each, number) => row.appendField(nameField(this, each), `INPUT${number}`));
+    buttons(this, row, 'input', (by) => changeInputs(this, by));
+  },
+};
+
+function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field {
+  const field = new FieldInputName(input.name, (words: string) => {
+    const name = words.replace(/\s+/g, ' ').trim().slice(0, 60);
+    if (!name) return null;
+    const own = block.own.find((each) => each.id === input.id);
+    if (own) own.name = name;
+    return name;
+  });
+  field.setTooltip('the name of this input');
+  return field;
+}
+
+function changeInputs(block: DefinitionBlock, by: number): void {
+  if (by < 0) {
+    block.showInputs(block.own.slice(0, -1));
+  } else if (block.own.length < MOST_INPUTS) {
+    const name = freshName('input', block.own.map((each) => each.name));
+    block.showInputs([...block.own, {id: Blockly.utils.idGenerator.genUid(), name}]);
+  }
+}
+
+function startFunction(this: DefinitionBlock): void {
+  this.showInputs([]);
+  this.getField('NAME')?.setValidator((words: string) => {
+    const name = words.replace(/\s+/g, ' ').trim().slice(0, 60);
+    return name ? freshName(name, others(this)) : null;
+  });
+}
+
+function others(block: Blockly.Block): string[] {
+  if (block.isInFlyout) return [];
+  return definitionsOf(block.workspace).filter((each) => each.id !== block.id).map(functionName);
+}
+
+export function definitionsOf(workspace: Blockly.Workspace): DefinitionBlock[] {
+  return DEFINITIONS.flatMap((type) => workspace.getBlocksByType(type, false)) as DefinitionBlock[];
+}
+
+export function functionName(definition: Blockly.Block): string {
+  return String(definition.getFieldValue('NAME') ?? '');
+}
+
+// ---- the use of a function
+
+export interface CallBlock extends Blockly.Block {
+  target: string;
+  called: string;
+  own: FunctionInput[];
+  showCall(target: string, name: string, inputs: FunctionInput[]): void;
+}
+
+const CALL = {
+  saveExtraState(this: CallBlock) {
+    return {function: this.target, name: this.called, inputs: this.own.map((each) => ({...each}))};
+  },
+  loadExtraState(this: CallBlock, state: {function?: unknown; name?: unknown; inputs?: unknown} | null) {
+    const target = typeof state?.function === 'string' ? state.function : '';
+    this.showCall(target, String(state?.name ?? 'function').slice(0, 60), readInputs(state?.inputs));
+  },
+  showCall(this: CallBlock, target: string, name: string, inputs: FunctionInput[]) {
+    this.target = target;
+    this.called = name;
+    this.setFieldValue(name, 'NAME');
+    for (const each of this.own) {
+      if (!inputs.some((other) => other.id === each.id)) this.removeInput(`IN_${each.id}`);
+    }
+    for (const each of inputs) {
+      const gap = this.getInput(`IN_${each.id}`);
+      if (gap) gap.fieldRow[0]?.setValue(each.name);
+      else this.appendValueInput(`IN_${each.id}`).appendField(new Blockly.FieldLabel(each.name));
+      this.moveInputBefore(`IN_${each.id}`, null);
+    }
+    this.own = inputs.map((each) => ({...each}));
+  },
+};
+
+function startCall(this: CallBlock): void {
+  this.own = [];
+  this.target = '';
+  this.called = 'function';
+  this.getInput('INPUTS')?.appendField(new Blockly.FieldLabel('function'), 'NAME');
+}
+
+/** Lets a call follow its function: name, and which inputs there are. */
+export function follow(call: CallBlock, definition: DefinitionBlock): void {
+  const name = functionName(definition);
+  const same = call.target === definition.id && call.called === name && JSON.stringify(call.own) === JSON.stringify(definition.own);
+  if (!same) reshape(call, () => call.showCall(definition.id, name, definition.own));
+}
+
+// ---- an input inside its function
+
+/** The function whose blocks hold this one. */
+function holderOf(block: Blockly.Block): DefinitionBlock | null {
+  const root = block.getRootBlock();
+  return DEFINITIONS.includes(root.type) ? root as DefinitionBlock : null;
+}
+
+/** Shows the name of an input; holds its id. */
+export class FieldFunctionInput extends Blockly.FieldLabelSerializable {
+  protected override getText_(): string {
+    const block = this.getSourceBlock();
+    const id = String(this.value_ ?? '');
+    if (!block) return id;
+    const main = (block.workspace as Blockly.WorkspaceSvg).targetWorkspace ?? block.workspace;
+    const holder = holderOf(block);
+    const all = [...(holder ? [holder] : []), ...definitionsOf(main)].flatMap((each) => each.own ?? []);
+    return all.find((each) => each.id === id)?.name ?? 'input';
+  }
+
+  static override fromJson(_config: Blockly.FieldConfig): FieldFunctionInput {
+    return new FieldFunctionInput('');
+  }
+}
+
+Blockly.fieldRegistry.register('field_function_input', FieldFunctionInput);
+Blockly.Extensions.registerMutator('nep_items', ITEMS, startItems);
+Blockly.Extensions.registerMutator('nep_function', FUNCTION, startFunction);
+Blockly.Extensions.registerMutator('nep_call', CALL, startCall);
