@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from nep.cli import log, masters, nodes, topics
+from nep.cli import doctor, log, masters, nodes, topics
 from nep.cli.screen import say_error
 from nep.errors import NepError
 
@@ -21,6 +21,7 @@ app = typer.Typer(
 )
 app.command("master")(masters.master)
 app.command("log")(log.log)
+app.command("doctor")(doctor.doctor)
 app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
 

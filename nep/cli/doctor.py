@@ -1,0 +1,47 @@
+"""`nep doctor`: why programs do not find each other, and what to do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from nep.cli.options import JsonOption, MasterOption
+from nep.cli.screen import console, show_json
+
+if TYPE_CHECKING:
+    from nep.doctor import Finding
+
+_STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
+_SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))
+_PLAIN_SIGNS = dict(zip(_STYLES, "x!-+", strict=True))
+"""For terminals and files that are not Unicode, as Windows has them."""
+
+
+def doctor(master: MasterOption = None, as_json: JsonOption = False) -> None:
+    """Look for what keeps programs from finding each other, and say what to do about it.
+
+    Ends with 0 when all is well, 1 with a warning, 2 when something is wrong.
+    """
+    from nep.doctor import findings, gather, to_plain, worst  # noqa: PLC0415 - loads what others don't need
+
+    found = findings(gather(master))
+    if as_json:
+        show_json(to_plain(found))
+    else:
+        _show(found)
+    raise typer.Exit(worst(found))
+
+
+def _show(found: tuple[Finding, ...]) -> None:
+    from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
+
+    out = console()
+    is_unicode = (out.encoding or "").lower().startswith("utf")
+    signs, arrow = (_SIGNS, "→") if is_unicode else (_PLAIN_SIGNS, "->")
+    for each in found:
+        out.print(Text.assemble((f"{signs[each.severity]} ", _STYLES[each.severity]), each.sentence))
+        if each.mend:
+            out.print(Text.assemble(f"  {arrow} ", each.mend))
+        if each.command:
+            out.print(Text.assemble("    ", (each.command, "cyan")))

@@ -1,0 +1,187 @@
+"""Gathering the facts that the doctor judges: processes, ports, files, the master's graph, this Python."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import psutil
+import zmq
+
+import nep.errors
+from nep.addresses import host_of, master_address
+from nep.doctor import processes
+from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact
+from nep.gateway.portmap import default_file
+from nep.nodes import Node
+from nep.views import GraphView
+
+__all__ = ["PORTS", "gather"]
+
+PORTS: Mapping[int, str] = {
+    7000: "where programs of nep up to 0.5.4.5, nep-js and C# ask",
+    50000: "where programs of nep 0.5.4.8 ask",
+    7777: "where tools of the original NEP hear of topics",
+    12345: "where original nodes are told to end",
+}
+_ASK_S = 1.0
+_AHEAD_S = 0.5
+_LEAST_FREE_BYTES = 10_000_000
+_ORIGINAL_FILES = ("helpers.py", "master.py", "publisher.py", "subscriber.py")
+_GATEWAY_OFF = {"0", "false", "no", "off"}
+
+
+def gather(
+    address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
+) -> Facts:
+    """Look at everything; takes up to two seconds when no master answers.
+
+    `folders`: more folders that must take files, each with what is kept there. `here`: where programs are
+    started (default: the current folder).
+    """
+    chosen = master_address(address)
+    number = int(chosen.rpartition(":")[2])
+    view, answered_s = _ask(chosen)
+    listening = processes.listening()
+    master_port = _port(number, "the master's", listening) if _is_here(chosen) else None
+    holder = master_port.holder if master_port is not None else None
+    master_pid = holder.pid if view is not None and holder is not None else None
+    package = Path(nep.errors.__file__).parent
+    state = ("Which original program has which port", default_file(number).parent)
+    return Facts(
+        time.time(),
+        chosen,
+        sys.platform,
+        _versions(),
+        str(package),
+        view,
+        answered_s,
+        master_port,
+        tuple(_port(port, purpose, listening, master_pid) for port, purpose in PORTS.items()),
+        processes.masters(listening, number),
+        os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF,
+        tuple(_packages()),
+        tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
+        _shadow(here or Path.cwd(), package),
+        _files(holder.pid if holder is not None and holder.is_master else master_pid),
+        tuple(_folder(purpose, path) for purpose, path in (state, *folders)),
+        tuple(_clocks(view)),
+        loopback_problem(),
+    )
+
+
+def _ask(address: str) -> tuple[GraphView | None, float | None]:
+    began = time.monotonic()
+    try:
+        with Node(f"nep-doctor-{os.getpid()}", master=address) as node:
+            return node.graph(_ASK_S), time.monotonic() - began
+    except (nep.errors.NepError, zmq.ZMQError, OSError):
+        return None, None
+
+
+def _is_here(address: str) -> bool:
+    """Whether the master's address is one of this computer."""
+    host = host_of(address)
+    if host in {"localhost", "*", "0.0.0.0", "[::1]"} or host.startswith("127."):  # noqa: S104 - no binding
+        return True
+    own = {each.address for addresses in psutil.net_if_addrs().values() for each in addresses}
+    return host in own
+
+
+def _port(
+    port: int, purpose: str, listening: Mapping[int, int | None], master_pid: int | None = None
+) -> PortFact:
+    if port in listening:
+        return PortFact(port, purpose, True, processes.describe(listening[port], master_pid))
+    return PortFact(port, purpose, not processes.is_free(port))
+
+
+def loopback_problem() -> str:
+    """Why a connection from this program to itself over 127.0.0.1 does not work; "" when it does."""
+    try:
+        with socket.socket() as server:
+            server.bind(("127.0.0.1", 0))
+            server.listen(1)
+            with socket.create_connection(server.getsockname(), timeout=1.0) as client:
+                client.sendall(b"?")
+        return ""
+    except OSError as error:
+        return (error.strerror or str(error)).lower()
+
+
+def _versions() -> dict[str, str]:
+    try:
+        own = importlib.metadata.version("nep-studio")
+    except importlib.metadata.PackageNotFoundError:
+        own = "(not installed)"
+    return {
+        "NEP Studio": own,
+        "Python": platform.python_version(),
+        "pyzmq": zmq.pyzmq_version(),
+        "libzmq": zmq.zmq_version(),
+        platform.system(): platform.release(),
+    }
+
+
+def _packages() -> Iterator[PackageFact]:
+    for found in importlib.metadata.distributions():
+        name = found.metadata["Name"] or ""
+        if name.lower().replace("_", "-") in {"nep", "nep-studio"}:
+            yield PackageFact(name, found.version, str(found.locate_file("")))
+
+
+def _shadow(here: Path, package: Path) -> str:
+    for candidate in (here / "nep.py", here / "nep" / "__init__.py"):
+        if candidate.exists() and candidate.resolve().parent != package.resolve():
+            return str(candidate)
+    return ""
+
+
+def _files(master_pid: int | None) -> FileFact:
+    opened = limit = None
+    if master_pid is not None:
+        opened, limit = processes.open_files(master_pid)
+    if sys.platform == "win32":
+        return FileFact(None, None, opened, limit)
+    import resource  # noqa: PLC0415 - not on Windows
+
+    soft, hard = (
+        None if each == resource.RLIM_INFINITY else each
+        for each in resource.getrlimit(resource.RLIMIT_NOFILE)
+    )
+    return FileFact(soft, hard, opened, limit)
+
+
+def _folder(purpose: str, path: Path) -> FolderFact:
+    """Whether a file can be made in the folder, or the folder itself; nothing is left behind."""
+    existing = path
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    try:
+        with tempfile.TemporaryFile(dir=existing):
+            pass
+        free = psutil.disk_usage(str(existing)).free
+    except OSError as error:
+        return FolderFact(str(path), purpose, (error.strerror or str(error)).lower())
+    problem = "the disk is full" if free < _LEAST_FREE_BYTES else ""
+    return FolderFact(str(path), purpose, problem)
+
+
+def _clocks(view: GraphView | None) -> Iterator[ClockFact]:
+    now_s = time.time()
+    ahead: dict[str, float] = {}
+    for topic in view.topics.values() if view is not None else ():
+        for publisher in topic.publishers:
+            node = view.nodes.get(publisher.node_id) if view is not None else None
+            if node is not None and publisher.last_stamp_ns is not None:
+                ahead[node.host] = max(ahead.get(node.host, 0.0), publisher.last_stamp_ns / 1e9 - now_s)
+    for host, seconds in ahead.items():
+        if seconds > _AHEAD_S:
+            yield ClockFact(host, seconds)

@@ -1,0 +1,174 @@
+"""The doctor's judgement: facts in, findings out. No sockets, no files, no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
+from typing import Literal
+
+from nep.doctor.facts import Facts, FolderFact
+from nep.doctor.network import clocks, masters, originals, ports, told_by_master
+from nep.doctor.verdict import Finding, Severity
+
+__all__ = ["findings", "report", "to_plain", "worst"]
+
+FEWEST_FILES = 1024
+MOST_SOCKETS = 1023
+"""libzmq's own limit of sockets in one context."""
+NEARLY = 0.8
+_FILES_A_TOPIC = 20
+"""A topic of the original NEP takes about so many handles of the master; a native one fewer."""
+_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2, "ok": 3}
+_SIGNS = {"error": "x", "warning": "!", "info": "-", "ok": "+"}
+EARLIEST_S = 1_704_067_200.0
+"""2024 began; a clock that says less was never set."""
+
+
+def findings(facts: Facts) -> tuple[Finding, ...]:
+    """Everything that the facts say, the worst first."""
+    parts: Sequence[Callable[[Facts], Iterator[Finding]]] = (
+        _loopback, masters, ports, _packages, originals, told_by_master, _files, _sockets, _folders, clocks,
+        _clock, _versions,
+    )  # fmt: skip
+    found = [finding for part in parts for finding in part(facts)]
+    return tuple(sorted(found, key=lambda finding: _ORDER[finding.severity]))
+
+
+def worst(found: Sequence[Finding]) -> Literal[0, 1, 2]:
+    """The exit code: 2 with an error, 1 with a warning, else 0."""
+    severities = {finding.severity for finding in found}
+    return 2 if "error" in severities else 1 if "warning" in severities else 0
+
+
+def report(found: Sequence[Finding]) -> str:
+    """The findings as plain text, to be sent to somebody."""
+    lines = []
+    for finding in found:
+        lines.append(f"{_SIGNS[finding.severity]} {finding.sentence}")
+        lines += [f"    {line}" for line in (finding.mend, finding.command) if line]
+    return "\n".join(lines) + "\n"
+
+
+def to_plain(found: Sequence[Finding]) -> list[dict[str, object]]:
+    """The findings as maps, for `--json`."""
+    return [asdict(finding) for finding in found]
+
+
+def _loopback(facts: Facts) -> Iterator[Finding]:
+    if facts.loopback:
+        yield Finding(
+            "loopback",
+            "error",
+            f"Programs of this computer cannot reach each other: {facts.loopback}.",
+            "Switch the loopback interface on; a firewall or a sandbox may have switched it off.",
+            command="ip link set lo up" if facts.platform == "linux" else "",
+        )
+    else:
+        yield Finding("loopback", "ok", "Programs of this computer can reach each other (127.0.0.1).")
+
+
+def _packages(facts: Facts) -> Iterator[Finding]:
+    originals = [each for each in facts.packages if each.name.lower() == "nep"]
+    for each in originals:
+        yield Finding(
+            "package:nep",
+            "error",
+            f"The original package nep {each.version} is installed beside NEP Studio; both are called “nep”.",
+            "Take it out and put NEP Studio back; give programs of the original a Python environment of their"
+            " own.",
+            command="pip uninstall -y nep && pip install --force-reinstall --no-deps nep-studio",
+        )
+    if facts.strange_files and not originals:
+        yield Finding(
+            "package:files",
+            "error",
+            f"Files of the original NEP lie in {facts.nep_file}: {', '.join(facts.strange_files)}.",
+            "Install NEP Studio anew.",
+            command="pip install --force-reinstall --no-deps nep-studio",
+        )
+    if facts.shadow:
+        yield Finding(
+            "package:shadow",
+            "warning",
+            f"{facts.shadow} hides the package “nep” from programs that are started in this folder.",
+            "Give that file another name.",
+        )
+    if not originals and not facts.strange_files:
+        yield Finding("package", "ok", f"“import nep” gives the one in {facts.nep_file}.")
+
+
+def _files(facts: Facts) -> Iterator[Finding]:
+    files = facts.files
+    if files.soft is not None and files.soft < FEWEST_FILES:
+        yield Finding(
+            "files",
+            "warning",
+            f"A program may open {files.soft} files only; that is enough for"
+            f" about {files.soft // _FILES_A_TOPIC} topics.",
+            "Allow more in the terminal from which you start programs.",
+            command=f"ulimit -n {min(8192, files.hard or 8192)}",
+        )
+    elif files.soft is not None:
+        yield Finding("files", "ok", f"A program may open {files.soft} files.")
+    opened, limit = files.master_open, files.master_limit
+    if opened is not None and limit is not None and opened > NEARLY * limit:
+        yield Finding(
+            "files:master",
+            "warning",
+            f"The master has {opened} of at most {limit} files open; soon nobody else can join.",
+            "End the master and start it from a terminal that allows more.",
+            command="ulimit -n 8192 && nep master",
+        )
+
+
+def _sockets(facts: Facts) -> Iterator[Finding]:
+    if facts.view is None:
+        return
+    counts: dict[str, int] = {}
+    for topic in facts.view.topics.values():
+        for node_id in (
+            *(each.node_id for each in topic.publishers),
+            *(s.node_id for s in topic.subscribers),
+        ):
+            counts[node_id] = counts.get(node_id, 0) + 1
+    for node_id, count in counts.items():
+        node = facts.view.nodes.get(node_id)
+        if node is not None and node.generation == "native" and count > NEARLY * MOST_SOCKETS:
+            yield Finding(
+                f"sockets:{node_id}",
+                "warning",
+                f"“{node.name}” has {count} publishers and subscribers; a node can have {MOST_SOCKETS}.",
+                "Share topics, or use several nodes.",
+            )
+
+
+def _folders(facts: Facts) -> Iterator[Finding]:
+    for folder in facts.folders:
+        if folder.problem:
+            yield _folder_problem(folder)
+        else:
+            yield Finding(f"folder:{folder.path}", "ok", f"{folder.purpose} can be kept in {folder.path}.")
+
+
+def _folder_problem(folder: FolderFact) -> Finding:
+    return Finding(
+        f"folder:{folder.path}",
+        "error",
+        f"{folder.purpose} can't be kept in {folder.path}: {folder.problem}.",
+        "Make the folder yours and writable, or make room on the disk.",
+    )
+
+
+def _clock(facts: Facts) -> Iterator[Finding]:
+    if facts.now_s < EARLIEST_S:
+        yield Finding(
+            "clock",
+            "warning",
+            "The clock of this computer is wrong: it says that 2024 has not begun.",
+            "Set it, so that ages of messages are right.",
+        )
+
+
+def _versions(facts: Facts) -> Iterator[Finding]:
+    words = ", ".join(f"{name} {version}" for name, version in facts.versions.items())
+    yield Finding("versions", "info", f"{words}.")

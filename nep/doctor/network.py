@@ -1,0 +1,191 @@
+"""The part of the doctor's judgement that is about masters, ports and who is on the net."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from nep.addresses import is_loopback
+from nep.doctor.facts import Facts, PortFact, ProcessFact
+from nep.doctor.verdict import Finding, ago, counted
+
+__all__ = ["clocks", "masters", "originals", "ports", "told_by_master"]
+
+SLOW_S = 0.5
+NOT_SERVED = ("0.5.4.6", "0.5.4.7")
+_AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
+_NATIVE = {"native", "gateway"}
+
+
+def masters(facts: Facts) -> Iterator[Finding]:
+    """Whether a master answers, who it is, and whether there are two."""
+    port = facts.master_port
+    holder = port.holder if port is not None else None
+    number = facts.address.rpartition(":")[2]
+    if facts.view is not None:
+        yield _running(facts, holder)
+    elif holder is not None and holder.is_master:
+        yield Finding(
+            "master:hung",
+            "error",
+            f"The master at {facts.address}{_process(holder)} does not answer; it hangs or is halted.",
+            "End it and start a new one; programs that have found each other go on meanwhile.",
+            command=f"kill {holder.pid}" if facts.platform != "win32" else f"taskkill /F /PID {holder.pid}",
+        )
+    elif port is not None and port.is_taken:
+        other = _other_port(number)
+        yield Finding(
+            "master:foreign",
+            "error",
+            f"Port {number} is held by {_who(holder)}, which is no master.",
+            f"End that program, or start the master on port {other} and tell it to all programs"
+            f" (NEP_MASTER=127.0.0.1:{other}).",
+            command=f"nep master --port {other}",
+        )
+    else:
+        yield Finding(
+            "master:none",
+            "error",
+            f"No master runs at {facts.address}, so new programs cannot find each other.",
+            "Start one."
+            if is_loopback(facts.address)
+            else "Start one on that computer, and check that it is in the same network.",
+            command="nep master" if number == "7780" else f"nep master --port {number}",
+        )
+    yield from _several(facts)
+
+
+def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
+    view = facts.view
+    people = f"{counted(len(view.nodes), 'node')}, {counted(len(view.topics), 'topic')}" if view else ""
+    since = ""
+    if holder is not None and holder.since_s is not None:
+        since = f" for {ago(facts.now_s - holder.since_s)}"
+    sentence = f"A master runs at {facts.address}{_process(holder)}{since}: {people}"
+    if facts.answered_s is not None and facts.answered_s > SLOW_S:
+        return Finding(
+            "master:slow",
+            "warning",
+            f"{sentence}. It took {facts.answered_s:.1f} s to answer.",
+            "This computer is very busy; look for the program that is.",
+        )
+    return Finding("master", "ok", f"{sentence}.")
+
+
+def _several(facts: Facts) -> Iterator[Finding]:
+    if len(facts.masters) < 2:
+        return
+    listed = ", ".join(
+        f"port {port} (process {process.pid})" if port else f"process {process.pid}"
+        for process, port in facts.masters
+    )
+    yield Finding(
+        "master:several",
+        "warning",
+        f"{len(facts.masters)} masters run on this computer: {listed}."
+        " Programs of one don't see those of the other.",
+        "End all but one, or give every program the same NEP_MASTER.",
+    )
+
+
+def ports(facts: Facts) -> Iterator[Finding]:
+    """The ports where original programs ask."""
+    if not facts.joins_originals:
+        yield Finding("ports", "info", "Programs of the original NEP are not joined (NEP_GATEWAY=0).")
+        return
+    for port in facts.ports:
+        holder = port.holder
+        if not port.is_taken:
+            if facts.view is not None:
+                yield Finding(
+                    f"port:{port.port}",
+                    "info",
+                    f"Nobody listens on port {port.port}, {port.purpose}.",
+                    "The master was started without its gateway." if port.port != 12345 else "",
+                )
+        elif holder is not None and holder.is_master:
+            yield Finding(f"port:{port.port}", "ok", f"The master holds port {port.port}, {port.purpose}.")
+        else:
+            yield _taken(facts, port)
+
+
+def _taken(facts: Facts, port: PortFact) -> Finding:
+    holder = port.holder
+    name = holder.name if holder is not None else ""
+    if facts.platform == "darwin" and port.port == 7000 and (not name or name.startswith(_AIRPLAY)):
+        return Finding(
+            "port:7000",
+            "warning",
+            f"The AirPlay Receiver holds port 7000, {port.purpose}.",
+            "Switch it off in the system settings, under General, AirDrop & Handoff.",
+        )
+    if port.port == 12345:  # the originals' kill channel: whoever wants to end nodes holds it
+        return Finding(
+            "port:12345",
+            "info",
+            f"Port 12345 is held by {_who(holder)}; original nodes take orders to end from there.",
+        )
+    return Finding(
+        f"port:{port.port}",
+        "warning",
+        f"Port {port.port}, {port.purpose}, is held by {_who(holder)}.",
+        "End that program; an original master may be one: this one joins its programs when it has gone.",
+    )
+
+
+def originals(facts: Facts) -> Iterator[Finding]:
+    """Who is a program of the original NEP, and which of them cannot be served."""
+    if facts.view is None:
+        return
+    nodes = [node for node in facts.view.nodes.values() if node.generation not in _NATIVE]
+    for node in nodes:
+        if node.generation in NOT_SERVED:
+            yield Finding(
+                f"original:{node.id}",
+                "error",
+                f"“{node.name}” uses nep {node.generation}, which no other version understands.",
+                "Install 0.5.4.8 or 0.5.4.5 for this program.",
+                command="pip install nep==0.5.4.8",
+            )
+    served = [node for node in nodes if node.generation not in NOT_SERVED]
+    if served:
+        names = ", ".join(f"{node.name} ({_wire(node.generation)})" for node in served)
+        yield Finding("originals", "info", f"{counted(len(served), 'program')} of the original NEP: {names}.")
+
+
+def told_by_master(facts: Facts) -> Iterator[Finding]:
+    """What the master itself has noticed; ports are judged here already."""
+    if facts.view is None:
+        return
+    for alert in facts.view.alerts:
+        if not alert.id.startswith("port:"):
+            sentence = alert.sentence if alert.sentence.endswith(".") else f"{alert.sentence}."
+            yield Finding(alert.id, "warning", sentence, alert.hint)
+
+
+def clocks(facts: Facts) -> Iterator[Finding]:
+    """Computers whose clocks are ahead of this one's."""
+    for clock in facts.clocks:
+        yield Finding(
+            f"clock:{clock.host}",
+            "warning",
+            f"The clock of {clock.host} is {clock.ahead_s:.1f} s ahead, so ages of its messages are wrong.",
+            "Let both computers set their clocks by the network.",
+        )
+
+
+def _wire(generation: str) -> str:
+    return {"A": "up to 0.5.4.5", "B": "0.5.4.8"}.get(generation, generation)
+
+
+def _process(holder: ProcessFact | None) -> str:
+    return f" (process {holder.pid})" if holder is not None and holder.pid is not None else ""
+
+
+def _who(holder: ProcessFact | None) -> str:
+    if holder is None:
+        return "a program that the system does not name"
+    return f"“{holder.name}”{_process(holder)}"
+
+
+def _other_port(number: str) -> int:
+    return int(number) + 1 if number.isdigit() and int(number) < 65535 else 7781

@@ -1,0 +1,130 @@
+"""Who holds which port of this computer, and which processes are masters."""
+
+from __future__ import annotations
+
+import itertools
+import socket
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePath
+
+import psutil
+
+from nep.doctor.facts import ProcessFact
+
+__all__ = ["describe", "is_free", "is_master_command", "listening", "masters", "open_files"]
+
+_NEAR = 20
+"""A master's port is looked for so near to the usual one, when it listens on several."""
+
+
+def listening() -> dict[int, int | None]:
+    """The TCP ports that somebody listens on, with the process where the system tells it."""
+    try:
+        connections: Iterable[object] = psutil.net_connections(kind="tcp")
+    except psutil.AccessDenied:  # macOS tells all of them to root only; its own to everybody
+        connections = _own_connections()
+    found: dict[int, int | None] = {}
+    for each in connections:
+        if getattr(each, "status", "") != psutil.CONN_LISTEN:
+            continue
+        port = getattr(getattr(each, "laddr", None), "port", None)
+        if isinstance(port, int):
+            found[port] = getattr(each, "pid", None) or found.get(port)
+    return found
+
+
+def _own_connections() -> Iterable[object]:
+    for process in psutil.process_iter():
+        try:
+            for each in process.net_connections(kind="tcp"):
+                yield _Owned(each, process.pid)
+        except psutil.Error:
+            continue
+
+
+class _Owned:
+    """A connection of one process, with its process as the system-wide list has it."""
+
+    def __init__(self, connection: object, pid: int) -> None:
+        self.status = getattr(connection, "status", "")
+        self.laddr = getattr(connection, "laddr", None)
+        self.pid = pid
+
+
+def is_free(port: int) -> bool:
+    """Whether a program could listen on the port now. It is taken for a moment to see."""
+    with socket.socket() as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def describe(pid: int | None, master_pid: int | None = None) -> ProcessFact | None:
+    """The process, None when it is not known or has ended."""
+    if pid is None:
+        return None
+    try:
+        process = psutil.Process(pid)
+        with process.oneshot():
+            command = _command(process)
+            is_master = pid == master_pid or is_master_command(command)
+            return ProcessFact(pid, _name(process.name(), command), is_master, process.create_time())
+    except psutil.Error:
+        return None
+
+
+def masters(ports: Mapping[int, int | None], usual: int) -> tuple[tuple[ProcessFact, int | None], ...]:
+    """Processes that run a master, each with its port; the one at the usual port first."""
+    held: dict[int, list[int]] = {}
+    for port, pid in ports.items():
+        if pid is not None:
+            held.setdefault(pid, []).append(port)
+    found = []
+    for pid, own in held.items():
+        fact = describe(pid)
+        if fact is not None and fact.is_master:
+            found.append((fact, _masters_port(own, usual)))
+    return tuple(sorted(found, key=lambda each: (each[1] != usual, each[1] or 0)))
+
+
+def _masters_port(ports: Sequence[int], usual: int) -> int | None:
+    near = sorted(ports, key=lambda port: abs(port - usual))
+    return near[0] if near and (abs(near[0] - usual) <= _NEAR or len(near) == 1) else None
+
+
+def is_master_command(command: Sequence[str]) -> bool:
+    """Whether a command line is one that runs a master: `nep master`, `python -m nep master`."""
+    for word, following in itertools.pairwise(command):
+        if following == "master" and PurePath(word).stem in {"nep", "__main__"}:
+            return True
+    return False
+
+
+def open_files(pid: int) -> tuple[int | None, int | None]:
+    """How many files a process has open, and how many it may; None where the system does not tell."""
+    try:
+        process = psutil.Process(pid)
+        opened = process.num_fds() if hasattr(process, "num_fds") else None
+        rlimit = getattr(process, "rlimit", None)
+        limit = rlimit(psutil.RLIMIT_NOFILE)[0] if rlimit is not None else None
+    except psutil.Error:
+        return None, None
+    return opened, limit if limit is not None and limit > 0 else None
+
+
+def _command(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
+
+
+def _name(name: str, command: Sequence[str]) -> str:
+    """What a person would call the program: of an interpreter, its script."""
+    if PurePath(name).stem.lower().startswith(("python", "node", "java")):
+        for word in command[1:]:
+            if not word.startswith("-"):
+                return f"{name} {PurePath(word).name}"
+    return name

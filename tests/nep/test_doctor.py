@@ -1,0 +1,212 @@
+"""The doctor's judgement over made-up facts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from nep.doctor import Facts, findings, report, to_plain, worst
+from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact
+from nep.graph import Alert, GraphView, NodeInfo, PublisherInfo, TopicInfo
+
+NOW = 1_800_000_000.0
+MASTER = ProcessFact(41, "nep", is_master=True, since_s=NOW - 7200)
+OTHER = ProcessFact(77, "python3 server.py", since_s=NOW - 5)
+
+
+def node(name, generation="native"):
+    return NodeInfo(name, name, "lab", 1, "Python", generation, 0)
+
+
+def view(*nodes, alerts=(), topics=None):
+    return GraphView(1, 1, {each.id: each for each in nodes}, topics or {}, tuple(alerts))
+
+
+HEALTHY = Facts(
+    NOW,
+    "127.0.0.1:7780",
+    "linux",
+    {"Python": "3.11.7", "pyzmq": "27.3.0"},
+    "/somewhere/nep",
+    view(node("Pepper"), node("studio")),
+    0.004,
+    PortFact(7780, "the master's", True, MASTER),
+    (
+        PortFact(7000, "where old programs ask", True, MASTER),
+        PortFact(50000, "where newer ones ask", True, MASTER),
+        PortFact(12345, "where nodes are told to end", False),
+    ),
+    ((MASTER, 7780),),
+    packages=(PackageFact("nep-studio", "0.1.0", "/somewhere"),),
+    files=FileFact(20_000, 20_000, 60, 8192),
+    folders=(FolderFact("/state", "Settings"),),
+)
+
+
+def found(severity=None, **changes):
+    """The findings of healthy facts with these changes, by id."""
+    made = findings(replace(HEALTHY, **changes))
+    return {each.id: each for each in made if severity is None or each.severity == severity}
+
+
+def test_a_healthy_computer_has_no_warning():
+    made = findings(HEALTHY)
+    assert worst(made) == 0
+    assert found()["master"].sentence == (
+        "A master runs at 127.0.0.1:7780 (process 41) for 2.0 h: 2 nodes, 0 topics."
+    )
+    assert "The master holds port 7000" in found()["port:7000"].sentence
+
+
+def test_no_master_says_how_to_start_one():
+    one = found(view=None, master_port=PortFact(7780, "", False))["master:none"]
+    assert (one.severity, one.command) == ("error", "nep master")
+    other = found(view=None, address="127.0.0.1:9", master_port=PortFact(9, "", False))["master:none"]
+    assert other.command == "nep master --port 9"
+    far = found(view=None, address="10.0.0.5:7780", master_port=None)["master:none"]
+    assert "on that computer" in far.mend
+
+
+def test_a_foreign_program_on_the_masters_port_is_named_with_the_way_out():
+    one = found(view=None, master_port=PortFact(7780, "", True, OTHER))["master:foreign"]
+    assert one.sentence == "Port 7780 is held by “python3 server.py” (process 77), which is no master."
+    assert "7781" in one.mend
+    assert one.command == "nep master --port 7781"
+    unknown = found(view=None, master_port=PortFact(7780, "", True))["master:foreign"]
+    assert "does not name" in unknown.sentence
+
+
+def test_a_master_that_hangs_or_is_slow():
+    hung = found(view=None, master_port=PortFact(7780, "", True, MASTER))["master:hung"]
+    assert hung.command == "kill 41"
+    windows = found(view=None, master_port=PortFact(7780, "", True, MASTER), platform="win32")["master:hung"]
+    assert windows.command == "taskkill /F /PID 41"
+    assert found(answered_s=0.8)["master:slow"].severity == "warning"
+
+
+def test_two_masters_are_told_with_their_ports():
+    second = ProcessFact(50, "nep", is_master=True)
+    one = found(masters=((MASTER, 7780), (second, None)))["master:several"]
+    assert "port 7780 (process 41), process 50" in one.sentence
+
+
+def test_a_taken_port_of_the_originals_is_a_warning_not_an_error():
+    made = found(ports=(PortFact(50000, "where newer ones ask", True, OTHER),))
+    assert made["port:50000"].severity == "warning"
+    assert "“python3 server.py” (process 77)" in made["port:50000"].sentence
+    assert worst(tuple(made.values())) == 1
+
+
+@pytest.mark.parametrize(
+    "holder", [None, ProcessFact(3, "ControlCenter"), ProcessFact(3, "AirPlayXPCHelper")]
+)
+def test_airplay_is_named_on_macos(holder):
+    made = found(platform="darwin", ports=(PortFact(7000, "where old programs ask", True, holder),))
+    assert "AirPlay Receiver" in made["port:7000"].sentence
+    assert "AirDrop & Handoff" in made["port:7000"].mend
+
+
+def test_another_program_on_port_7000_of_a_mac_is_not_airplay():
+    made = found(platform="darwin", ports=(PortFact(7000, "", True, OTHER),))
+    assert "python3 server.py" in made["port:7000"].sentence
+
+
+def test_a_master_without_gateway_and_a_wish_for_none():
+    one = found(ports=(PortFact(7000, "where old programs ask", False),))["port:7000"]
+    assert (one.severity, one.mend) == ("info", "The master was started without its gateway.")
+    assert set(found(joins_originals=False)) >= {"ports"}
+    assert "port:7000" not in found(joins_originals=False)
+
+
+def test_the_kill_channel_is_only_told():
+    assert found(ports=(PortFact(12345, "", True, OTHER),))["port:12345"].severity == "info"
+
+
+def test_the_original_package_beside_ours_is_an_error_with_the_command():
+    one = found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),))["package:nep"]
+    assert one.severity == "error"
+    assert "nep 0.5.4.8" in one.sentence
+    assert one.command.startswith("pip uninstall -y nep")
+    assert "package" not in found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),))
+    left = found(strange_files=("publisher.py", "master.py"))["package:files"]
+    assert "publisher.py, master.py" in left.sentence
+    assert found(shadow="/home/me/nep.py")["package:shadow"].severity == "warning"
+
+
+def test_few_files_say_for_how_many_topics_that_is():
+    one = found(files=FileFact(256, 10_240))["files"]
+    assert one.severity == "warning"
+    assert "12 topics" in one.sentence
+    assert one.command == "ulimit -n 8192"
+    assert found(files=FileFact(256, 512))["files"].command == "ulimit -n 512"
+    assert found(files=FileFact(8192, 8192, 8000, 8192))["files:master"].severity == "warning"
+    assert "files" not in found(files=FileFact(None, None))
+
+
+def test_a_node_with_nearly_all_sockets_is_told():
+    many = {
+        f"t{number}": TopicInfo(
+            f"t{number}",
+            "json",
+            "json",
+            (PublisherInfo(number, "Pepper", (), False, 0, 0, 0, None, None, None),),
+        )
+        for number in range(900)
+    }
+    assert "900 publishers" in found(view=view(node("Pepper"), topics=many))["sockets:Pepper"].sentence
+
+
+def test_originals_are_named_and_those_that_cannot_be_served_are_errors():
+    made = found(
+        view=view(node("rize", "A"), node("camera", "B"), node("bad", "0.5.4.7"), node("g", "gateway"))
+    )
+    assert made["originals"].sentence == (
+        "2 programs of the original NEP: rize (up to 0.5.4.5), camera (0.5.4.8)."
+    )
+    assert made["original:bad"].severity == "error"
+    assert "0.5.4.7" in made["original:bad"].sentence
+    assert "0.5.4.8 or 0.5.4.5" in made["original:bad"].mend
+
+
+def test_what_the_master_noticed_is_told_once():
+    alerts = [
+        Alert("name:x", "2 programs call themselves “x”", "Give each a name."),
+        Alert("port:7000", "taken"),
+    ]
+    made = found(view=view(alerts=alerts))
+    assert made["name:x"].mend == "Give each a name."
+    assert made["port:7000"].severity == "ok"  # judged by itself
+
+
+def test_folders_clocks_and_the_loopback():
+    assert found(folders=(FolderFact("/state", "Settings", "permission denied"),))[
+        "folder:/state"
+    ].sentence == ("Settings can't be kept in /state: permission denied.")
+    assert "3.2 s ahead" in found(clocks=(ClockFact("lab", 3.21),))["clock:lab"].sentence
+    assert found(now_s=1000.0)["clock"].severity == "warning"
+    one = found(loopback="network is unreachable")["loopback"]
+    assert (one.severity, one.command) == ("error", "ip link set lo up")
+
+
+def test_the_worst_comes_first_and_decides_the_exit_code():
+    made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False), shadow="x"))
+    assert [each.severity for each in made][:2] == ["error", "warning"]
+    assert worst(made) == 2
+
+
+def test_the_report_is_plain_text_with_mends():
+    made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False)))
+    lines = report(made).splitlines()
+    assert lines[:3] == [
+        "x No master runs at 127.0.0.1:7780, so new programs cannot find each other.",
+        "    Start one.",
+        "    nep master",
+    ]
+    assert to_plain(made)[0]["id"] == "master:none"
+
+
+def test_every_sentence_ends_like_one():
+    for each in (*findings(HEALTHY), *found(view=None, master_port=None, shadow="/x").values()):
+        assert each.sentence.endswith(".")
+        assert each.sentence[0].isupper() or each.sentence[0] in "“/"

@@ -1,0 +1,125 @@
+"""Gathering facts on the real computer, and `nep doctor` itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+import nep
+from nep.cli.doctor import doctor
+from nep.doctor import gather, processes
+from nep.doctor.collect import loopback_problem
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def foreign():
+    """A port that this program holds and that is no master's."""
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        held.listen(1)
+        yield held.getsockname()[1]
+
+
+def test_a_master_of_this_computer_is_found_with_its_process(master):
+    with nep.node("Pepper") as node:
+        node.new_pub("/odom")
+        facts = gather(master.address)
+    assert {each.name for each in facts.view.nodes.values()} == {"Pepper"}
+    assert facts.answered_s < 1.0
+    assert facts.master_port.is_taken
+    assert facts.master_port.holder.pid == os.getpid()
+    assert facts.loopback == ""
+    assert facts.versions["Python"].startswith("3.")
+    assert Path(facts.nep_file) == Path(nep.__file__).parent
+
+
+def test_who_holds_the_port_is_found(foreign):
+    facts = gather(f"127.0.0.1:{foreign}")
+    assert facts.view is None
+    assert facts.master_port.holder.pid == os.getpid()
+    assert not facts.master_port.holder.is_master
+    assert not processes.is_free(foreign)
+
+
+def test_a_free_port_is_free():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    facts = gather(f"127.0.0.1:{port}")
+    assert not facts.master_port.is_taken
+    assert processes.is_free(port)
+
+
+def test_a_far_masters_port_is_not_looked_for_here():
+    assert gather("192.0.2.1:7780").master_port is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way")
+def test_folders_that_take_no_files_say_why(tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    facts = gather("127.0.0.1:1", folders=[("Settings", tmp_path / "new"), ("Work", file / "below")])
+    problems = {fact.purpose: fact.problem for fact in facts.folders}
+    assert problems["Settings"] == ""
+    assert problems["Work"] == "not a directory"
+    assert not (tmp_path / "new").exists()
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_file_that_hides_the_package_is_found(tmp_path):
+    assert gather("127.0.0.1:1", here=tmp_path).shadow == ""
+    (tmp_path / "nep.py").touch()
+    assert gather("127.0.0.1:1", here=tmp_path).shadow == str(tmp_path / "nep.py")
+    assert gather("127.0.0.1:1", here=REPOSITORY).shadow == ""
+
+
+def test_loopback_works_here():
+    assert loopback_problem() == ""
+
+
+@pytest.mark.parametrize(
+    ("command", "is_master"),
+    [
+        (["/usr/bin/python3", "-m", "nep", "master"], True),
+        (["/x/bin/nep", "master", "--port", "1"], True),
+        (["nep-studio", "--module", "nep", "master"], True),
+        (["nep", "topic", "pub", "master", "1"], False),
+        (["git", "checkout", "master"], False),
+        ([], False),
+    ],
+)
+def test_a_master_is_known_by_its_command(command, is_master):
+    assert processes.is_master_command(command) is is_master
+
+
+def test_the_command_ends_with_its_verdict(foreign, capfdbinary):
+    with pytest.raises(typer.Exit) as ended:
+        doctor(f"127.0.0.1:{foreign}", as_json=True)
+    assert ended.value.exit_code == 2
+    (first, *_) = json.loads(capfdbinary.readouterr().out)
+    assert (first["id"], first["severity"]) == ("master:foreign", "error")
+
+
+def test_people_see_a_sentence_and_the_next_step(foreign):
+    done = subprocess.run(
+        [sys.executable, "-m", "nep", "doctor", "--master", f"127.0.0.1:{foreign}"],
+        capture_output=True,
+        encoding="utf-8",
+        timeout=30,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8"},
+    )
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("✗ Port")
+    assert lines[2].strip() == f"nep master --port {foreign + 1}"
