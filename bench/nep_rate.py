@@ -1,45 +1,124 @@
 """1 kB messages a second from process to process: nep's native wire ÷ plain pyzmq, measured in one run.
 
-    python bench/nep_rate.py [--messages 30000] [--blocks 16]
+    python bench/nep_rate.py [--messages 9000] [--blocks 30] [--limit 5]
 
-The child sends bursts that fit into every queue, so nothing may be lost; this process receives them in its
-main thread and takes the time from the first message to the last. The variants are interleaved in random
-order; "plain again" is plain pyzmq against itself: a run counts only when that is within 5 %.
+The child sends bursts that fit into every queue, so nothing may be lost; this process receives them and takes
+the time from the first message to the last. The variants are interleaved in random order; "plain again" is
+plain pyzmq against itself: a run counts only when that is within 5 %, see `blocks.py` for what is done until
+then.
+
+    plain           one part of 1000 bytes: PUB.send, SUB.recv as bytes; nobody counts, checks or decodes
+    plain, 3 parts  the same bytes behind a topic and 32 bytes: send_multipart, recv_multipart
+    listen          Subscriber.listen in the main thread
+    spin            a callback that `Node.spin` calls in the main thread
+    sink            batches given to a sink in the node's thread, as Studio takes them
+    json            a robot's state that is encoded and decoded again, 1000 bytes of JSON, with listen
+    plain json      the same with `json.dumps`, `json.loads` and one part, as many programs do it
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import zmq
 from blocks import Child, Sample, cpu_s, interleaved, other_process, verdict
 
 import nep
+from nep.message import Message
 
 SIZE = 1000
+NATIVE = ("listen", "spin", "sink", "json")
 
 SENDER = """
-import os, sys, time, zmq, nep
-size, count = int(sys.argv[1]), int(sys.argv[2])
-data = os.urandom(size)
+import json, os, sys, time, zmq, nep
+count, state = int(sys.argv[1]), json.loads(sys.argv[2])
+data = os.urandom(1000)
 node = nep.node("sender")
-pub = node.new_pub("rate", "bytes")
-plain = zmq.Context().socket(zmq.PUB)
-plain.setsockopt(zmq.SNDHWM, 0)
-print(plain.bind_to_random_port("tcp://127.0.0.1"), flush=True)
+topics = {name: node.new_pub(name, "json" if name == "json" else "bytes") for name in sys.argv[3:]}
+context = zmq.Context()
+plains = [context.socket(zmq.PUB), context.socket(zmq.PUB)]
+for plain in plains:
+    plain.setsockopt(zmq.SNDHWM, 0)
+print(*(plain.bind_to_random_port("tcp://127.0.0.1") for plain in plains), flush=True)
 for line in sys.stdin:
-    if line.startswith("native"):
+    what = line.strip()
+    if what in topics:
+        publish, payload = topics[what].publish, state if what == "json" else data
         for _ in range(count):
-            pub.publish(data)
+            publish(payload)
+    elif what == "parts":
+        head = bytes(32)
+        for _ in range(count):
+            plains[1].send_multipart((b"parts", head, data))
+    elif what == "plain json":
+        for _ in range(count):
+            plains[0].send(json.dumps(state).encode())
+    elif what == "one":
+        plains[0].send(data)
+        plains[1].send(data)
     else:
-        for _ in range(count if line.startswith("plain") else 1):
-            plain.send(data)
+        for _ in range(count):
+            plains[0].send(data)
     print(time.process_time(), flush=True)
 """
+
+
+def robot_state() -> dict[str, object]:
+    """What a robot may tell of itself; 1000 bytes as JSON."""
+    joints = {f"joint_{n}": {"angle": 0.123 * n, "load": 0.5 - n / 100} for n in range(12)}
+    state: dict[str, object] = {"name": "robot", "battery": 0.83, "position": [1.25, -0.5, 0.0], "text": ""}
+    state |= {"joints": joints}
+    state["text"] = "x" * (SIZE - len(json.dumps(state, separators=(",", ":"))))
+    return state
+
+
+class Count:
+    """Takes messages until there are `wanted`, and the time from after the first batch to the last."""
+
+    def __init__(self, wanted: int) -> None:
+        self._wanted = wanted
+        self._lock = threading.Lock()
+        self.is_full = threading.Event()
+        self.begin()
+
+    def begin(self) -> None:
+        """Count from 0."""
+        with self._lock:
+            self._first = self._count = 0
+            self._started = self._ended = 0.0
+            self.is_full.clear()
+
+    def batch(self, messages: Sequence[Message]) -> None:
+        """So many more came; a sink."""
+        with self._lock:
+            self._ended = time.perf_counter()
+            if not self._count:
+                self._started = self._ended
+                self._first = len(messages)
+            self._count += len(messages)
+            if self._count >= self._wanted:
+                self.is_full.set()
+
+    def one(self, _payload: object) -> None:
+        """One more came; a callback."""
+        self._count += 1
+        if self._count == 1:
+            self._first = 1
+            self._started = time.perf_counter()
+        elif self._count == self._wanted:
+            self._ended = time.perf_counter()
+            self.is_full.set()
+
+    @property
+    def seconds_each(self) -> float:
+        """How long one message took."""
+        return (self._ended - self._started) / (self._count - self._first)
 
 
 class Bursts:
@@ -58,22 +137,36 @@ class Bursts:
         started = time.perf_counter()
         for _ in range(self._count - 1):
             one()
-        taken = time.perf_counter() - started
+        return self._sample((time.perf_counter() - started) / (self._count - 1), used)
+
+    def count(self, what: str, counted: Count, wait: Callable[[], object]) -> Sample:
+        """One burst of `what`, which `counted` counts while `wait` waits."""
+        counted.begin()
+        used = cpu_s()
+        self._child.write(what)
+        wait()
+        if not counted.is_full.is_set():
+            raise SystemExit(f"{what}: a message did not come")
+        return self._sample(counted.seconds_each, used)
+
+    def _sample(self, seconds: float, used: float) -> Sample:
         used = cpu_s() - used
         before, self._child_s = self._child_s, float(self._child.read())
-        return Sample(taken / self._count, (used + self._child_s - before) / self._count)
+        return Sample(seconds, (used + self._child_s - before) / self._count)
 
 
-def connect(socket: zmq.Socket[bytes], port: str, child: Child) -> None:
-    """Connect to the child's plain socket, and wait until its messages come."""
-    socket.setsockopt(zmq.RCVHWM, 0)
-    socket.subscribe(b"")
-    socket.connect(f"tcp://127.0.0.1:{port}")
-    while not socket.poll(50):
-        child.write("one")
-        child.read()
-    while socket.poll(200):
-        socket.recv()
+def connect(sockets: Sequence[zmq.Socket[bytes]], ports: Sequence[str], child: Child) -> None:
+    """Connect to the child's plain sockets, and wait until their messages come."""
+    for socket, port in zip(sockets, ports, strict=True):
+        socket.setsockopt(zmq.RCVHWM, 0)
+        socket.subscribe(b"")
+        socket.connect(f"tcp://127.0.0.1:{port}")
+        while not socket.poll(50):
+            child.write("one")
+            child.read()
+    for socket in sockets:
+        while socket.poll(200):
+            socket.recv_multipart()
 
 
 def show(samples: dict[str, Sample]) -> int:
@@ -88,42 +181,72 @@ def show(samples: dict[str, Sample]) -> int:
     return verdict(plain.seconds / samples["plain again"].seconds)
 
 
-def main() -> int:
-    """Measure and print one table; 1 when the run does not count."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--messages", type=int, default=30_000)
-    parser.add_argument("--blocks", type=int, default=16)
-    arguments = parser.parse_args()
-    count: int = arguments.messages
+def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int]:
+    """The samples of all variants, and how many messages were lost."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    plain = context.socket(zmq.SUB)
+    plain, parts = context.socket(zmq.SUB), context.socket(zmq.SUB)
+    sunk, spun = Count(count), Count(count)
+    state = robot_state()
     with (
         nep.master("127.0.0.1:0", learn_s=0.0) as master,
         nep.node("bench", master=master.address) as node,
-        node.new_sub("rate", "bytes", max_messages=2 * count) as sub,
-        other_process(SENDER, (str(SIZE), str(count)), master.address) as child,
+        node.new_sub("listen", "bytes") as listener,
+        node.new_sub("json", "json") as reader,
+        node.new_sub("sink", "bytes", sink=sunk.batch) as sinker,
+        node.new_callback("spin", "bytes", spun.one) as spinner,
+        other_process(SENDER, (str(count), json.dumps(state), *NATIVE), master.address) as child,
     ):
-        connect(plain, child.read(), child)
+        connect((plain, parts), child.read().split(), child)
         bursts = Bursts(child, count)
 
-        def listen() -> None:
-            if not sub.listen(timeout_s=5.0)[0]:
+        def listen(subscriber: nep.Subscriber) -> object:
+            is_there, payload = subscriber.listen(timeout_s=5.0)
+            if not is_there:
                 raise SystemExit("a message did not come")
+            return payload
 
-        def receive() -> None:
-            if sub.receive(5.0) is None:
-                raise SystemExit("a message did not come")
+        def spin() -> None:
+            ending = threading.Thread(target=lambda: (spun.is_full.wait(10.0), node.stop_spin()))
+            ending.start()
+            node.spin(10.0)
+            ending.join()
 
+        if listen_once(bursts, child, reader) != state:
+            raise SystemExit("the state came back as another one")
         variants = {
             "plain": partial(bursts.take, "plain", plain.recv),
             "plain again": partial(bursts.take, "plain", plain.recv),
-            "native, listen": partial(bursts.take, "native", listen),
-            "native, receive": partial(bursts.take, "native", receive),
+            "plain, 3 parts": partial(bursts.take, "parts", parts.recv_multipart),
+            "listen": partial(bursts.take, "listen", partial(listen, listener)),
+            "spin": partial(bursts.count, "spin", spun, spin),
+            "sink": partial(bursts.count, "sink", sunk, partial(sunk.is_full.wait, 10.0)),
+            "json": partial(bursts.take, "json", partial(listen, reader)),
+            "plain json": partial(bursts.take, "plain json", lambda: json.loads(plain.recv())),
         }
-        samples = interleaved(variants, arguments.blocks)
-        lost = sub.lost
+        samples = interleaved(variants, blocks, limit=limit)
+        lost = sum(each.lost or 0 for each in (listener, reader, sinker, spinner))
     context.destroy(0)
-    print(f"{SIZE} bytes, bursts of {count} messages; lost on the native wire: {lost}")
+    return samples, lost
+
+
+def listen_once(bursts: Bursts, child: Child, reader: nep.Subscriber) -> object:
+    """A burst of states; the last one."""
+    last: list[object] = []
+    bursts.take("json", lambda: last.append(reader.listen(timeout_s=5.0)[1]))
+    return last[-1]
+
+
+def main() -> int:
+    """Measure and print one table; 1 when the run does not count."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--messages", type=int, default=9_000)
+    parser.add_argument("--blocks", type=int, default=30)
+    parser.add_argument(
+        "--limit", type=int, default=5, help="so many times the blocks at most, see blocks.py"
+    )
+    arguments = parser.parse_args()
+    samples, lost = measure(arguments.messages, arguments.blocks, arguments.limit)
+    print(f"{SIZE} bytes, bursts of {arguments.messages} messages; lost on the native wire: {lost}")
     return show(samples)
 
 

@@ -1,6 +1,6 @@
 """Round trips of nep's native wire: their time, as a ratio to plain pyzmq measured in the same run.
 
-    python bench/nep_roundtrip.py [--trips 30] [--blocks 16]
+    python bench/nep_roundtrip.py [--trips 30] [--blocks 16] [--limit 4]
 
 One side runs in this process, the other in its child, over loopback, each in its main thread or a thread that
 does nothing else. All variants are interleaved in random order within each block; "plain again" is plain
@@ -24,7 +24,7 @@ from collections.abc import Callable
 from functools import partial
 
 import zmq
-from blocks import TRUSTED, Child, Sample, cpu_s, interleaved, other_process, verdict
+from blocks import Child, Sample, cpu_s, interleaved, is_trusted, other_process, verdict
 
 import nep
 
@@ -104,13 +104,13 @@ def child_s(ask: Child) -> float:
     return float(ask.read())
 
 
-def compare(variants: dict[str, Trip], ask: Child, blocks: int, trips: int) -> int:
+def compare(variants: dict[str, Trip], ask: Child, blocks: int, trips: int, limit: int) -> int:
     """Print the median round trip of "plain" and the others' ratio to it, for each size."""
     print(f"{'bytes':>9} {'plain ms':>9} {'plain again':>12} {'native':>7} {'CPU ms':>8} {'native CPU':>11}")
     again, native = [], []
     for size in SIZES:
         ready = {name: partial(measure, trip, ask, size, trips) for name, trip in variants.items()}
-        found = interleaved(ready, blocks)
+        found = interleaved(ready, blocks, limit=limit)
         plain = found["plain"]
         a_a, ratio = (found[name].seconds / plain.seconds for name in ("plain again", "native"))
         if size >= JUDGED:
@@ -118,7 +118,7 @@ def compare(variants: dict[str, Trip], ask: Child, blocks: int, trips: int) -> i
             native.append(ratio)
         cpu = found["native"].cpu_s / plain.cpu_s
         times = f"{size:>9} {plain.seconds * 1e3:>9.3f} {a_a:>12.2f} {ratio:>7.2f}"
-        doubt = "" if abs(a_a - 1.0) <= TRUSTED else "  does not count"
+        doubt = "" if is_trusted(a_a) else "  does not count"
         print(f"{times} {plain.cpu_s * 1e3:>8.3f} {cpu:>11.2f}{doubt}", flush=True)
     print(f"native ÷ plain, geometric mean from {JUDGED} bytes up: {mean(native):.3f}")
     return verdict(mean(again))
@@ -134,6 +134,9 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--trips", type=int, default=30)
     parser.add_argument("--blocks", type=int, default=16)
+    parser.add_argument(
+        "--limit", type=int, default=4, help="so many times the blocks at most, see blocks.py"
+    )
     arguments = parser.parse_args()
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     plain = Plain(context)
@@ -152,7 +155,7 @@ def main() -> int:
                 raise SystemExit("a message did not come back")
 
         variants: dict[str, Trip] = {"plain": plain.trip, "plain again": plain.trip, "native": native}
-        code = compare(variants, ask, arguments.blocks, arguments.trips)
+        code = compare(variants, ask, arguments.blocks, arguments.trips, arguments.limit)
         if sub.lost:
             raise SystemExit(f"{sub.lost} messages were lost")
     context.destroy(0)

@@ -21,11 +21,13 @@ from dataclasses import dataclass
 import orjson
 
 from nep import images
-from nep.encoded import Encoded
+from nep.encoded import Encoded, encoded
 from nep.errors import DecodeError, EncodeError, did_you_mean
 from nep.packing import pack, unpack
 
 __all__ = ["CODECS", "Codec", "Encoded", "codec", "codec_for", "codec_numbered"]
+
+_NUMPY = orjson.OPT_SERIALIZE_NUMPY
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,11 @@ def _plain(value: object) -> object:
 
 def _encode_json(payload: object) -> Encoded:
     try:
-        return Encoded(orjson.dumps(payload, _plain, orjson.OPT_SERIALIZE_NUMPY))
+        return encoded((orjson.dumps(payload, _plain, _NUMPY), None))
     except TypeError:
         pass  # number keys need the slower way; everything else fails again with its reason
     try:
-        return Encoded(orjson.dumps(payload, _plain, orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS))
+        return Encoded(orjson.dumps(payload, _plain, _NUMPY | orjson.OPT_NON_STR_KEYS))
     except (TypeError, RecursionError) as error:
         reason = str(error.__cause__ or error) or "it does not fit"
         raise EncodeError("json", type(payload).__name__, reason) from error
@@ -92,7 +94,7 @@ def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -
 
 def _encode_bytes(payload: object) -> Encoded:
     if isinstance(payload, bytes):
-        return Encoded(payload)
+        return encoded((payload, None))
     if isinstance(payload, bytearray | memoryview):
         return Encoded(bytes(payload))
     raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")

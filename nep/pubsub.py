@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
 from nep.codecs import codec_for
-from nep.encoded import Encoded
+from nep.encoded import Encoded, encoded
 from nep.errors import ClosedError, DecodeError
 from nep.message import Message
 
@@ -31,6 +31,7 @@ class Publisher:
         self._outlet = outlet
         self._spec = spec
         self._encode = spec.codec.encode
+        self._is_latched = spec.is_latched
         self._is_closed = False
 
     @property
@@ -68,17 +69,17 @@ class Publisher:
 
         With no subscriber nothing is encoded, unless it is latched. Raises `EncodeError`, `ClosedError`.
         """
-        if self._is_closed or not (self._outlet.subscribers or self._spec.is_latched):
+        if self._is_closed or not (self._outlet.subscribers or self._is_latched):
             self._skip()
         else:
             self._outlet.send(payload if isinstance(payload, Encoded) else self._encode(payload))
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send bytes that are encoded already. Raises `ClosedError`."""
-        if self._is_closed or not (self._outlet.subscribers or self._spec.is_latched):
+        if self._is_closed or not (self._outlet.subscribers or self._is_latched):
             self._skip()
         else:
-            self._outlet.send(Encoded(data, extension))
+            self._outlet.send(encoded((data, extension)))
 
     def _skip(self) -> None:
         """Count a message that nobody wants."""
