@@ -13,16 +13,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from nep.addresses import master_address
-from nep.errors import ClosedError
+from nep.errors import ClosedError, RequestRefusedError
 from nep.graph import LEASE_S, Graph, GraphView
 from nep.masterloop import MasterLoop
-from nep.requests import Look, Reply, Request, Seen
-from nep.starting import Owner, is_running, start_process
+from nep.requests import Listen, Look, Refused, Reply, Request, Seen
+from nep.starting import Owner, is_running, listen, start_process
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["Attachment", "Master", "is_running", "master_address", "start_process"]
+__all__ = ["Attachment", "Master", "is_running", "listen", "master_address", "start_process"]
 
 
 class Attachment(Protocol):
@@ -116,6 +116,12 @@ class Master:
         if loop is None or loop.ended.is_set():
             raise ClosedError(f"the master at '{self.address}'")
         return loop.submit(request, timeout_s)
+
+    def listen(self, hosts: Sequence[str]) -> None:
+        """Serve other computers at these addresses of this one, none: no more. See `nep.masters.listen`."""
+        reply = self.submit(Listen(tuple(hosts)))
+        if isinstance(reply, Refused):
+            raise RequestRefusedError(reply.reason)
 
     def view(self) -> GraphView:
         """The graph now. Raises as `submit` does."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
+from collections.abc import Sequence
 from types import FrameType
 from typing import Annotated
 
@@ -16,6 +17,7 @@ from nep.cli.screen import console
 from nep.errors import AddressInUseError, NepError
 from nep.gateway.attachment import GatewayAttachment
 from nep.masters import Attachment, Master, is_running
+from nep.network import ANY, own_addresses
 
 
 def master(
@@ -23,6 +25,15 @@ def master(
         int | None,
         typer.Option(
             min=1, max=65535, help="The port; else that of NEP_MASTER, else 7780.", show_default=False
+        ),
+    ] = None,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Serve other computers, too, at this address of this one; 0.0.0.0 is all of them. There is"
+            " no password: whoever is in that network can read and command everything.",
+            show_default=False,
         ),
     ] = None,
     owner_pid: Annotated[
@@ -58,7 +69,9 @@ def master(
             ) from error
         raise
     try:
+        running.listen(listen or ())
         _say_running(running.address, joins_originals=gateway)
+        _warn_of_others(running.address, listen or ())
         signal.signal(signal.SIGTERM, _end)
         running.wait()
     finally:
@@ -70,7 +83,9 @@ def _address(port: int | None) -> str:
     if port is not None:
         address = f"{host_of(address)}:{port}"
     if not is_loopback(address):
-        raise NepError(f"a master serves this computer only; '{address}' is another, use 127.0.0.1")
+        raise NepError(
+            f"a master answers at 127.0.0.1; use that and add --listen {host_of(address)} for other computers"
+        )
     return address
 
 
@@ -80,6 +95,17 @@ def _say_running(address: str, *, joins_originals: bool) -> None:
     if joins_originals:
         out.print("  programs of the original NEP join it too", style="dim")
     out.print("  Ctrl+C ends it", style="dim")
+
+
+def _warn_of_others(address: str, hosts: Sequence[str]) -> None:
+    """Say that others can connect, and what they type."""
+    out = console(stderr=True)
+    port = address.rpartition(":")[2]
+    chosen = [own.host for own in own_addresses()] if ANY in hosts else hosts
+    for host in chosen:
+        out.print(f"[bold yellow]●[/] other computers connect with [bold]NEP_MASTER={host}:{port}[/]")
+    if hosts:
+        out.print("  whoever is in that network can read and command everything: no password", style="yellow")
 
 
 def _end(_signal: int, _frame: FrameType | None) -> None:

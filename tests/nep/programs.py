@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
@@ -21,14 +21,14 @@ ROOT = Path(__file__).parents[2]
 class Program:
     """A Python program that is running. It says things line by line."""
 
-    def __init__(self, code: str, *args: str) -> None:
+    def __init__(self, code: str, *args: str, before: Sequence[str] = (), **environment: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-u", "-c", textwrap.dedent(code), *args],
+            [*before, sys.executable, "-u", "-c", textwrap.dedent(code), *args],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
         )
 
     def line(self) -> str:
@@ -66,9 +66,9 @@ class Program:
 
 
 @contextmanager
-def running(code: str, *args: str) -> Iterator[Program]:
-    """A program, killed at the end."""
-    program = Program(code, *args)
+def running(code: str, *args: str, before: Sequence[str] = (), **environment: str) -> Iterator[Program]:
+    """A program, killed at the end. `before` are the words of a command that starts it."""
+    program = Program(code, *args, before=before, **environment)
     try:
         yield program
     finally:

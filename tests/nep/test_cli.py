@@ -247,11 +247,25 @@ def test_a_master_ends_when_its_owner_is_gone_and_nobody_needs_it(address, start
     assert master.process.wait(LONG_S) == 0
 
 
-def test_a_master_serves_this_computer_only(monkeypatch):
+def test_a_master_serves_this_computer_only_unless_it_is_told(monkeypatch):
     monkeypatch.setenv("NEP_MASTER", "192.168.1.7:7780")
     done = run("master", "--no-gateway")
     assert done.returncode == 1
-    assert "this computer only" in done.stderr
+    assert "add --listen 192.168.1.7" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
+def test_a_master_that_listens_says_what_others_type_and_warns(address, start):
+    port = address.rpartition(":")[2]
+    master = start("master", "--port", port, "--no-gateway", "--listen", "127.0.0.2")
+    assert address in master.wait_says("master at")
+    assert nep.is_running(f"127.0.0.2:{port}", LONG_S)
+    _code, _, err = master.interrupt()
+    assert f"NEP_MASTER=127.0.0.2:{port}" in err
+    assert "no password" in err
+    refused = run("master", "--port", port, "--no-gateway", "--listen", "203.0.113.77")
+    assert refused.returncode == 1
+    assert "no address of this computer" in refused.stderr
 
 
 def test_the_command_starts_without_loading_rich():

@@ -37,6 +37,15 @@ print("ready")
 sys.stdin.readline()
 """
 
+ECHO = """
+import sys, nep
+node = nep.node("sleeper")
+pub = node.new_pub(sys.argv[1])
+print("ready")
+for line in sys.stdin:
+    pub.publish(line.strip())
+"""
+
 
 @pytest.fixture
 def node(master: Master) -> Iterator[nep.Node]:
@@ -302,3 +311,19 @@ def test_wait_none_waits_for_a_master() -> None:
         with Master(address, learn_s=0.0):
             thread.join(5.0)
             assert made
+
+
+def test_a_computer_that_slept_is_registered_again_and_heard(node: nep.Node) -> None:
+    """Its lease lapsed meanwhile; what it said before it fell asleep and after is all there."""
+    sub = node.new_sub("topic")
+    with running(ECHO, "topic") as program:
+        program.line()
+        program.say("before")
+        assert sub.listen(timeout_s=5.0) == (True, "before")
+        program.stop()
+        eventually(lambda: not node.graph().topics["topic"].publishers, 6.0)
+        program.signal(signal.SIGCONT)
+        program.say("after")
+        assert sub.listen(timeout_s=5.0) == (True, "after")
+        eventually(lambda: len(node.graph().topics["topic"].publishers) == 1)
+        assert sub.lost == 0
