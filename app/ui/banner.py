@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Protocol
 
-from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
@@ -18,6 +18,7 @@ from app.ui.widgets.small import label
 
 LEAST_HEIGHT = 52
 ICON = 20
+LEAST_WORDS = 360  # px at 100 % that a sentence has beside its buttons
 BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 
 
@@ -71,12 +72,15 @@ class Banner(QWidget):
         self.button = Button(theme, "", size="form")
         self.second = Button(theme, "", size="form")
         self.close_button = IconButton(theme, "x", "Close this message", size=32)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(16 + ICON + 12, 8, 12, 8)
-        row.setSpacing(8)
-        row.addWidget(self.words, 1)
+        self._whole = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._whole.setContentsMargins(16 + ICON + 12, 8, 12, 8)
+        self._whole.setSpacing(8)
+        self._whole.addWidget(self.words, 1)
+        self._row = QHBoxLayout()
+        self._row.setSpacing(8)
         for widget in (self.more, self.second, self.button, self.close_button):
-            row.addWidget(widget)
+            self._row.addWidget(widget)
+        self._whole.addLayout(self._row)
         self.button.clicked.connect(self.pressed)
         self.second.clicked.connect(self.second_pressed)
         self.more.clicked.connect(self.more_pressed)
@@ -105,6 +109,24 @@ class Banner(QWidget):
         self.more.set_word(f"and {others} more" if others else "")
         paint.show_when(self.more, others > 0)
         self.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.LayoutRequest:
+            self._fit()
+        return super().event(event)
+
+    def _fit(self) -> None:
+        """Large or long words: the buttons go below them."""
+        beside = self.width() - self._row.sizeHint().width() >= self._theme.scaled(LEAST_WORDS)
+        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        if self._whole.direction() != wanted:
+            self._whole.setDirection(wanted)
+            right = Qt.AlignmentFlag.AlignRight
+            self._whole.setAlignment(self._row, Qt.AlignmentFlag(0) if beside else right)
 
     def _write(self) -> None:
         title, detail = (escape(words) for words in self._words)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.panels.base import Density, PanelWidget
 from app.ui.theme import Theme
-from app.ui.widgets import Elided, IconButton, label, paint, set_role
+from app.ui.widgets import Elided, IconButton, paint, set_role
 
 
 class TitleTab(QAbstractButton):
@@ -30,6 +30,13 @@ class TitleTab(QAbstractButton):
     def sizeHint(self) -> QSize:
         font = self._theme.font("title")
         return QSize(round(paint.width_of(font, self.text())) + 21, max(26, round(paint.height_of(font)) + 6))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(48, self.sizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
@@ -52,7 +59,7 @@ class DockTitle(QWidget):
         self._theme, self._panel, self._density = theme, panel, density
         self._whole = panel.replaces_title()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.name = label("", "titleLarge" if density == "comfortable" else "title", role="textSecondary")
+        self.name = Elided("titleLarge" if density == "comfortable" else "title", "textSecondary", 60)
         self._subtitle = Elided("code", "textTertiary")
         self._tabs: list[TitleTab] = []
         self.more = IconButton(theme, "ellipsis", f"More about {panel.title()}")

@@ -13,6 +13,7 @@ from app.ui.widgets import paint
 
 WORDS = "Find a command or panel"
 WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
+LEAST_ROOM = 44  # less than that for the words, and only icon and key are shown
 
 
 class PaletteField(QAbstractButton):
@@ -60,7 +61,7 @@ class PaletteField(QAbstractButton):
         font = theme.font("body")
         left = LEFT + ICON + GAP
         room = rect.width() - left - self._key_room() - 4
-        if room >= paint.width_of(font, self.text()):
+        if room >= self._theme.scaled(LEAST_ROOM):
             area = QRectF(left, 0, room, rect.height())
             paint.words(painter, area, self.text(), font, theme.colour("textSecondary"))
         if self._key:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.ui.overlay import Overlay
 from app.ui.shortcuts import spoken_key as spoken_key
 from app.ui.theme import Theme
 from app.ui.widgets import IconButton, label, paint
@@ -31,64 +32,47 @@ class KeyCap(QWidget):
         painter.end()
 
 
-class Sheet(QWidget):
-    """Lines of words, each perhaps with its key, under a heading."""
+class Sheet(Overlay):
+    """Lines of words, each perhaps with its key, under a heading; it is gone when it is closed."""
+
+    top = 96
 
     def __init__(
-        self, theme: Theme, window: QWidget, title: str, lines: Sequence[tuple[str, str]], *, wide: int = 360
+        self, theme: Theme, window: QWidget, title: str, lines: Sequence[tuple[str, str]], *, wide: int = 420
     ) -> None:
-        super().__init__(window)
-        self._theme = theme
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.setAccessibleName(title)
+        super().__init__(theme, window, title)
+        self._wide = wide
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 16, 20, 18)
         column.setSpacing(10)
         head = QHBoxLayout()
-        head.addWidget(label(title, "heading"))
-        head.addStretch(1)
+        head.addWidget(label(title, "heading", wrap=True), 1)
         self._close = IconButton(theme, "x", "Close", "Esc")
-        self._close.clicked.connect(self.close)
+        self._close.clicked.connect(self.shut)
         head.addWidget(self._close)
         column.addLayout(head)
         grid = QGridLayout()
         grid.setHorizontalSpacing(24)
         grid.setVerticalSpacing(6)
+        grid.setColumnStretch(0, 1)
         for row, (words, key) in enumerate(lines):
-            shown = label(words, "body", role="text" if key else "textSecondary", wrap=not key)
+            shown = label(words, "body", role="text" if key else "textSecondary", wrap=True)
             grid.addWidget(shown, row, 0, 1, 1 if key else 2)
             if key:
                 grid.addWidget(KeyCap(theme, spoken_key(key)), row, 1)
         column.addLayout(grid)
-        self.setMinimumWidth(wide)
+        self.closed.connect(self.deleteLater)
+        self.closed.connect(self._scrim.deleteLater)
+
+    def first(self) -> QWidget:
+        return self._close
+
+    def wanted_size(self, room: QSize) -> QSize:
+        wide = min(room.width(), round(self.theme.scaled(self._wide)))
+        layout = self.layout()
+        high = layout.totalHeightForWidth(wide) if layout is not None else 0
+        return QSize(wide, min(room.height(), high))
 
     def show_over(self) -> None:
-        """In the middle of the window, a little above its half."""
-        window = self.parentWidget()
-        self.adjustSize()
-        if window is not None:
-            left = (window.width() - self.width()) // 2
-            self.move(left, max(8, (window.height() - self.height()) // 3))
-        self.show()
-        self.raise_()
-        self._close.setFocus(Qt.FocusReason.PopupFocusReason)
-        application = QApplication.instance()
-        if isinstance(application, QApplication):
-            application.focusChanged.connect(self._focus_changed)
-
-    def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
-        if new is not None and not self.isAncestorOf(new):
-            self.close()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape:
-            self.close()
-        else:
-            super().keyPressEvent(event)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        theme = self._theme
-        fill, edge = theme.colour("raised"), theme.colour("border")
-        paint.box(painter, QRectF(self.rect()), theme.radius("card"), fill, edge)
-        painter.end()
+        """Show it; Esc or a press beside it closes it."""
+        self.open()

@@ -79,7 +79,7 @@ class Sentence(QWidget):
         if (title, detail) != (self._title, self._detail):
             self._title, self._detail = title, detail
             self.setAccessibleName(f"{title}. {detail}")
-            self.setToolTip(detail)
+            self.setToolTip(f"{title}\n{detail}")
             self.update()
 
     def _title_font(self) -> QFont:

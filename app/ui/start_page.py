@@ -98,7 +98,7 @@ class StartPage(QWidget):
         column = QVBoxLayout(content)
         column.setContentsMargins(0, 35, 0, 24)
         column.setSpacing(0)
-        self._question = label("What would you like to do?", "display")
+        self._question = label("What would you like to do?", "display", wrap=True)
         column.addWidget(self._question)
         column.addSpacing(7)
         lead = "Build what a robot says and does, by putting blocks together. No programming needed."

@@ -6,7 +6,7 @@ import datetime as dt
 from pathlib import Path
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.settings import RecentFile
@@ -14,7 +14,7 @@ from app.ui.icons import paint_icon
 from app.ui.miniature import Row, paint_rows
 from app.ui.start_art import Art, upper_corners
 from app.ui.theme import Theme
-from app.ui.widgets import Button, Card, Chip, label, paint
+from app.ui.widgets import Button, Card, Chip, Elided, label, paint
 
 EXAMPLE_ART = 112
 RECENT_HEIGHT = 48
@@ -38,9 +38,8 @@ class BigCard(Card):
         body.setSpacing(0)
         head = QHBoxLayout()
         head.setSpacing(10)
-        head.addWidget(label(title, "heading"))
+        head.addWidget(label(title, "heading", wrap=True), 1)
         head.addWidget(self.chip)
-        head.addStretch(1)
         body.addLayout(head)
         body.addSpacing(4)
         body.addWidget(self.text, 1)
@@ -165,6 +164,13 @@ class LinkButton(QAbstractButton):
         font = self._theme.font("title")
         return QSize(round(paint.width_of(font, self.text())) + 2, max(24, round(paint.height_of(font)) + 4))
 
+    def minimumSizeHint(self) -> QSize:
+        return QSize(80, self.sizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
+
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         font = self._theme.font("title")
@@ -214,7 +220,9 @@ class DevelopersLine(QWidget):
         icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14))
         theme.changed.connect(lambda: icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14)))
         row.addWidget(icon)
-        row.addWidget(label("Do you write programs?", "body", role="textSecondary"))
+        question = Elided("body", "textSecondary")
+        question.setText("Do you write programs?")
+        row.addWidget(question)
         row.addWidget(link)
         row.addWidget(label("or type", "body", role="textSecondary"))
         row.addWidget(_Key(theme, "nep topic list"))

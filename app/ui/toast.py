@@ -25,7 +25,7 @@ class Toast(QWidget):
         super().__init__(window)
         self._theme = theme
         self._run: Callable[[], object] | None = None
-        self._words = label("", "bodyLarge")
+        self._words = label("", "bodyLarge", wrap=True)
         self.button = Button(theme, "", kind="ghost", size="small")
         self.button.clicked.connect(self._pressed)
         row = QHBoxLayout(self)
@@ -63,11 +63,26 @@ class Toast(QWidget):
 
     def place(self) -> None:
         """Go to the bottom right of the window."""
-        self.adjustSize()
         window = self.parentWidget()
         if window is not None:
+            self._fit(window.width() - 2 * MARGIN)
             left = window.width() - self.width() - MARGIN
             self.move(max(MARGIN, left), window.height() - self.height() - ABOVE_STATUS_BAR)
+
+    def _fit(self, room: int) -> None:
+        """One line where there is room for it, else as many as it takes."""
+        aside = self.sizeHint().width() - self._words.sizeHint().width()
+        line = paint.width_of(self._words.font(), self._words.text()) + 2
+        wide = min(room, round(line) + aside)
+        layout = self.layout()
+        high = layout.totalHeightForWidth(wide) if layout is not None else 0
+        self.resize(wide, max(high, layout.minimumSize().height() if layout is not None else 0))
+
+    def event(self, event: QEvent) -> bool:
+        done = super().event(event)
+        if event.type() == QEvent.Type.LayoutRequest and self.isVisible():
+            self.place()
+        return done
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and self.isVisible():

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QFrame, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -18,6 +18,7 @@ from app.ui.words import grouped
 if TYPE_CHECKING:
     from app.core.alerts import Alert
 
+LEAST_WORDS = 220  # px at 100 % that the words have beside the button
 BORDERS = {"error": "errorBorder", "warn": "warnBorder", "info": "borderStrong"}
 
 
@@ -40,12 +41,23 @@ class AlertRow(QWidget):
             words.addWidget(line)
         self.button = Button(theme, alert.button or "", size="small")
         self.button.setVisible(bool(alert.button))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(40, 10, 12, 10)
-        row.setSpacing(10)
-        row.addLayout(words, 1)
-        row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignVCenter)
+        self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._row.setContentsMargins(40, 10, 12, 10)
+        self._row.setSpacing(10)
+        self._row.addLayout(words, 1)
+        self._row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignVCenter)
         self.setAccessibleName(f"{alert.severity}: {alert.title} {alert.detail}".strip())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        room = self.width() - self.button.sizeHint().width()
+        beside = self.button.isHidden() or room >= self._theme.scaled(LEAST_WORDS)
+        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        if self._row.direction() != wanted:
+            self._row.setDirection(wanted)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(160, super().minimumSizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)

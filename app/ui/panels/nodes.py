@@ -15,7 +15,7 @@ from app.ui.node_rows import NodeRow, columns, facts_of, limits_of, rows_of
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.table import TableModel
 from app.ui.table_view import TableView
-from app.ui.widgets import EmptyAction, EmptyState, Line, label
+from app.ui.widgets import EmptyAction, EmptyState, Line, Scrolled, label
 from app.ui.words import rate_words
 
 if TYPE_CHECKING:
@@ -52,10 +52,11 @@ class NodesPanel(PanelWidget):
         self._stack.addWidget(self.empty)
         self.setFocusProxy(self.table)
         self._line = Line(theme)
+        self._about = Scrolled(self.foot)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget, stretch in ((self._stack, 1), (self._line, 0), (self.foot, 0)):
+        for widget, stretch in ((self._stack, 1), (self._line, 0), (self._about, 0)):
             column.addWidget(widget, stretch)
         self._opened: set[str] = set()
         self._seen: tuple[object, ...] = ()
@@ -118,7 +119,7 @@ class NodesPanel(PanelWidget):
         words = "Open a node to see its topics" if row is None else facts_of(row.node)
         limits = limits_of(row.node) if row is not None else ""
         self.foot.setText(f"{words}.\n{limits}" if limits else words)
-        self.foot.setVisible(shown)
+        self._about.setVisible(shown)
         self._line.setVisible(shown)
 
     def _open(self, key: str) -> None:

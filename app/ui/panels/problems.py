@@ -21,7 +21,7 @@ from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.rich_line import BoldInLine, is_pressed_key
 from app.ui.theme import Theme
-from app.ui.widgets import Button, Chip, label, paint
+from app.ui.widgets import Button, Chip, Scrolled, label, paint
 
 if TYPE_CHECKING:
     from app.blocks import Problem
@@ -130,7 +130,7 @@ class ProblemsPanel(PanelWidget):
         self.nothing = label(NOTHING, "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.pages = QStackedWidget()
-        self.pages.addWidget(self.nothing)
+        self.pages.addWidget(Scrolled(self.nothing))
         self.pages.addWidget(scroll)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)

@@ -12,6 +12,7 @@ from app.ui.widgets.empty_state import EmptyAction as EmptyAction
 from app.ui.widgets.empty_state import EmptyState as EmptyState
 from app.ui.widgets.run_buttons import RunButton as RunButton
 from app.ui.widgets.run_buttons import StopButton as StopButton
+from app.ui.widgets.scrolled import Scrolled as Scrolled
 from app.ui.widgets.segments import Segments as Segments
 from app.ui.widgets.slider import NumberField as NumberField
 from app.ui.widgets.slider import SliderWithUnit as SliderWithUnit

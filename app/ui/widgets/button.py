@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
@@ -67,6 +67,7 @@ class Button(QAbstractButton):
         self.measure = _MEASURES[size]
         self.icon_name = icon
         self.fill_icon = False
+        self._least: int | None = None
         self.setText(text)
         self.setAccessibleName(text)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -96,12 +97,26 @@ class Button(QAbstractButton):
         font = self._theme.font(self.measure.font)
         width = paint.width_of(font, self.text()) + 2 * self.measure.padding
         if self.icon_name is not None:
-            width += self.measure.icon + (self.measure.gap if self.text() else 0)
+            width += self.icon_side() + (self.measure.gap if self.text() else 0)
         height = max(self.measure.height, round(paint.height_of(font)) + 8)
         return QSize(round(width) + 1, height)
 
     def minimumSizeHint(self) -> QSize:
-        return self.sizeHint()
+        wanted = self.sizeHint()
+        return wanted if self._least is None else QSize(min(self._least, wanted.width()), wanted.height())
+
+    def let_shrink(self, least: int = 72) -> None:
+        """In narrow places the word is shortened rather than cut off; its tooltip then has the whole."""
+        self._least = least
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
+
+    def icon_side(self) -> int:
+        """How large the icon is: it grows with the text."""
+        return round(self._theme.scaled(self.measure.icon))
 
     def shown_word(self) -> str:
         """The word that is painted."""
@@ -126,14 +141,15 @@ class Button(QAbstractButton):
         frame = self.frame()
         word = self.shown_word()
         text_width = paint.width_of(font, word)
-        icon = self.measure.icon if self.icon_name is not None else 0
+        icon = self.icon_side() if self.icon_name is not None else 0
         gap = self.measure.gap if icon and word else 0
-        left = frame.center().x() - (icon + gap + text_width) / 2
+        left = max(frame.left() + 6, frame.center().x() - (icon + gap + text_width) / 2)
         if self.icon_name is not None:
             top = frame.center().y() - icon / 2
             filled = self.fill_icon and self.isEnabled()
             paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, ink, filled=filled)
-        area = QRectF(QPointF(left + icon + gap, frame.top()), frame.bottomRight())
+        end = frame.bottomRight() - QPointF(4, 0)
+        area = QRectF(QPointF(left + icon + gap, frame.top()), end)
         paint.words(painter, area, word, font, ink)
 
     def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
@@ -175,11 +191,16 @@ class IconButton(QAbstractButton):
         self.setProperty("focusRadius", theme.radius("small"))
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self.set_name(name, shortcut)
+        theme.changed.connect(self.updateGeometry)
 
     def set_name(self, name: str, shortcut: str = "") -> None:
         """What the button does, and its key."""
         self.setAccessibleName(name)
         self.setToolTip(f"{name} ({shortcut})" if shortcut else name)
+
+    def _icon_side(self) -> float:
+        name = "normal" if self._side < 40 else "large"
+        return self._theme.scaled(self._theme.size("icon", name))
 
     def set_icon(self, icon: str) -> None:
         """Another icon in the same place."""
@@ -187,7 +208,8 @@ class IconButton(QAbstractButton):
         self.update()
 
     def sizeHint(self) -> QSize:
-        return QSize(self._side, self._side)
+        side = max(self._side, round(self._icon_side()) + 10)
+        return QSize(side, side)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -205,7 +227,7 @@ class IconButton(QAbstractButton):
             fill, ink = "hover", "text"
         if fill is not None:
             paint.box(painter, rect, theme.radius("small"), theme.colour(fill))
-        side = theme.size("icon", "normal" if self._side < 40 else "large")
+        side = self._icon_side()
         square = QRectF(0, 0, side, side)
         square.moveCenter(rect.center())
         paint_icon(painter, square, self._icon, theme.colour(ink if self.isEnabled() else "textDisabled"))

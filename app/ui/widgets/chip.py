@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize
-from PySide6.QtGui import QFont, QPainter, QPaintEvent
+from PySide6.QtGui import QFont, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
@@ -63,6 +63,9 @@ class Chip(QWidget):
     def _icon_name(self) -> str:
         return self._theme.status(self._status).icon if self._icon is None else self._icon
 
+    def _side(self) -> float:
+        return self._theme.scaled(self._theme.size("icon", "small") + (1 if self._large else 0))
+
     def _font(self) -> QFont:
         font = self._theme.font("body" if self._large else "small")
         font.setWeight(font.Weight.Medium)
@@ -71,12 +74,16 @@ class Chip(QWidget):
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self._text) + 2 * PADDING + (2 if self._large else 0)
         if self._icon_name():
-            width += self._theme.size("icon", "small") + GAP + (1 if self._large else 0)
+            width += self._side() + GAP
         least = HEIGHT + (4 if self._large else 0)
         return QSize(round(width) + 1, max(least, round(paint.height_of(self._font())) + 6))
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self._text)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
@@ -91,9 +98,9 @@ class Chip(QWidget):
         left = PADDING + (1 if self._large else 0)
         name = self._icon_name()
         if name:
-            side = theme.size("icon", "small") + (1 if self._large else 0)
+            side = self._side()
             square = QRectF(left, (rect.height() - side) / 2, side, side)
             paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
             left += side + GAP
-        paint.words(painter, rect.adjusted(left, 0, 0, 0), self._text, self._font(), ink)
+        paint.words(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
         painter.end()

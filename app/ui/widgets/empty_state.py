@@ -13,6 +13,7 @@ from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.button import Button
+from app.ui.widgets.scrolled import Scrolled
 from app.ui.widgets.small import label
 
 TILE, BELOW_TILE = 56, 16
@@ -60,7 +61,8 @@ class EmptyState(QWidget):
         self._text = label(text, "bodyLarge", role="textSecondary", wrap=True)
         for words in (self._title, self._text):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        column = QVBoxLayout(self)
+        inside = QWidget()
+        column = QVBoxLayout(inside)
         column.setContentsMargins(16, MARGIN, 16, MARGIN)
         column.setSpacing(0)
         column.addStretch(1)
@@ -79,6 +81,11 @@ class EmptyState(QWidget):
         column.addLayout(self._row)
         column.addStretch(1)
         self._buttons: list[Button] = []
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        area = Scrolled(inside)
+        area.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        whole.addWidget(area)
         self.set_actions(actions)
 
     def say(self, title: str, text: str, icon: str | None = None) -> None:
@@ -110,6 +117,7 @@ class EmptyState(QWidget):
         self._row.addStretch(1)
         for action in actions:
             button = Button(self._theme, action.text, action.icon, size="form")
+            button.let_shrink()
             button.set_kind("primary" if action.primary else "plain")
             button.clicked.connect(lambda _on=False, run=action.run: run())
             self._row.addWidget(button)

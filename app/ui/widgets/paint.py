@@ -84,6 +84,16 @@ def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: s
     return rect
 
 
+def tell_whole(widget: QWidget, words: str) -> None:
+    """Give words that had to be shortened a tooltip with the whole; a tooltip of its own stays."""
+    own = widget.property("tip") or (widget.toolTip() and not widget.property("shortened"))
+    if own:
+        return
+    short = widget.width() < widget.sizeHint().width() - 1
+    widget.setProperty("shortened", short)
+    widget.setToolTip(words if short else "")
+
+
 def announce(widget: QWidget, words: str) -> None:
     """Let a screen reader say something now: alerts, and that robots stopped; never figures that change."""
     if QAccessible.isActive():

@@ -42,14 +42,20 @@ class RunButton(Button):
             self.updateGeometry()
             self.update()
 
+    def icon_side(self) -> int:
+        return self.measure.icon  # the words need the room
+
     def shown_word(self) -> str:
         return "" if self._bare else self.text()
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("button")
         if self._bare:
-            return QSize(BARE_WIDTH, max(self.measure.height, round(paint.height_of(font)) + 12))
-        inner = self.measure.icon + self.measure.gap + paint.width_of(font, self._widest)
+            return QSize(
+                max(BARE_WIDTH, self.icon_side() + 28),
+                max(self.measure.height, round(paint.height_of(font)) + 12),
+            )
+        inner = self.icon_side() + self.measure.gap + paint.width_of(font, self._widest)
         height = max(self.measure.height, round(paint.height_of(font)) + 12)
         return QSize(max(RUN_WIDTH, round(inner) + 28), height)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QFont, QPainter, QPaintEvent
+from PySide6.QtGui import QFont, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
@@ -41,8 +41,11 @@ class _Segment(QAbstractButton):
         font.setWeight(font.Weight.Medium)
         return font
 
+    def _side(self) -> int:
+        return round(self._theme.scaled(16))
+
     def _icons_width(self) -> int:
-        return (16 + GAP) * (int(self._icon is not None) + int(self._check))
+        return (self._side() + GAP) * (int(self._icon is not None) + int(self._check))
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self.text()) + 2 * self._padding + self._icons_width()
@@ -50,6 +53,10 @@ class _Segment(QAbstractButton):
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
@@ -64,10 +71,11 @@ class _Segment(QAbstractButton):
         ink = theme.colour("text" if chosen else "textSecondary" if self.isEnabled() else "textDisabled")
         shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
         text_width = paint.width_of(self._font(), self.text())
-        left = rect.center().x() - (text_width + len(shown) * (16 + GAP)) / 2
+        side = self._side()
+        left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP)) / 2)
         for name in shown:
-            paint_icon(painter, QRectF(left, rect.center().y() - 8, 16, 16), name, ink)
-            left += 16 + GAP
+            paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, ink)
+            left += side + GAP
         paint.words(painter, rect.adjusted(left, 0, 2, 0), self.text(), self._font(), ink)
         painter.end()
 

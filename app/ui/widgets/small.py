@@ -40,7 +40,7 @@ class Elided(QLabel):
     """A line that is shortened in its middle where there is too little room; the tooltip has the whole."""
 
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
-        """``least`` pixels are always asked for."""
+        """Ask for ``least`` pixels always."""
         super().__init__()
         self._least = least
         self.setTextFormat(Qt.TextFormat.PlainText)
@@ -206,12 +206,9 @@ class Card(QFrame):
         self.border = "border"
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        theme = self._theme
-        rect = QRectF(self.rect())
-        paint.box(
-            painter, rect, theme.radius(self._radius), theme.colour(self.fill), theme.colour(self.border)
-        )
+        painter, theme = QPainter(self), self._theme
+        fill, edge = theme.colour(self.fill), theme.colour(self.border)
+        paint.box(painter, QRectF(self.rect()), theme.radius(self._radius), fill, edge)
         painter.end()
 
 
@@ -230,7 +227,7 @@ class StatusItem(QWidget):
 
     @property
     def text(self) -> str:
-        """The words shown now."""
+        """What it says now."""
         return self._text
 
     def set(self, icon: str, text: str, status: str | None = None) -> None:
@@ -243,9 +240,12 @@ class StatusItem(QWidget):
         self.updateGeometry()
         self.update()
 
+    def _side(self) -> float:
+        return self._theme.scaled(self.ICON)
+
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        width = paint.width_of(font, self._text) + (self.ICON + 6 if self._icon else 0)
+        width = paint.width_of(font, self._text) + (self._side() + 6 if self._icon else 0)
         return QSize(round(width) + 1, round(paint.height_of(font)))
 
     def minimumSizeHint(self) -> QSize:
@@ -261,9 +261,9 @@ class StatusItem(QWidget):
             colour = ink or theme.colour(
                 theme.status(self._status).colour if self._status else "textSecondary"
             )
-            square = QRectF(0, rect.center().y() - self.ICON / 2, self.ICON, self.ICON)
-            paint_icon(painter, square, self._icon, colour)
-            rect.setLeft(self.ICON + 6)
+            side = self._side()
+            paint_icon(painter, QRectF(0, rect.center().y() - side / 2, side, side), self._icon, colour)
+            rect.setLeft(side + 6)
         paint.words(painter, rect, self._text, theme.font("small"), ink or theme.colour("textSecondary"))
         painter.end()
 

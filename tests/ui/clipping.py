@@ -1,0 +1,136 @@
+"""Finds words that do not fit: labels, buttons and chips smaller than what they ask for, or cut off.
+
+Words that are shortened on purpose have a tooltip with the whole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtGui import QFontMetricsF
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractScrollArea,
+    QComboBox,
+    QDockWidget,
+    QLabel,
+    QLineEdit,
+    QWidget,
+)
+
+from app.ui.widgets import Chip, Elided, StatusItem
+
+SLACK = 1.5
+LONGER = 0.35
+ASKED = (QAbstractButton, Chip, StatusItem)
+
+
+def shown(root: QWidget) -> Iterator[QWidget]:
+    """Every widget inside that is there for a person, also what one has to scroll to."""
+    behind = [dock for dock in root.findChildren(QDockWidget) if dock.x() < -dock.width() / 2]
+    for widget in [root, *root.findChildren(QWidget)]:
+        hidden = any(dock.isAncestorOf(widget) for dock in behind)  # Qt moves what is behind a tab away
+        if widget.isVisibleTo(root) and widget.width() > 0 and not hidden:
+            yield widget
+
+
+def lengthen(root: QWidget) -> None:
+    """Make every fixed word about a third longer, as other languages do."""
+    for widget in shown(root):
+        if isinstance(widget, QLabel | QAbstractButton) and widget.text() and not widget.property("long"):
+            widget.setProperty("long", True)
+            widget.setText(longer(widget.text()))
+
+
+def longer(text: str) -> str:
+    """A word gets longer letters, a sentence more words."""
+    more = math.ceil(len(text) * LONGER)
+    if " " not in text:
+        return text + "n" * more
+    return text + " nnnn" * (more // 5) + "n" * (more % 5)
+
+
+def clipped(root: QWidget) -> list[str]:
+    """What does not fit, one sentence each."""
+    return [fault for widget in shown(root) for fault in _faults(widget, root)]
+
+
+def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
+    said = _name(widget)
+    if isinstance(widget, Elided) or not said:
+        return
+    if isinstance(widget, QLabel):
+        yield from _label(widget, said)
+    elif isinstance(widget, ASKED):
+        wanted = widget.sizeHint()
+        if widget.width() < wanted.width() - SLACK and not _tip(widget):
+            yield f"{said} is {widget.width()} wide and needs {wanted.width()}"
+        if widget.height() < wanted.height() - SLACK:
+            yield f"{said} is {widget.height()} high and needs {wanted.height()}"
+    elif isinstance(widget, QLineEdit | QComboBox):
+        high = QFontMetricsF(widget.font()).height()
+        if widget.height() < high:
+            yield f"{said} is {widget.height()} high and its letters are {high:.0f}"
+    if isinstance(widget, (QLabel, *ASKED)):
+        cut = _cut(widget, root)
+        if cut:
+            yield f"{said} is cut by {cut}"
+
+
+def _label(label: QLabel, said: str) -> Iterator[str]:
+    if label.pixmap() is not None and not label.pixmap().isNull():
+        return
+    if label.wordWrap():
+        wanted = label.heightForWidth(label.width())
+        if label.height() < wanted - SLACK:
+            yield f"{said} is {label.height()} high and needs {wanted}"
+        return
+    wide = label.sizeHint().width()
+    if label.width() < wide - SLACK and not _tip(label):
+        yield f"{said} is {label.width()} wide and needs {wide}"
+    high = QFontMetricsF(label.font()).height()
+    if label.height() < high - SLACK:
+        yield f"{said} is {label.height()} high and its letters are {high:.0f}"
+
+
+def _cut(widget: QWidget, root: QWidget) -> str:
+    """The ancestor that shows only a part of it; what can be scrolled to is not cut."""
+    rect = widget.rect()
+    step = widget
+    while step is not root:
+        parent = step.parentWidget()
+        if parent is None:
+            return ""
+        rect.translate(step.pos())
+        if _scrolls(parent, rect):
+            return ""
+        room = parent.rect()
+        out = QRect(rect).united(room)
+        slack = 2
+        if out.width() > room.width() + slack or out.height() > room.height() + slack:
+            return f"{type(parent).__name__} ({parent.accessibleName()}) by {out.size() - room.size()}"
+        step = parent
+    return ""
+
+
+def _scrolls(viewport: QWidget, rect: QRect) -> bool:
+    """Whether a person can bring it into view: vertically always, sideways when there is a bar."""
+    area = viewport.parentWidget()
+    if not isinstance(area, QAbstractScrollArea) or area.viewport() is not viewport:
+        return False
+    sideways = area.horizontalScrollBarPolicy() != Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+    return sideways or (rect.left() >= -2 and rect.right() <= viewport.width() + 2)
+
+
+def _tip(widget: QWidget) -> bool:
+    return bool(widget.toolTip())
+
+
+def _name(widget: QWidget) -> str:
+    text = getattr(widget, "text", None)
+    words = text() if callable(text) else text
+    words = words if isinstance(words, str) else widget.accessibleName()
+    where = widget.mapTo(widget.window(), QPoint(0, 0))
+    return f"{type(widget).__name__} “{words[:50]}” at {where.x()},{where.y()}" if words else ""

@@ -1,0 +1,159 @@
+"""Text of 100 to 200 per cent, and words a third longer than ours: nothing is cut off anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app import resources
+from app.core.run_view import RunView
+from app.core.session import Session
+from app.ui.commands import Commands
+from app.ui.docks import Dock
+from app.ui.main_window import MainWindow
+from app.ui.overlay import Overlay
+from app.ui.panels.base import PanelContext
+from app.ui.start_page import read_examples
+from app.ui.theme import Theme
+from tests.ui.clipping import clipped, lengthen
+from tests.ui.fakes import Session as FakeSession
+from tests.ui.shell_parts import PANELS, Answers
+from tests.ui.show_panels import SIZES, prepare
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+SETTLE_MS = 20
+VIEWS = (
+    RunView("ready", "Ready", "Pepper and Turtle are connected", "Ready", can_run=True, can_step=True),
+    RunView(
+        "running",
+        "Running, 14 s",
+        "Pepper says “Touch my head.”",
+        "Greeting runs, 14 s",
+        can_pause=True,
+        can_step=True,
+        last_stop="all 2 robots stopped (41 ms)",
+    ),
+    RunView(
+        "proven",
+        "Stopped after 14 s",
+        "The dashed outline shows where",
+        "",
+        can_run=True,
+        can_step=True,
+        result="all 2 robots stopped (41 ms)",
+        result_ok=True,
+    ),
+    RunView(
+        "unanswered",
+        "Turtle did not answer",
+        "Pepper stopped (38 ms). Switch Turtle off by hand.",
+        "Turtle did not answer; switch it off by hand",
+        stop_word="Stop again",
+        result="1 of 2 robots stopped",
+        result_ok=False,
+        confirm="Turtle is still",
+    ),
+)
+OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _text_as_before(qapp) -> Iterator[None]:
+    yield
+    Theme("light").apply()
+
+
+def settle(qtbot, root, *, longer: bool) -> None:
+    """Let layouts come to rest, with longer words if those are wanted."""
+    if longer:
+        lengthen(root)
+    for _ in range(2):
+        qtbot.wait(SETTLE_MS)
+
+
+@pytest.mark.parametrize("longer", [False, True], ids=["ours", "longer"])
+@pytest.mark.parametrize("percent", [100, 150, 200])
+@pytest.mark.parametrize("full", [True, False], ids=["full", "empty"])
+def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, longer: bool) -> None:
+    if (percent, longer) == (100, True):
+        pytest.skip("what fits at 150 per cent and longer fits here")
+    theme.set_text_percent(percent)
+    faults = []
+    for name, (panel, width, height, density) in SIZES.items():
+        if name == "behaviour":
+            continue  # its page is of the web; its bar is in test_behaviour_tabs
+        session = FakeSession.full() if full else FakeSession()
+        context = PanelContext(session, theme, str, str, str)  # type: ignore[arg-type]
+        widget = panel.make(context)
+        dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
+        qtbot.addWidget(dock)
+        dock.resize(width, height)
+        dock.show()
+        dock.front = True
+        if full:
+            prepare(name, widget)
+        for _ in range(3):
+            session.tick()
+            dock.refresh()
+        settle(qtbot, dock, longer=longer)
+        faults += [f"{name}: {fault}" for fault in clipped(dock)]
+        widget.shut()
+        dock.close()
+    assert faults == []
+
+
+@pytest.fixture
+def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tuple[MainWindow, Commands]]:
+    """The window with an example of everything that it can show around the panels."""
+    file = tmp_path / "Story with emotions.nepb"
+    file.write_text("{}", "utf-8")
+    session.settings.add_recent(file)
+    window = MainWindow(session, theme, PANELS, read_examples(resources.folder() / "examples"))
+    qtbot.addWidget(window)
+    theme.set_motion("on")
+    yield window, Commands(window, Answers())
+    window.close()
+
+
+@pytest.mark.parametrize("longer", [False, True], ids=["ours", "longer"])
+@pytest.mark.parametrize("percent", [100, 150, 200])
+@pytest.mark.parametrize("size", [(1440, 900), (1100, 700)], ids=["1440", "1100"])
+def test_the_window_cuts_no_words(
+    qtbot,
+    whole: tuple[MainWindow, Commands],
+    size: tuple[int, int],
+    percent: int,
+    longer: bool,
+) -> None:
+    window, commands = whole
+    window.theme.set_text_percent(percent)
+    window.resize(*size)
+    window.show()
+    faults: list[str] = []
+
+    def look(what: str, root=window) -> None:
+        settle(qtbot, root, longer=longer)
+        faults.extend(f"{what}: {fault}" for fault in clipped(root))
+
+    window.tick()
+    look("start page")
+    alerts = window.session.alerts
+    title, detail = "The camera of Pepper has been silent for 4 s.", "The behaviour waits for a face."
+    alerts.put("one", "error", title, detail, button="Open the connection doctor", action="panel:topics")
+    alerts.put("two", "error", "Another one.", button="Look", action="panel:topics")
+    for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
+        commands.run(f"layout.{layout}")
+        window.tick()
+        window.toast.say("Deleted the layout “Two cameras and a plot”", "Undo", lambda: None)
+        for view in VIEWS:
+            bar.show_view(view)
+            look(f"{layout}, {view.state}")
+    for name in OVER:
+        commands.run(name)
+        shown = [each for each in window.findChildren(Overlay) if each.isVisible()]
+        assert len(shown) == 1
+        look(name, shown[0])
+        shown[0].shut()
+    assert faults == []
