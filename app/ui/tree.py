@@ -1,16 +1,17 @@
 """A lazy tree over one decoded message: nodes are made when they are seen, and stay when the next one comes.
 
 So what is expanded stays expanded, the scroll position stays, and a value that differs from the one before is
-marked with the time of its change.
+marked with the time of its change. It may be compared with another message: then every node has its mark.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
 
+from app.ui.tree_difference import MISSING, OFF, Mark, Part, differs, parts_of
 from app.ui.tree_values import is_container, keys_of, size_of, values_of, words_of
 
 Index = QModelIndex | QPersistentModelIndex
@@ -21,7 +22,11 @@ _ROOT = QModelIndex()
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """One value of the message: ``children`` is None until somebody looked into it."""
+    """One value of the message: ``children`` is None until somebody looked into it.
+
+    ``base`` is the value that it is compared with (`OFF`: nothing is compared), ``mark`` how they differ;
+    ``total`` is how many children there are, once they were looked at.
+    """
 
     key: str | int
     value: object
@@ -30,6 +35,9 @@ class Node:
     depth: int = 0
     children: list[Node] | None = None
     changed_s: float | None = None
+    base: object = OFF
+    mark: Mark = ""
+    total: int = 0
 
     @property
     def is_container(self) -> bool:
@@ -56,6 +64,7 @@ class TreeModel(QAbstractItemModel):
         self._root = Node("", {}, None, depth=-1, children=[])
         self.changed_at_s: float | None = None
         self._changing = False
+        self._changes_only = False
 
     # -- Qt's questions ---------------------------------------------------------------------------------
 
@@ -79,19 +88,19 @@ class TreeModel(QAbstractItemModel):
 
     def hasChildren(self, parent: Index = _ROOT) -> bool:
         node = self.node(parent)
-        return parent.column() <= 0 and (bool(node.children) or size_of(node.value) > 0)
+        return parent.column() <= 0 and (bool(node.children) or self._size(node) > 0)
 
     def canFetchMore(self, parent: Index) -> bool:
         node = self.node(parent)
         # While rows are being changed a view may ask; it gets more when the change is complete.
-        return parent.column() <= 0 and not self._changing and len(node.children or ()) < size_of(node.value)
+        return parent.column() <= 0 and not self._changing and len(node.children or ()) < self._size(node)
 
     def fetchMore(self, parent: Index) -> None:
         if self._changing:
             return
         node = self.node(parent)
         have = len(node.children or ())
-        self._load(node, min(size_of(node.value), have + PAGE))
+        self._load(node, have + PAGE)
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         if not index.isValid():
@@ -104,7 +113,7 @@ class TreeModel(QAbstractItemModel):
         if role == Qt.ItemDataRole.ToolTipRole:
             return node.path
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            return f"{node.key}, {words_of(node.value)}"
+            return ", ".join(part for part in (str(node.key), words_of(node.value), node.mark) if part)
         return None
 
     # -- what the inspector asks and says ---------------------------------------------------------------
@@ -129,66 +138,86 @@ class TreeModel(QAbstractItemModel):
         self.changed_at_s = None
         self.endResetModel()
 
-    def set_value(self, value: object, now: float) -> None:
+    def set_value(self, value: object, now: float, base: object = OFF, *, changes_only: bool = False) -> None:
         """Show the next message; values that differ are marked as changed at ``now`` (monotonic s).
 
         A message that is no container is shown as one row called ``value``. The first message marks nothing.
+        With a ``base`` every node is marked by how it differs from that message, and ``changes_only`` leaves
+        out what does not.
         """
         first = not self._root.children
-        shown = value if is_container(value) else {"value": value}
+        shown = _as_container(value)
+        self._changes_only = changes_only
         self._changing = True
         try:
-            self._update(self._root, shown, None if first else now)
+            self._update(self._root, (0, shown, _as_container(base), ""), None if first else now)
             if not self._root.children:
-                self._load(self._root, min(size_of(shown), PAGE))
+                self._load(self._root, PAGE)
         finally:
             self._changing = False
 
-    def _update(self, node: Node, value: object, now: float | None) -> None:
+    def _size(self, node: Node) -> int:
+        """How many children a node has, or (compared, and not looked at yet) whether it has any."""
+        if node.base is OFF:
+            return size_of(node.value)
+        return node.total if node.children is not None else size_of(node.value) or size_of(node.base)
+
+    def _parts(self, node: Node, count: int) -> list[Part]:
+        """The first ``count`` children as they are to be shown."""
+        if node.base is OFF:
+            pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
+            return [(key, value, OFF, "") for key, value in pairs]
+        parts = parts_of(node.value, node.base, node.mark, changes_only=self._changes_only)
+        node.total = len(parts)
+        return parts[:count]
+
+    def _update(self, node: Node, part: Part, now: float | None) -> None:
+        _key, value, base, mark = part
         before, node.value = node.value, value
+        marked, node.mark, node.base = node.mark != mark, mark, base
         loaded = node.children
         if loaded is None:
-            if now is not None and not is_container(value) and _differs(before, value):
+            if now is not None and not is_container(value) and differs(before, value):
                 node.changed_s = self.changed_at_s = now
+            if marked:
+                self._tell(node, node)
             return
-        wanted = keys_of(value, max(len(loaded), PAGE) if loaded or is_container(value) else 0)
+        parts = self._parts(node, max(len(loaded), PAGE) if loaded or is_container(value) else 0)
+        wanted = [each[0] for each in parts]
         if [child.key for child in loaded] != wanted[: len(loaded)] or len(wanted) < len(loaded):
-            self._fit(node, loaded, wanted)
+            self._fit(node, loaded, parts)
         elif len(wanted) > len(loaded):
             self._load(node, len(wanted))
         if not is_container(value) and node is not self._root:
             node.children = None
             return
-        values = values_of(value, len(loaded))
-        for child, newer in zip(loaded, values, strict=False):
+        for child, newer in zip(loaded, parts, strict=False):
             self._update(child, newer, now)
-        self._tell_values(node, now)
+        rows = [child.row for child in loaded if child.changed_s == now and now is not None]
+        if rows:
+            self._tell(loaded[rows[0]], loaded[rows[-1]])
 
-    def _tell_values(self, node: Node, now: float | None) -> None:
-        rows = [child.row for child in node.children or () if child.changed_s == now and now is not None]
-        if rows and node.children:
-            first, last = node.children[rows[0]], node.children[rows[-1]]
+    def _tell(self, first: Node, last: Node) -> None:
+        if first is not self._root:
             roles = [Qt.ItemDataRole.DisplayRole]
             self.dataChanged.emit(self.index_of(first), self.index_of(last), roles)
 
     def _load(self, node: Node, count: int) -> None:
-        """Have ``count`` children."""
+        """Have ``count`` children, or as many as there are."""
+        parts = self._parts(node, count)
         if node.children is None:
             node.children = []
         first = len(node.children)
-        if count <= first:
+        if len(parts) <= first:
             return
-        keys, values = keys_of(node.value, count), values_of(node.value, count)
-        fresh = [
-            Node(keys[row], values[row], node, row, node.depth + 1)
-            for row in range(first, min(count, len(keys)))
-        ]
-        self.beginInsertRows(self.index_of(node), first, first + len(fresh) - 1)
+        fresh = [_made(node, row, parts[row]) for row in range(first, len(parts))]
+        self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
         node.children.extend(fresh)
         self.endInsertRows()
 
-    def _fit(self, node: Node, loaded: list[Node], wanted: Sequence[str | int]) -> None:
+    def _fit(self, node: Node, loaded: list[Node], parts: Sequence[Part]) -> None:
         """Children came, went or changed places: those that stay keep what is expanded in them."""
+        wanted = [part[0] for part in parts]
         keep = set(wanted)
         for row in range(len(loaded) - 1, -1, -1):
             if loaded[row].key not in keep:
@@ -199,10 +228,10 @@ class TreeModel(QAbstractItemModel):
         have = {child.key for child in loaded}
         if [key for key in wanted if key in have] != [child.key for child in loaded]:
             self._reorder(loaded, wanted)
-        for row, key in enumerate(wanted):
-            if key not in have:
+        for row, part in enumerate(parts):
+            if part[0] not in have:
                 self.beginInsertRows(self.index_of(node), row, row)
-                loaded.insert(row, Node(key, _child(node.value, key), node, row, node.depth + 1))
+                loaded.insert(row, _made(node, row, part))
                 _number(loaded)
                 self.endInsertRows()
 
@@ -220,7 +249,7 @@ class TreeModel(QAbstractItemModel):
         """The index of a value, loading what leads to it; invalid when it is not there."""
         node = self._root
         for key in path:
-            keys = keys_of(node.value, size_of(node.value))
+            keys = [part[0] for part in self._parts(node, size_of(node.value) + size_of(node.base))]
             if key not in keys:
                 return QModelIndex()
             self._load(node, max(keys.index(key) + 1, min(PAGE, len(keys))))
@@ -228,21 +257,16 @@ class TreeModel(QAbstractItemModel):
         return self.index_of(node)
 
 
-def _child(value: object, key: str | int) -> object:
-    if isinstance(value, Mapping):
-        if key in value:
-            return value[key]
-        return next((below for name, below in value.items() if str(name) == key), None)
-    return value[key] if isinstance(value, Sequence) and isinstance(key, int) else None
+def _made(parent: Node, row: int, part: Part) -> Node:
+    key, value, base, mark = part
+    return Node(key, value, parent, row, parent.depth + 1, base=base, mark=mark)
+
+
+def _as_container(value: object) -> object:
+    """A message that is no container gets one row, ``value``."""
+    return value if value is OFF or value is MISSING or is_container(value) else {"value": value}
 
 
 def _number(nodes: Sequence[Node]) -> None:
     for row, node in enumerate(nodes):
         node.row = row
-
-
-def _differs(before: object, after: object) -> bool:
-    # NaN differs from itself, but it has not changed. 1 and true are equal in Python, not in JSON.
-    if before is after or (before != before and after != after):  # noqa: PLR0124
-        return False
-    return type(before) is not type(after) or before != after

@@ -1,0 +1,131 @@
+"""How two messages differ, and how the tree shows it."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from PySide6.QtCore import QModelIndex
+
+from app.core.lazy_json import JsonIndex
+from app.ui.tree import Node, TreeModel
+from app.ui.tree_difference import MISSING, OFF, differs, mark_of, parts_of
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "wanted"),
+    [
+        (1, 1, False), (1, 1.0, True), (1, True, True), (math.nan, math.nan, False), (None, 0, True),
+        ([1], [1], False), ([1], [True], True), ({"a": [0]}, {"a": [False]}, True), ({}, [], True),
+        ({"a": 1, "b": 2}, {"b": 2, "a": 1}, False), ([math.nan], [math.nan], False),
+        ({"a": b"x"}, {"a": b"x"}, False), ({"a": b"x"}, {"a": b"y"}, True), ("a", "a", False),
+    ],
+)  # fmt: skip
+def test_differences_are_those_of_json(before: object, after: object, wanted: bool) -> None:
+    assert differs(before, after) is wanted
+
+
+def test_large_texts_are_compared_as_texts() -> None:
+    def lazy(value: object) -> object:
+        return JsonIndex(memoryview(json.dumps(value).encode())).root
+
+    assert not differs(lazy({"a": [1]}), lazy({"a": [1]}))
+    assert differs(lazy({"a": [1]}), lazy({"a": [2]}))
+
+
+def test_what_is_not_there_is_something_else_than_null() -> None:
+    assert mark_of(None, MISSING) == "added"
+    assert mark_of(MISSING, None) == "removed"
+    assert mark_of(None, None) == ""
+    assert mark_of(None, OFF) == ""
+
+
+def test_children_are_marked_and_removed_ones_stand_at_the_end() -> None:
+    before, after = {"x": 1, "gone": 2, "same": 3}, {"x": 5, "same": 3, "new": {"deep": 1}}
+    parts = parts_of(after, before, "changed", changes_only=False)
+    assert [(key, value, mark) for key, value, _base, mark in parts] == [
+        ("x", 5, "changed"), ("same", 3, ""), ("new", {"deep": 1}, "added"), ("gone", 2, "removed"),
+    ]  # fmt: skip
+    only = parts_of(after, before, "changed", changes_only=True)
+    assert [part[0] for part in only] == ["x", "new", "gone"]
+    below = parts_of({"deep": 1}, MISSING, "added", changes_only=True)
+    assert [(part[0], part[3]) for part in below] == [("deep", "added")]
+
+
+def test_lists_are_compared_by_index() -> None:
+    parts = parts_of([1, 9], [1, 2, 3], "changed", changes_only=False)
+    assert [(key, value, mark) for key, value, _base, mark in parts] == [
+        (0, 1, ""), (1, 9, "changed"), (2, 3, "removed"),
+    ]  # fmt: skip
+
+
+def shown(model: TreeModel, above: QModelIndex | None = None) -> list[tuple[object, str]]:
+    parent = above if above is not None else QModelIndex()
+    found: list[tuple[object, str]] = []
+    for row in range(model.rowCount(parent)):
+        index = model.index(row, 0, parent)
+        node = model.node(index)
+        found.append((node.path, node.mark))
+        if model.canFetchMore(index) and node.children is None:
+            model.fetchMore(index)
+        found += shown(model, index)
+    return found
+
+
+BEFORE = {"pose": {"x": 1, "y": 2}, "words": ["a", "b"], "old": {"k": 1}, "same": {"q": [1]}}
+AFTER = {"pose": {"x": 1, "y": 3}, "words": ["a"], "same": {"q": [1]}, "new": 4}
+
+
+def test_the_tree_marks_what_differs_from_another_message(qtmodeltester) -> None:
+    model = TreeModel()
+    model.set_value(AFTER, 0.0, BEFORE)
+    qtmodeltester.check(model)
+    assert shown(model) == [
+        ("pose", "changed"), ("pose.x", ""), ("pose.y", "changed"),
+        ("words", "changed"), ("words[0]", ""), ("words[1]", "removed"),
+        ("same", ""), ("same.q", ""), ("same.q[0]", ""),
+        ("new", "added"), ("old", "removed"), ("old.k", "removed"),
+    ]  # fmt: skip
+
+
+def test_changes_only_leaves_out_the_rest_and_coming_back_shows_all(qtmodeltester) -> None:
+    model = TreeModel()
+    model.set_value(AFTER, 0.0)
+    qtmodeltester.check(model)  # it goes on watching
+    shown(model)  # everything is opened
+    model.set_value(AFTER, 1.0, BEFORE, changes_only=True)
+    assert shown(model) == [
+        ("pose", "changed"), ("pose.y", "changed"), ("words", "changed"), ("words[1]", "removed"),
+        ("new", "added"), ("old", "removed"), ("old.k", "removed"),
+    ]  # fmt: skip
+    model.set_value(AFTER, 2.0)
+    assert {mark for _path, mark in shown(model)} == {""}
+    assert model.rowCount() == 4
+
+
+def test_without_a_difference_changes_only_is_empty() -> None:
+    model = TreeModel()
+    model.set_value(AFTER, 0.0)
+    model.set_value(AFTER, 1.0, dict(AFTER), changes_only=True)
+    assert model.rowCount() == 0
+
+
+def test_a_message_that_is_no_container_is_compared_too() -> None:
+    model = TreeModel()
+    model.set_value(5, 0.0, 4)
+    node = model.node(model.index(0, 0))
+    assert isinstance(node, Node)
+    assert (node.key, node.value, node.base, node.mark) == ("value", 5, 4, "changed")
+
+
+def test_expanded_parts_survive_while_messages_are_compared() -> None:
+    model = TreeModel()
+    model.set_value(AFTER, 0.0, BEFORE)
+    pose = model.index(0, 0)
+    model.fetchMore(pose)
+    first = model.node(pose)
+    for x in range(5):
+        model.set_value({**AFTER, "pose": {"x": x, "y": 3}}, float(x), AFTER)
+    assert model.node(model.index(0, 0)) is first
+    assert [child.key for child in first.children or ()] == ["x", "y"]
