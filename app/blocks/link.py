@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
 LAST_STATES = ("succeeded", "failed", "canceled")
+STATES = ("accepted", "running", *LAST_STATES)
 
 
 @dataclass
@@ -22,6 +24,8 @@ class Call:
     error: str = ""
     began: bool = False  # the robot has begun to do it
     held: bool = False  # a pause has taken it back
+    waits_for: tuple[str, ...] = ()  # the actions that the robot does first
+    heard_s: float = field(default_factory=time.monotonic)  # when its robot last said anything
 
     @property
     def done(self) -> bool:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
+import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
-from app.blocks.link import LAST_STATES, Call
+from app.blocks.link import LAST_STATES, STATES, Call
 from app.robots import rize
 from app.robots.description import Robot
 from nep.errors import NepError
@@ -211,6 +212,7 @@ class Network:
         answer = told if "state" in told and "op" in told else rize.from_answer(told)
         if answer is None:
             return
+        self._hear(topic)
         if answer.get("op") == "stop":
             self._stop_answered(topic, answer)
             return
@@ -218,15 +220,27 @@ class Network:
         # A cancel is answered with the id of the command it was for; only the command's own answer ends it.
         if call is None or call.done or answer.get("op") not in (None, "invoke"):
             return
+        state = str(answer.get("state"))
+        if self._robots[call.robot].topics.answer != topic or state not in STATES:
+            return  # another robot's answer, or no word of a robot
         output = answer.get("output")
         call.output = output if isinstance(output, Mapping) else {}
         call.error = str(answer.get("error") or "")
         feedback = answer.get("feedback")
         call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
-        call.began = call.began or answer.get("state") == "running"
-        call.state = str(answer.get("state"))
+        call.began = call.began or state == "running"
+        waits_for = answer.get("waits_for")
+        call.waits_for = tuple(map(str, waits_for)) if isinstance(waits_for, list) else call.waits_for
+        call.state = state
         if call.state in LAST_STATES:
             self._calls.pop(call.id, None)
+
+    def _hear(self, topic: str) -> None:
+        """A robot has said something: whoever waits for it knows that it lives."""
+        now = time.monotonic()
+        for call in list(self._calls.values()):
+            if self._robots[call.robot].topics.answer == topic:
+                call.heard_s = now
 
     def _stop_answered(self, topic: str, answer: Mapping[str, object]) -> None:
         if answer.get("state") not in ("succeeded", "failed"):

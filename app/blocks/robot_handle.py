@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
@@ -17,6 +18,9 @@ FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0
 LONGEST_S = 60.0
 MARGIN_S = 2.0
+LOOK_S = 0.25
+"""How often a command that is waited for is looked at: has its robot fallen silent, has it begun?"""
+BEATS_MISSED, SHORTEST_SILENCE_S = 4, 2.0
 HOLD_S = 3.0
 """How long a robot may take to end what a pause takes back; its own kit answers within about a second."""
 
@@ -104,20 +108,21 @@ class RobotHandle:
         wrong = action.check(action.complete(input))
         if wrong:
             raise BehaviourError(f"{self._name} can't do this: {wrong[0]}.")
-        self._runtime.tell(sentence(robot, action, input))
+        words = sentence(robot, action, input)
+        self._runtime.tell(words)
         try:
-            call = self._do(robot, action, action.complete(input))
+            call = self._do(robot, action, action.complete(input), words)
         finally:
             self._runtime.tell("")
         if call.state == "failed":
             raise BehaviourError(_ended(f"{self._name}: {call.error or f'“{action.title}” failed'}"))
         return call
 
-    def _do(self, robot: Robot, action: Action, input: Mapping[str, object]) -> Call:
+    def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> Call:
         """One command, or several when a pause takes it back and what is left is done afterwards."""
         while True:
             call = self._runtime.linked().invoke(self._name, action.name, input)
-            self._await(robot, action, call)
+            self._await(robot, action, call, words)
             if not call.held or call.state != "canceled":
                 return call
             self._runtime.scheduler.hold()
@@ -126,18 +131,42 @@ class RobotHandle:
                 return call
             input = rest
 
-    def _await(self, robot: Robot, action: Action, call: Call) -> None:
+    def _await(self, robot: Robot, action: Action, call: Call, words: str) -> None:
         scheduler = self._runtime.scheduler
         if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
             raise BehaviourError(f"{self._name} does not answer. Check that it is on and in the same Wi-Fi.")
         can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or LONGEST_S
-        in_time = scheduler.wait_for(lambda: call.done or (can_hold and scheduler.holds()), limit + MARGIN_S)
-        if in_time and not call.done:
+        until = time.monotonic() + limit + MARGIN_S
+        waits = bool(call.waits_for) and call.state == "accepted"
+        if waits:
+            self._runtime.tell(_waiting(robot, call))
+
+        def ready() -> bool:
+            return call.done or (can_hold and scheduler.holds())
+
+        while not scheduler.wait_for(ready, min(LOOK_S, max(0.0, until - time.monotonic()))):
+            if waits:  # its time limit begins with it
+                until = time.monotonic() + limit + MARGIN_S
+                waits = not call.began
+                self._runtime.tell(_waiting(robot, call) if waits else words)
+            said = self._broken(robot, call)
+            if said is None and time.monotonic() >= until:
+                said = f"{self._name} has not ended “{action.title}” within {limit:g} s."
+            if said is not None:
+                self._runtime.linked().cancel(call)
+                raise BehaviourError(said)
+        if not call.done:
             self._hold(call)
-        elif not in_time:
-            self._runtime.linked().cancel(call)
-            raise BehaviourError(f"{self._name} has not ended “{action.title}” within {limit:g} s.")
+
+    def _broken(self, robot: Robot, call: Call) -> str | None:
+        """The sentence when a robot that always tells that it lives does so no more."""
+        if robot.beat_s is None:
+            return None
+        silence = time.monotonic() - call.heard_s
+        if silence <= max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s):
+            return None
+        return f"{self._name} has stopped answering. Check that it is on and in the same Wi-Fi."
 
     def _hold(self, call: Call) -> None:
         """The pause takes the command back; a robot that does not end it is no longer under control."""
@@ -145,6 +174,13 @@ class RobotHandle:
         self._runtime.linked().cancel(call)
         if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
             raise BehaviourError(f"{self._name} does not hold still, so the behaviour was stopped.")
+
+
+def _waiting(robot: Robot, call: Call) -> str:
+    """What the robot does first: "Pepper waits for “say”"."""
+    found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
+    titles = [f"“{action.title if action is not None else name}”" for action, name in found]
+    return f"{robot.name} waits for {' and '.join(titles)}"
 
 
 def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:

@@ -64,7 +64,7 @@ class Tries:
             self._take(link, made, answer)
 
     def _take(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
-        state = answer.get("state")
+        state = str(answer.get("state"))
         if state not in FINAL_STATES and state not in ("accepted", "running"):
             return  # no word of a robot
         made.feedback = _object(answer.get("feedback")) or made.feedback
@@ -73,9 +73,9 @@ class Tries:
         made.replaces = _names(answer.get("replaces")) or made.replaces
         error = answer.get("error")
         if state in FINAL_STATES:
-            self._end(link, made, str(state), str(error) if error else None)
+            self._end(link, made, state, str(error) if error else None)
             return
-        made.state = str(state)
+        made.state = state
         if state == "running" and made.begun_s is None:
             made.begun_s = self._clock()
 

@@ -131,12 +131,17 @@ class DiffDrive:
         on_busy="replace",
         timeout_s=60,
         risk="locomotes",
-        feedback={"moved": Annotated[float, Range(unit="m")]},
+        feedback={
+            "moved": Annotated[float, Range(unit="m")],
+            "to_go": Annotated[float, Range(unit="m"), Title("to go")],
+        },
         output={"moved": Annotated[float, Range(unit="m")]},
     )
     def move(self, call: Call, distance: Distance = 0.5) -> Mapping[str, object]:
         """Move straight, backwards when the distance is negative."""
-        return {"moved": round(self._roll(call, distance, lambda moved: {"moved": moved}), 3)}
+        left = abs(distance)
+        made = self._roll(call, distance, lambda moved: {"moved": moved, "to_go": _left(left, moved)})
+        return {"moved": round(made, 3)}
 
     @action(
         "turn %angle °",
@@ -147,11 +152,11 @@ class DiffDrive:
         on_busy="replace",
         timeout_s=60,
         risk="locomotes",
-        feedback={"turned": Annotated[float, Range(unit="deg")]},
+        feedback={"to_go": Annotated[float, Range(unit="deg"), Title("to go")]},
     )
     def turn(self, call: Call, angle: Annotated[float, Range(-360, 360, 5, "deg", "angle")] = 90.0) -> None:
         """Turn on the spot, to the left when positive."""
-        self._spin(call, angle, lambda turned: {"turned": turned})
+        self._spin(call, angle, lambda turned: {"to_go": _left(abs(angle), turned)})
 
     @action(
         "go to x %x m y %y m",
@@ -173,7 +178,7 @@ class DiffDrive:
             return
         turn = math.degrees(math.atan2(y - here_y, x - here_x)) - facing
         self._spin(call, (turn + 180.0) % 360.0 - 180.0, lambda _: {"to_go": round(away, 2)})
-        self._roll(call, away, lambda moved: {"to_go": round(max(0.0, away - moved), 2)})
+        self._roll(call, away, lambda moved: {"to_go": _left(away, moved)})
 
     @action(
         "light %colour",
@@ -271,6 +276,10 @@ class DiffDrive:
                 call.wait(STEP_S)
         finally:
             self._brake()
+
+
+def _left(amount: float, done: float) -> float:
+    return round(max(0.0, amount - done), 2)
 
 
 DIFFDRIVE = Kind(

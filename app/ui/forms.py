@@ -17,6 +17,7 @@ from app.ui.widgets import Button, label
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
+TALL_ROW = 60  # a row with a drawing: its name stands in the middle
 
 
 class ActionForm(QWidget):
@@ -74,8 +75,8 @@ class ActionForm(QWidget):
         inside.setSpacing(4)
         inside.addWidget(control.widget)
         inside.addWidget(wrong)
-        for widget in (name, control.widget):
-            widget.setMinimumHeight(ROW_HEIGHT)
+        control.widget.setMinimumHeight(ROW_HEIGHT)
+        name.setMinimumHeight(max(ROW_HEIGHT, min(TALL_ROW, control.widget.sizeHint().height())))
         self._grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
         self._grid.addWidget(cell, row, 1)
         self.controls[parameter.name] = control

@@ -66,7 +66,7 @@ class LongText(QWidget):
         EditMenu(theme, self.edit)
         self.setFocusProxy(self.edit)
         row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 3, 0)
+        row.setContentsMargins(3, 2, 3, 1)
         row.addWidget(self.edit)
         self.edit.textChanged.connect(self._grow)
         self.edit.textChanged.connect(self.changed)

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
 
 
+TURTLE = "diffdrive"
+
+
 class RobotList(QWidget):
     """One row for each robot; `chosen` tells the name of the one that was pressed."""
 
@@ -57,3 +60,4 @@ class RobotList(QWidget):
                 item.clicked.connect(lambda _on=False, name=link.name: self.chosen.emit(name))
                 self.items[link.name] = item
                 self._column.insertWidget(self._column.count() - 2, item)
+        self.turtle.setVisible(not any(link.robot.model == TURTLE and link.connected for link in links))

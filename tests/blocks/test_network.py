@@ -49,6 +49,26 @@ def test_an_invoke_is_answered(network, pepper):
     assert pokes
 
 
+def test_answers_of_another_robot_and_words_of_no_robot_change_nothing(network, pepper, node):
+    pepper.slow = {"say"}
+    call = network.invoke("Pepper", "say", {"text": "Hi"})
+    until(lambda: call.state == "accepted")
+    answer = node.new_pub("/Pepper/answer", "robot/answer")
+    told = {"id": call.id, "op": "invoke", "action": "say", "output": {}, "feedback": {}, "error": None}
+    for state in ("dancing", None, ["succeeded"], "accepted"):
+        answer.publish({**told, "state": state})
+    network._answer("/Other/answer", {**told, "state": "succeeded"})
+    answer.publish({"op": "alive", "id": "", "state": "running"})
+    until(lambda: call.heard_s > 0 and call.state == "accepted")
+    answer.publish({**told, "state": "running", "waits_for": "no list"})
+    until(lambda: call.state == "running")
+    assert call.waits_for == ()
+    answer.publish({**told, "state": "succeeded"})
+    answer.publish({**told, "state": "failed", "error": "twice"})
+    until(lambda: call.done)
+    assert (call.state, call.error) == ("succeeded", "")
+
+
 def test_a_refusal_and_a_cancel(network, pepper):
     pepper.refuses = {"say": "no voice"}
     pepper.slow = {"turn"}

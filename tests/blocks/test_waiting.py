@@ -1,0 +1,63 @@
+"""A program waits for a busy robot, and gives up one that has fallen silent."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from app.blocks.compiler import compile_behaviour
+from tests.blocks.fakes import FakeLink, Play, until
+from tests.blocks.samples import robot, say, started, text, workspace, write
+
+
+def begin(link: FakeLink, beat_s: float | None = None) -> Play:
+    pepper = replace(robot(), beat_s=beat_s)
+    blocks = workspace(started(say("Hi") | {"id": "x"}, write(text("after"))))
+    return Play(compile_behaviour(blocks, [pepper]), (pepper,), link).start()
+
+
+class Queued(FakeLink):
+    """A robot that is busy with something else first."""
+
+    def invoke(self, robot: str, action: str, input: dict[str, object]):  # type: ignore[no-untyped-def, override]
+        self.held.add(action)
+        call = super().invoke(robot, action, input)
+        call.state, call.waits_for = "accepted", ("look", "look")
+        return call
+
+
+def test_what_waits_says_for_what_and_then_what_it_does(monkeypatch) -> None:
+    monkeypatch.setattr("app.blocks.robot_handle.MARGIN_S", -29.5)  # the limit: half a second
+    link = Queued()
+    run = begin(link)
+    until(lambda: bool(link.calls))
+    said = lambda: run.runtime.says(("x",))  # noqa: E731
+    until(lambda: said() == "Pepper waits for “look”")
+    begun = time.monotonic()
+    until(lambda: time.monotonic() > begun + 0.7)  # longer than its limit, which has not begun
+    assert not run.runtime.finished.is_set()
+    link.calls[0].began = True
+    link.calls[0].state = "running"
+    until(lambda: said() == "Pepper says “Hi”")
+    link.answer(link.calls[0], "succeeded")
+    assert run.end().lines == ["after"]
+
+
+def test_a_robot_that_stops_telling_that_it_lives_is_an_error_at_the_block(monkeypatch) -> None:
+    monkeypatch.setattr("app.blocks.robot_handle.SHORTEST_SILENCE_S", 0.3)
+    link = FakeLink()
+    link.held = {"say"}
+    run = begin(link, beat_s=0.05)
+    until(lambda: bool(link.calls))
+    heard_until = time.monotonic() + 0.8
+    while time.monotonic() < heard_until:  # it beats: nothing is wrong
+        link.calls[0].heard_s = time.monotonic()
+        assert not run.runtime.finished.wait(0.02)
+    run.end(3.0)
+    error = run.runtime.error
+    assert error is not None
+    assert (error.block, error.sentence) == (
+        "x",
+        "Pepper has stopped answering. Check that it is on and in the same Wi-Fi.",
+    )
+    assert link.canceled == link.calls  # should it wake up

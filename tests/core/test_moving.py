@@ -1,0 +1,100 @@
+"""May this robot move? Asked once for each real robot, before it moves; never for virtual ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.core.moving import MayNotMoveError, Moving, actions_of, risky, wanted_by
+from app.core.settings import Settings
+from app.robots.description import Robot, parse, td_for
+from app.robots.turtle import ROBOT
+
+
+@pytest.fixture
+def rover() -> Robot:
+    """A real robot on two wheels."""
+    return replace(parse(td_for(ROBOT.thing_model, "Rover")), virtual=False)
+
+
+def test_a_virtual_robot_is_never_asked_for(rover) -> None:
+    moving = Moving()
+    assert moving.permits([(replace(rover, virtual=True), ["move"])], pytest.fail)
+    assert moving.question is None
+
+
+def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
+    moving = Moving()
+    assert not moving.permits([(rover, ["move", "light", "turn"])], lambda: None)
+    question = moving.question
+    assert question is not None
+    assert question.title == "Let Rover move?"
+    assert question.sentence.startswith("Rover will do: move and turn.")
+    assert "Stop is F12" in question.sentence
+
+
+def test_actions_without_risk_need_no_answer(rover) -> None:
+    assert Moving().permits([(rover, ["light", "stop"])], pytest.fail)
+
+
+def test_a_yes_goes_on_once_and_counts_for_the_session(rover) -> None:
+    moving, done = Moving(), []
+    moving.permits([(rover, ["move"])], lambda: done.append(1))
+    moving.answer(let=True)
+    moving.answer(let=True)  # a second press
+    assert done == [1]
+    assert moving.permits([(rover, ["turn"])], pytest.fail)
+    other = replace(rover, name="Other")
+    assert not moving.permits([(other, ["turn"])], lambda: None)  # each robot for itself
+    assert not Moving().permits([(rover, ["move"])], lambda: None)  # and each session
+
+
+def test_not_now_moves_nothing_and_asks_again(rover) -> None:
+    moving = Moving()
+    moving.permits([(rover, ["move"])], pytest.fail)
+    moving.answer(let=False, always=True)
+    assert moving.question is None
+    assert not moving.permits([(rover, ["move"])], pytest.fail)
+    moving.withdraw()
+    assert moving.question is None
+    moving.answer(let=True)  # the question has gone: this answers nothing
+    assert not moving.allowed(rover)
+
+
+def test_always_is_kept_for_this_robot_until_it_is_forgotten(rover, tmp_path) -> None:
+    moving = Moving(Settings(tmp_path))
+    moving.permits([(rover, ["move"])], lambda: None)
+    moving.answer(let=True, always=True)
+    assert Moving(Settings(tmp_path)).allowed(rover)
+    assert not Moving(Settings(tmp_path)).allowed(replace(rover, model="other"))
+    moving.forget()
+    assert not Moving(Settings(tmp_path)).allowed(rover)
+    assert not moving.allowed(rover)
+
+
+def test_the_question_replaces_an_older_one(rover) -> None:
+    moving, done = Moving(), []
+    moving.permits([(rover, ["move"])], lambda: done.append("old"))
+    moving.permits([(rover, ["turn"])], lambda: done.append("new"))
+    moving.answer(let=True)
+    assert done == ["new"]
+
+
+def test_what_a_program_asks_of_robots_is_read_from_it(rover) -> None:
+    source = "robot('Rover').do('move', distance=1)\nrobot('Rover').ask('look', 'w')\nrobot('P').get('b')\n"
+    assert actions_of(source) == {"Rover": ("move", "look")}
+    assert wanted_by(source, [rover]) == [(rover, ("move", "look"))]
+    assert risky(rover, ["move", "move", "light", "unknown"]) == ("move",)
+
+
+@pytest.mark.parametrize("source", ["robot(name).do('move')", "robot('Rover').do(what)", "r.do('move')"])
+def test_a_program_that_hides_what_it_does_may_do_anything(rover, source) -> None:
+    assert actions_of(source) is None
+    ((_, actions),) = wanted_by(source, [rover])
+    assert "move" in actions
+    assert not Moving().permits(wanted_by(source, [rover]), lambda: None)
+
+
+def test_the_error_names_the_robots() -> None:
+    assert "Rover and Tim may not move yet" in str(MayNotMoveError(["Rover", "Tim"]))

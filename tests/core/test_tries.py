@@ -1,0 +1,170 @@
+"""Tries of actions: answered, waiting, too long, silent robots, answers to others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from app.core.robot_link import TRIES_KEPT, Invocation, Payload, RobotLink
+from app.core.tries import FIRST_ANSWER_S, GRACE_S, Tries
+from app.robots.description import Action, Robot, parse, td_for
+from app.robots.turtle import ROBOT
+
+
+@dataclass
+class Bench:
+    """Tries with one robot, a clock, and what was sent to it."""
+
+    now: float = 100.0
+    sent: list[Payload] = field(default_factory=list)
+    rested: list[str] = field(default_factory=list)
+    reachable: bool = True
+
+    def __post_init__(self) -> None:
+        robot: Robot = parse(td_for(ROBOT.thing_model, "Turtle"))
+        self.link = RobotLink("Turtle", robot)
+        self.tries = Tries(self.send, self.rested.append, lambda: self.now, lambda: 1e9)
+
+    def send(self, _link: RobotLink, command: Payload) -> bool:
+        self.sent.append(command)
+        return self.reachable
+
+    def action(self, name: str) -> Action:
+        found = self.link.robot.action(name)
+        assert found is not None
+        return found
+
+    def begin(self, name: str = "move", **given: object) -> Invocation:
+        return self.tries.begin(self.link, self.action(name), given)
+
+    def answer(self, made: Invocation, state: str, **more: object) -> None:
+        told = {"id": made.id, "op": "invoke", "action": made.action, "state": state}
+        self.tries.answer(self.link, {**told, **more})
+
+    def pass_time(self, seconds: float, *, alive: bool = False) -> None:
+        self.now += seconds
+        if alive:
+            self.tries.answer(self.link, {"op": "alive", "id": "", "state": "running"})
+        self.tries.look([self.link])
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_a_try_goes_through_its_states_and_is_kept(bench) -> None:
+    made = bench.begin("move", distance=0.5)
+    assert bench.sent[0]["input"] == {"distance": 0.5}
+    assert made.state == "sent"
+    bench.answer(made, "accepted", replaces=["turn"])
+    assert (made.state, made.replaces, made.left_s) == ("accepted", ("turn",), None)
+    bench.answer(made, "running")
+    bench.now += 4
+    bench.answer(made, "running", feedback={"moved": 0.2})
+    assert made.feedback == {"moved": 0.2}
+    assert made.left_s == 56.0
+    bench.answer(made, "succeeded", output={"moved": 0.5})
+    assert (made.state, made.output, made.elapsed_s) == ("succeeded", {"moved": 0.5}, 4.0)
+    assert not made.running
+    assert bench.rested == ["Turtle"]
+    assert list(bench.link.tried) == [made]
+
+
+def test_only_the_newest_tries_are_kept(bench) -> None:
+    for _ in range(TRIES_KEPT + 5):
+        bench.answer(bench.begin("light"), "succeeded")
+    assert len(bench.link.tried) == TRIES_KEPT
+
+
+def test_a_robot_that_says_nothing_to_a_command_fails_it_in_three_seconds(bench) -> None:
+    made = bench.begin()
+    bench.pass_time(FIRST_ANSWER_S - 0.1)
+    assert made.running
+    bench.pass_time(0.2)
+    assert (made.state, made.error) == ("failed", "Turtle does not answer. Check that it is on.")
+    assert bench.sent[-1]["op"] == "cancel"  # should it wake up
+    assert (bench.link.state, bench.link.chip) == ("silent", "virtual, does not answer")
+    bench.tries.answer(bench.link, {"op": "alive", "id": ""})
+    assert bench.link.state == "ready"
+
+
+def test_a_robot_that_falls_silent_in_the_middle_fails_it_in_two_seconds(bench) -> None:
+    made = bench.begin()
+    bench.answer(made, "accepted")
+    bench.answer(made, "running")
+    for _ in range(20):
+        bench.pass_time(0.5, alive=True)  # it lives, and goes on
+    assert made.running
+    bench.pass_time(2.1)
+    assert made.state == "failed"
+    assert made.error is not None
+    assert "has stopped answering" in made.error
+    assert bench.sent[-1] == {"id": made.id, "op": "cancel", "from": "studio", "action": "move"}
+
+
+def test_a_robot_without_a_beat_is_waited_for_until_the_time_limit(bench) -> None:
+    bench.link.robot = replace(bench.link.robot, beat_s=None)
+    made = bench.begin()
+    bench.answer(made, "running")
+    bench.pass_time(59.0)
+    assert made.running
+    bench.pass_time(1.0 + GRACE_S / 2)
+    assert made.running  # the robot may say so itself
+    bench.pass_time(GRACE_S)
+    assert (made.state, made.error) == ("failed", "move took longer than 60 s")
+    assert bench.sent[-1]["op"] == "cancel"
+    bench.answer(made, "succeeded")
+    assert made.state == "failed"  # what comes later changes nothing
+
+
+def test_what_waits_in_the_queue_of_the_robot_takes_no_time_of_its_limit(bench) -> None:
+    made = bench.begin()
+    bench.answer(made, "accepted", waits_for=["turn", "turn"])
+    for _ in range(200):
+        bench.pass_time(0.5, alive=True)
+    assert (made.state, made.waits_for) == ("accepted", ("turn", "turn"))
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        {"id": "somebody else's", "op": "invoke", "state": "succeeded"},
+        {"op": "invoke", "state": "succeeded"},
+        {"op": "cancel", "state": "failed", "mine": True},
+        {"op": "stop", "state": "succeeded", "mine": True},
+        {"op": "invoke", "state": "dancing", "mine": True},
+        {"op": "invoke", "state": None, "mine": True},
+        {"op": "invoke", "state": ["succeeded"], "mine": True},
+    ],
+)
+def test_answers_to_others_and_nonsense_end_nothing(bench, answer) -> None:
+    made = bench.begin()
+    bench.answer(made, "running")
+    bench.tries.answer(bench.link, {**answer, "id": made.id} if answer.get("mine") else answer)
+    assert made.state == "running"
+
+
+def test_the_second_answer_changes_nothing(bench) -> None:
+    made = bench.begin()
+    bench.answer(made, "succeeded")
+    bench.answer(made, "failed", error="no")
+    assert (made.state, made.error) == ("succeeded", None)
+
+
+def test_a_robot_that_can_not_be_reached_fails_at_once(bench) -> None:
+    bench.reachable = False
+    made = bench.begin()
+    assert (made.state, made.error) == ("failed", "Turtle can't be reached; check that it is on")
+
+
+def test_a_cancel_is_sent_once_it_runs_and_never_after_its_end(bench) -> None:
+    made = bench.begin()
+    bench.tries.cancel(bench.link, "move")
+    assert bench.sent[-1]["op"] == "cancel"
+    bench.answer(made, "canceled")
+    count = len(bench.sent)
+    bench.tries.cancel(bench.link, "move")
+    bench.tries.cancel(bench.link, "turn")
+    assert len(bench.sent) == count

@@ -1,0 +1,154 @@
+"""Busy: queue, replace, reject; what is told about them; cancel and stop of what waits."""
+
+from __future__ import annotations
+
+from tests.robots.conftest import Ears, eventually
+
+
+def first_answer(ears: Ears, wanted: str) -> dict[str, object]:
+    eventually(lambda: ears.answers(wanted))
+    return ears.answers(wanted)[0]
+
+
+def test_queue_waits_for_what_runs_and_for_what_waits_already(turtle) -> None:
+    body, ears, _ = turtle
+    ears.invoke("1", "say", text="one")
+    ears.invoke("2", "say", text="two")
+    ears.invoke("3", "say", text="three")
+    assert "waits_for" not in first_answer(ears, "1")
+    assert first_answer(ears, "2")["waits_for"] == ["say"]
+    assert first_answer(ears, "3")["waits_for"] == ["say"]
+    body.go_on.set()
+    assert ears.final("3")["state"] == "succeeded"
+    assert [text for _, text in body.done] == ["one", "two", "three"]
+    assert ears.states("2") == ["accepted", "running", "succeeded"]
+
+
+def test_replace_ends_the_other_and_both_say_so(turtle) -> None:
+    body, ears, _ = turtle
+    ears.invoke("1", "move", distance=1)
+    eventually(lambda: body.moving)
+    ears.invoke("2", "move", distance=0.5)
+    assert first_answer(ears, "2")["replaces"] == ["move"]
+    ended = ears.final("1")
+    assert (ended["state"], ended["error"]) == ("canceled", "move took its place")
+    body.go_on.set()
+    assert ears.final("2")["output"] == {"moved": 0.5}
+    assert body.done == [("move", 0.5)]
+
+
+def test_replace_also_clears_what_waits(turtle) -> None:
+    body, ears, _ = turtle
+    ears.invoke("1", "ignore")  # does not end when it is told to: what comes waits for it
+    eventually(lambda: ears.states("1") == ["accepted", "running"])
+    ears.invoke("2", "ignore")
+    ears.invoke("3", "move", distance=1)
+    assert first_answer(ears, "2")["waits_for"] == ["ignore"]
+    assert ears.final("2") == {**ears.final("2"), "state": "canceled", "error": "move took its place"}
+    assert ears.states("2") == ["accepted", "canceled"]  # it never ran
+    body.go_on.set()
+    assert ears.final("3")["state"] == "succeeded"
+
+
+def test_reject_refuses_and_says_with_what_the_robot_is_busy(turtle) -> None:
+    body, ears, _ = turtle
+    ears.invoke("1", "move", distance=1)
+    eventually(lambda: body.moving)
+    ears.invoke("2", "dig", times=2)
+    refused = ears.final("2")
+    assert (refused["state"], refused["error"]) == ("failed", "dig: Turtle is busy with move")
+    assert ears.states("2") == ["failed"]
+    body.go_on.set()
+    assert ears.final("1")["state"] == "succeeded"
+    ears.invoke("3", "dig", times=2)
+    assert ears.final("3")["state"] == "succeeded"
+
+
+def test_a_queued_one_is_canceled_without_ever_running(turtle) -> None:
+    body, ears, _ = turtle
+    ears.invoke("1", "say", text="one")
+    ears.invoke("2", "say", text="two")
+    ears.invoke("3", "say", text="three")
+    first_answer(ears, "3")
+    ears.command(id="2", op="cancel")
+    assert ears.final("2")["state"] == "canceled"
+    body.go_on.set()
+    assert ears.final("3")["state"] == "succeeded"
+    assert [text for _, text in body.done] == ["one", "three"]
+
+
+def test_a_stop_clears_the_queue(turtle) -> None:
+    body, ears, _ = turtle
+    for wanted in ("1", "2", "3"):
+        ears.invoke(wanted, "say", text=wanted)
+    first_answer(ears, "3")
+    ears.command(id="s", op="stop")
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert [ears.final(wanted)["state"] for wanted in "123"] == ["canceled"] * 3
+    body.go_on.set()
+    ears.invoke("4", "say", text="4")
+    assert ears.final("4")["state"] == "succeeded"
+    assert body.done == [("say", "4")]
+
+
+def test_a_time_limit_begins_when_it_runs_not_while_it_waits(turtle) -> None:
+    body, ears, clock = turtle
+    ears.invoke("1", "ignore")
+    ears.invoke("2", "ignore")
+    first_answer(ears, "2")
+    clock.advance(5.1)  # the limit of the first: it is told to end, and does not
+    ears.invoke("3", "light")
+    ears.final("3")
+    clock.advance(1.1)  # so it is answered for
+    assert ears.final("1")["error"] == "ignore took longer than 5 s"
+    assert ears.states("2") == ["accepted"]
+    body.go_on.set()
+    assert ears.final("2")["state"] == "succeeded"
+
+
+def test_the_robot_says_that_it_lives_while_something_runs_or_waits(turtle) -> None:
+    body, ears, clock = turtle
+
+    def beats() -> int:
+        return sum(1 for answer in list(ears.heard["answer"]) if answer["op"] == "alive")
+
+    ears.invoke("1", "say", text="one")
+    eventually(lambda: beats() == 1)
+    clock.advance(0.6)
+    eventually(lambda: beats() == 2)
+    body.go_on.set()
+    ears.final("1")
+    told = beats()
+    clock.advance(5)
+    ears.invoke("2", "light")
+    ears.final("2")
+    assert beats() <= told + 1
+
+
+# ---- who must stay alive ---------------------------------------------------------------------------
+
+
+def test_a_program_for_which_nothing_is_done_any_more_may_fall_silent(turtle) -> None:
+    body, ears, clock = turtle
+    ears.invoke("1", "light", program="tried")
+    ears.final("1")
+    ears.invoke("2", "move", program="running", distance=1)
+    eventually(lambda: body.moving)
+    for number in range(20):
+        clock.advance(0.2)
+        ears.command(op="alive", id=f"a{number}", **{"from": "running"})
+        ears.invoke(f"l{number}", "light")
+        ears.final(f"l{number}")  # the robot has looked at the clock
+    assert body.stops == 0
+    body.go_on.set()
+    assert ears.final("2")["state"] == "succeeded"
+
+
+def test_a_program_whose_action_runs_must_not(turtle) -> None:
+    body, ears, clock = turtle
+    ears.invoke("1", "move", program="running", distance=1)
+    eventually(lambda: body.moving)
+    clock.advance(1.1)
+    ended = ears.final("1")
+    assert (ended["state"], ended["error"]) == ("canceled", "no sign of life from its program for 1 s")
+    eventually(lambda: body.stops == 1)
