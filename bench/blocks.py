@@ -56,6 +56,11 @@ class Child:
             raise SystemExit("the child process has ended")
         return line.strip()
 
+    def kill(self) -> None:
+        """Kill it, and wait until it is gone."""
+        self._process.kill()
+        self._process.wait()
+
 
 @contextmanager
 def other_process(program: str, arguments: Sequence[str], master: str) -> Iterator[Child]:

@@ -211,7 +211,7 @@ def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int
             node.spin(10.0)
             ending.join()
 
-        if listen_once(bursts, child, reader) != state:
+        if listen_once(bursts, reader) != state:
             raise SystemExit("the state came back as another one")
         variants = {
             "plain": partial(bursts.take, "plain", plain.recv),
@@ -229,7 +229,7 @@ def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int
     return samples, lost
 
 
-def listen_once(bursts: Bursts, child: Child, reader: nep.Subscriber) -> object:
+def listen_once(bursts: Bursts, reader: nep.Subscriber) -> object:
     """A burst of states; the last one."""
     last: list[object] = []
     bursts.take("json", lambda: last.append(reader.listen(timeout_s=5.0)[1]))

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
 
 from nep.addresses import master_address
-from nep.backends.base import Backend, Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
+from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
+from nep.backends.choosing import backend_named
 from nep.codecs import codec_for
 from nep.configuration import Configuration, Direct, Hybrid, checked_mode, checked_port
-from nep.errors import ClosedError, DecodeError, NepError, UnknownBackendError
+from nep.errors import ClosedError, DecodeError, NepError
 from nep.graph import GraphView
 from nep.inbox import MAX_MESSAGES, Keep
 from nep.logs import LogHandler, handler_of
-from nep.plugins import discover
 from nep.pubsub import SLICE_S, Publisher, Subscriber
 from nep.records import NodeRecord
 from nep.wire import check_topic
@@ -37,14 +37,6 @@ FLUSH_S = 2.0
 
 _alive: set[Node] = set()
 """Nodes live until they are closed or the interpreter ends: a publisher may outlive its node's variable."""
-
-
-def _backend(name: str) -> Backend:
-    backends = discover("nep.backends", "BACKEND", Backend)
-    for backend in backends.values():
-        if name.lower() in {backend.name, *backend.aliases}:
-            return backend
-    raise UnknownBackendError(name, sorted(backends))
 
 
 class Node:
@@ -69,7 +61,7 @@ class Node:
             raise NepError(f"'{name}' cannot be a node's name; use 1 to 200 letters")
         self.name = name
         self.id = secrets.token_hex(8)
-        self._backend = _backend(transport)
+        self._backend = backend_named(transport)
         self._master = master or ("memory" if self._backend.name == "memory" else master_address())
         if self._backend.name != "memory":
             self._master = master_address(self._master)

@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 
 from nep.errors import PluginsMissingError
 
-__all__ = ["Named", "discover"]
+__all__ = ["Named", "discover", "discover_own"]
 
 _logger = logging.getLogger("nep.plugins")
 
@@ -27,13 +27,8 @@ class Named(Protocol):
 T = TypeVar("T", bound=Named)
 
 
-def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """Name → plug-in: what the modules of `package` bind as `attribute`, and entry points of that group.
-
-    Modules that do not bind it are no plug-ins. A third party's entry point that fails is logged and left
-    out; it cannot replace one of ours. Raises `PluginsMissingError` when the package has none (a frozen build
-    that forgot it), `TypeError` when a module binds something else.
-    """
+def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
+    """As `discover`, without entry points: these are looked for in all that is installed, which takes long."""
     found: dict[str, T] = {}
     home = importlib.import_module(package)
     for info in pkgutil.iter_modules(home.__path__, f"{package}."):
@@ -45,6 +40,17 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
         found[bound.name] = bound
     if not found:
         raise PluginsMissingError(package, attribute)
+    return found
+
+
+def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
+    """Name → plug-in: what the modules of `package` bind as `attribute`, and entry points of that group.
+
+    Modules that do not bind it are no plug-ins. A third party's entry point that fails is logged and left
+    out; it cannot replace one of ours. Raises `PluginsMissingError` when the package has none (a frozen build
+    that forgot it), `TypeError` when a module binds something else.
+    """
+    found = dict(discover_own(package, attribute, kind))
     for point in entry_points(group=package):
         try:
             bound = point.load()

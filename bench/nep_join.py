@@ -1,0 +1,136 @@
+"""How long a program needs to join: a new node and its first publisher, with live and with killed subscribers.
+
+    python bench/nep_join.py [--subscribers 10] [--rounds 40]
+
+Every subscriber is a process of its own. `Node` and `new_pub` are timed together; when `new_pub` returns, the
+first message reaches every subscriber, so nothing else has to be waited for (and that is checked here).
+
+    live       all subscribers are there
+    killed     one more was there and has just been killed (SIGKILL); the master does not know yet
+    plain      a bound XPUB of plain pyzmq that waits until as many plain subscribers in as many processes have
+               connected: what processes and sockets cost without a master; "plain again" is the same again
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import time
+from contextlib import ExitStack
+
+import zmq
+from blocks import Child, is_trusted, other_process
+
+import nep
+
+SUBSCRIBER = """
+import os, sys, threading, zmq, nep
+node = nep.node("subscriber")
+sub = node.new_sub("join", "bytes")
+print(os.getpid(), flush=True)
+plain = zmq.Context().socket(zmq.SUB)
+plain.subscribe(b"")
+for line in sys.stdin:
+    what, _, port = line.strip().partition(" ")
+    if what == "heard":
+        message = sub.receive(2.0)
+        print("no" if message is None else bytes(message.data).decode(), flush=True)
+    elif what == "connect":
+        plain.connect("tcp://127.0.0.1:" + port)
+    elif what == "disconnect":
+        plain.disconnect("tcp://127.0.0.1:" + port)
+        print("done", flush=True)
+"""
+
+
+def join(master: str, name: str) -> tuple[float, nep.Node, nep.Publisher]:
+    """The time that a node with its first publisher takes, in seconds, and both."""
+    started = time.perf_counter()
+    node = nep.node(name, master=master)
+    publisher = node.new_pub("join", "bytes")
+    return time.perf_counter() - started, node, publisher
+
+
+def live(master: str, children: list[Child], number: int) -> float:
+    """Join with all subscribers alive; every one must get the first message."""
+    taken, node, publisher = join(master, f"joiner{number}")
+    publisher.publish(f"hello {number}".encode())
+    with node:
+        for child in children:
+            child.write("heard")
+        heard = [child.read() for child in children]
+        if heard != [f"hello {number}"] * len(children):
+            raise SystemExit(f"not everybody heard the first message: {heard}")
+    return taken
+
+
+def killed(master: str, children: list[Child], number: int) -> float:
+    """Join just after one more subscriber was killed."""
+    with other_process(SUBSCRIBER, (), master) as victim:
+        victim.read()
+        victim.kill()
+        return live(master, children, number)
+
+
+def plain(context: zmq.Context[zmq.Socket[bytes]], children: list[Child]) -> float:
+    """Bind, and wait for as many subscriptions as there are children that connect."""
+    started = time.perf_counter()
+    socket = context.socket(zmq.XPUB)
+    socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+    port = socket.bind_to_random_port("tcp://127.0.0.1")
+    for child in children:
+        child.write(f"connect {port}")
+    for _ in children:
+        socket.recv()
+    taken = time.perf_counter() - started
+    for child in children:
+        child.write(f"disconnect {port}")
+    for child in children:
+        child.read()
+    socket.close(0)
+    return taken
+
+
+def show(name: str, seconds: list[float]) -> float:
+    """Print a row; its median."""
+    ordered = sorted(seconds)
+    tail = ordered[min(len(ordered) - 1, round(0.95 * len(ordered)))]
+    median = statistics.median(ordered)
+    print(f"{name:>12} {median * 1e3:>9.2f} {tail * 1e3:>9.2f} {ordered[-1] * 1e3:>9.2f}", flush=True)
+    return median
+
+
+def main() -> int:
+    """Measure and print a table; 1 when a median is beyond its goal or the run does not count."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--subscribers", type=int, default=10)
+    parser.add_argument("--rounds", type=int, default=40)
+    arguments = parser.parse_args()
+    times: dict[str, list[float]] = {"plain": [], "plain again": [], "live": [], "killed": []}
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    with ExitStack() as stack:
+        master = stack.enter_context(nep.master("127.0.0.1:0", learn_s=0.0))
+        children = [
+            stack.enter_context(other_process(SUBSCRIBER, (), master.address))
+            for _ in range(arguments.subscribers)
+        ]
+        for child in children:
+            child.read()
+        live(master.address, children, 0)
+        for number in range(1, arguments.rounds + 1):
+            for name in ("plain", "plain again"):
+                times[name].append(plain(context, children))
+            times["live"].append(live(master.address, children, number))
+            times["killed"].append(killed(master.address, children, -number))
+    context.destroy(0)
+    print(f"{arguments.subscribers} subscriber processes; milliseconds for a node and its first publisher")
+    print(f"{'':>12} {'median':>9} {'p95':>9} {'most':>9}")
+    medians = {name: show(name, seconds) for name, seconds in times.items()}
+    again = medians["plain again"] / medians["plain"]
+    print(f"plain against itself: {again:.3f}{'' if is_trusted(again) else '; this run does NOT count'}")
+    return 0 if is_trusted(again) and medians["live"] <= 0.010 and medians["killed"] <= 0.025 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
