@@ -211,8 +211,10 @@ class TreeModel(QAbstractItemModel):
         if len(parts) <= first:
             return
         fresh = [_made(node, row, parts[row]) for row in range(first, len(parts))]
+        before, self._changing = self._changing, True  # who is told now must not fetch the same rows
         self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
         node.children.extend(fresh)
+        self._changing = before
         self.endInsertRows()
 
     def _fit(self, node: Node, loaded: list[Node], parts: Sequence[Part]) -> None:
