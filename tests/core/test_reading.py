@@ -1,0 +1,101 @@
+"""Large messages are read elsewhere: in another thread, the newest only."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from app.core import reading
+from app.core.lazy_json import LazyObject
+from app.core.reading import Reader, Reading, read
+from nep.message import Message
+
+WAIT_S = 10.0  # a busy computer may take long; the test ends as soon as it is there
+
+
+def message(data: bytes, codec: str = "json", seq: int = 1) -> Message:
+    return Message("/big", data, codec, codec, seq=seq)
+
+
+@pytest.fixture
+def reader() -> Iterator[Reader]:
+    made = Reader()
+    yield made
+    made.close()
+
+
+def taken(reader: Reader) -> Reading:
+    pause = threading.Event()
+    for _ in range(int(WAIT_S * 100)):
+        found = reader.take()
+        if found is not None:
+            return found
+        pause.wait(0.01)
+    raise AssertionError("nothing was read")
+
+
+def test_json_is_looked_into_and_other_messages_are_decoded() -> None:
+    found = read(message(b'{"a": [1, 2]}'))
+    assert isinstance(found.value, LazyObject)
+    assert found.index is not None
+    assert read(message(b"text", "string")).value == "text"
+    assert read(message(b"\xff", "string")).error is not None
+    assert read(message(b'{"a": ')).error == "its brackets do not match"
+
+
+def test_it_reads_in_another_thread(reader: Reader, monkeypatch) -> None:
+    threads: list[int] = []
+    before = reading.read
+
+    def watched(one: Message) -> Reading:
+        threads.append(threading.get_ident())
+        return before(one)
+
+    monkeypatch.setattr(reading, "read", watched)
+    reader.ask(message(json.dumps({"data": list(range(1000))}).encode()))
+    assert len(taken(reader).value["data"]) == 1000  # type: ignore[index, arg-type]
+    assert len(threads) == 1
+    assert threading.get_ident() not in threads
+
+
+def test_of_many_only_the_newest_is_read(reader: Reader, monkeypatch) -> None:
+    began, go_on, read_seqs = threading.Event(), threading.Event(), []
+
+    def slow(one: Message) -> Reading:
+        read_seqs.append(one.seq)
+        began.set()
+        go_on.wait(WAIT_S)
+        return Reading(one, one.seq)
+
+    monkeypatch.setattr(reading, "read", slow)
+    reader.ask(message(b"1", seq=1))
+    assert began.wait(WAIT_S)
+    for seq in range(2, 50):
+        reader.ask(message(b"1", seq=seq))
+    assert reader.busy
+    go_on.set()
+    found = taken(reader)
+    while found.value != 49:
+        found = taken(reader)
+    assert read_seqs == [1, 49]
+
+
+def test_what_nobody_wants_any_more_is_not_given(reader: Reader, monkeypatch) -> None:
+    began, go_on = threading.Event(), threading.Event()
+
+    def slow(one: Message) -> Reading:
+        began.set()
+        go_on.wait(WAIT_S)
+        return Reading(one, one.seq)
+
+    monkeypatch.setattr(reading, "read", slow)
+    reader.ask(message(b"1", seq=1))
+    assert began.wait(WAIT_S)
+    reader.forget()
+    assert not reader.busy
+    go_on.set()
+    reader.ask(message(b"1", seq=2))
+    assert taken(reader).value == 2
