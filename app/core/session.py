@@ -16,6 +16,7 @@ from app.core.arrivals import arrivals
 from app.core.checks import Checks
 from app.core.companions import CompanionFailed, Companions
 from app.core.console import Console
+from app.core.doctor import doctor_of
 from app.core.document import Document
 from app.core.documents import Documents
 from app.core.fleet import Fleet
@@ -88,6 +89,7 @@ class Session:
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
         self.companions = Companions(self.address, self._mailbox.post_event)
+        self.doctor = doctor_of(self.address, self.settings.path.parent)
         self.runs = Runs(
             self.documents,
             self.fleet,
@@ -163,6 +165,7 @@ class Session:
         if self.stopper is not None:
             self.stopper.close()
         self.images.close()
+        self.doctor.close()
         self.source.close()
         self.companions.close()
 

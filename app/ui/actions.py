@@ -79,6 +79,7 @@ TABLE: tuple[Row, ...] = (
     Row("robots.show", "Robots", "Try what a robot can do", "", "eye", above=True),
     Row("robots.ask", "Robots", "Ask again before real robots move", "", "footprints"),
     Row("help.shortcuts", "Help", "Keyboard shortcuts", "F1", "keyboard"),
+    Row("help.doctor", "Help", "Connection doctor", "", "stethoscope"),
     Row("help.about", "Help", "About NEP Studio", "", "info"),
 )
 

@@ -93,6 +93,7 @@ class Commands:
             "robots.turtle": self._virtual_turtle,
             "robots.ask": self._ask_before_moving,
             "robots.show": lambda: window.open_panel("robots"),
+            "help.doctor": self._doctor,
             "help.about": lambda: self._sheet("NEP Studio", [(line, "") for line in ABOUT]),
         }
 
@@ -203,6 +204,13 @@ class Commands:
     def _ask_before_moving(self) -> None:
         self._session.fleet.moving.forget()
         self._window.toast.say("Studio asks again before a real robot moves")
+
+    def _doctor(self) -> None:
+        self._session.doctor.look()
+        if self._window.bench is None:
+            self._open_in("developer", "doctor")
+        else:
+            self._window.open_panel("doctor")
 
     def _sheet(self, title: str, lines: list[tuple[str, str]]) -> None:
         Sheet(self._window.theme, self._window, title, lines).show_over()

@@ -24,6 +24,7 @@ from app.core.pictures import Picture
 from app.robots.inputs import Choice, Parameter
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
 from app.robots.parts import Topics as RobotTopics
+from nep.doctor import Finding
 from nep.message import Message
 from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
@@ -349,6 +350,25 @@ class Documents:
         return self.current.definitions()
 
 
+class Doctor:
+    """Finds what the test says, at once."""
+
+    def __init__(self, calls: list[tuple[object, ...]]) -> None:
+        self.calls = calls
+        self.found: tuple[Finding, ...] = ()
+        self.findings: tuple[Finding, ...] = ()
+        self.looking = False
+        self.looked_s: float | None = None
+        self.revision = 0
+
+    def look(self) -> None:
+        self.calls.append(("look",))
+        self.findings, self.looked_s, self.revision = self.found, 1_795_164_093.0, self.revision + 1
+
+    def close(self) -> None:
+        """Nothing goes on."""
+
+
 class Session:
     """Has nothing: no master, no topic, no robot, an empty behaviour."""
 
@@ -358,6 +378,7 @@ class Session:
         self.topics = Topics()
         self.nodes = Nodes()
         self.alerts = Alerts()
+        self.doctor = Doctor(self.calls)
         self.console = Console()
         self.fleet = Fleet(self.calls)
         self.images = Images()
@@ -426,6 +447,7 @@ class Session:
         session.nodes.update(nodes_seen(1), 0.0)
         session.nodes.update(nodes_seen(2), 1.0)
         session.nodes.age(5.2)
+        session.doctor.found = FOUND
         link = session.fleet.join(RobotLink("Pepper", pepper()))
         link.values.update(
             head_touched=False, distance=0.82, battery=84, sees_face=True, sound=34.0, heard_word="hello",
@@ -473,6 +495,22 @@ LOG = (
     (1, "info", "greeting", "turn left by 30° succeeded (1.84 s)"),
     (0, "info", "greeting", "say “Touch my head.” started"),
 )
+
+
+FOUND = (
+    Finding(
+        "master:foreign", "error", "Port 7780 is held by “python3 server.py” (process 77), which is no master.",
+        "End that program, or start the master on port 7781 and tell it to all programs"
+        " (NEP_MASTER=127.0.0.1:7781).", "nep master --port 7781",
+    ),
+    Finding(
+        "port:7000", "warning", "The AirPlay Receiver holds port 7000, where programs of nep up to 0.5.4.5,"
+        " nep-js and C# ask.", "Switch it off in the system settings, under General, AirDrop & Handoff.",
+    ),
+    Finding("versions", "info", "NEP Studio 0.1.0, Python 3.11.7, pyzmq 27.3.0, libzmq 4.3.5, Linux 6.18."),
+    Finding("loopback", "ok", "Programs of this computer can reach each other (127.0.0.1)."),
+    Finding("files", "ok", "A program may open 20000 files."),
+)  # fmt: skip
 
 
 def topics() -> list[Topic]:

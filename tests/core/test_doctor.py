@@ -1,0 +1,55 @@
+"""The doctor beside the window: looks in its own thread, one look at a time, and never vanishes."""
+
+from __future__ import annotations
+
+import socket
+import threading
+
+from app.core.doctor import Doctor, doctor_of
+from nep.doctor import Finding
+
+FINE = Finding("master", "ok", "A master runs.")
+
+
+def test_it_looks_beside_the_window_and_keeps_what_it_found() -> None:
+    go_on = threading.Event()
+    looks = []
+
+    def look() -> list[Finding]:
+        looks.append(threading.current_thread().name)
+        go_on.wait(5)
+        return [FINE]
+
+    doctor = Doctor(look, lambda: 7.0)
+    assert (doctor.looking, doctor.looked_s, doctor.findings) == (False, None, ())
+    doctor.look()
+    doctor.look()  # it looks already
+    assert doctor.looking
+    go_on.set()
+    doctor.close()
+    assert looks == ["studio-doctor"]
+    assert (doctor.looking, doctor.looked_s, doctor.findings) == (False, 7.0, (FINE,))
+    assert doctor.revision == 2
+
+
+def test_a_doctor_that_breaks_off_says_so() -> None:
+    def look() -> list[Finding]:
+        raise ValueError("no such luck")
+
+    doctor = Doctor(look)
+    doctor.look()
+    doctor.close()
+    assert doctor.findings[0].severity == "error"
+    assert "ValueError: no such luck" in doctor.findings[0].sentence
+
+
+def test_studios_own_folder_is_looked_at(tmp_path) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    doctor = doctor_of(address, tmp_path)
+    doctor.look()
+    doctor.close()
+    found = {finding.id: finding for finding in doctor.findings}
+    assert found["master:none"].severity == "error"
+    assert found[f"folder:{tmp_path}"].severity == "ok"
