@@ -1,4 +1,4 @@
-"""The benchmarks of the wire, one after the other.
+"""The benchmarks, one after the other.
 
     python tools/bench.py                       all of them
     python tools/bench.py nep_rate -- ARGS      one; what comes after -- goes to it
@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 BENCH = Path(__file__).resolve().parent.parent / "bench"
-NAMES = ("nep_roundtrip", "nep_rate")
+NAMES = ("nep_roundtrip", "nep_rate", "studio_load", "studio_images", "studio_topics", "studio_start")
 
 
 def main() -> int:

@@ -20,6 +20,9 @@ from nep.pubsub import Subscriber
 from nep.views import GraphView
 
 POLL_S = 0.4
+POLL_PAUSE = 5.0
+"""Where telling the graph takes long (10 000 topics: 0.4 s) the pause is so many times as long, at most:"""
+POLL_SLOWEST_S = 3.0
 NODE_NAME = "studio"
 
 Sink = Callable[[str, Sequence[Message]], None]
@@ -167,8 +170,9 @@ class LiveSource:
                 if self._node is None and not self._join():
                     self._closing.wait(POLL_S)
                     continue
-                self._ask()
-                self._do_jobs(time.monotonic() + POLL_S)
+                asked_s = self._ask()
+                pause_s = max(POLL_S, min(POLL_SLOWEST_S, POLL_PAUSE * asked_s))
+                self._do_jobs(time.monotonic() + pause_s)
         finally:
             for _, subscriber in self._subscribers.values():
                 subscriber.close()
@@ -191,21 +195,24 @@ class LiveSource:
             self._found = False
             self._post_event(MasterLost(self.address, sentence))
 
-    def _ask(self) -> None:
+    def _ask(self) -> float:
+        """Ask for the graph; how long the answer took, 0.0 when there was none."""
         if self._node is None:
-            return
+            return 0.0
         asked = time.monotonic()
         try:
             view = self._node.graph(timeout_s=1.0)
         except NepError as error:
             self._lost(str(error))
-            return
+            return 0.0
+        asked_s = time.monotonic() - asked
         if self._found is not True:
             self._found = True
             self._post_event(MasterFound(self.address))
-        self._post_event(GraphSeen(view, time.monotonic() - asked))
+        self._post_event(GraphSeen(view, asked_s))
         self._view = view
         self._reconcile()
+        return asked_s
 
     def _do_jobs(self, until: float) -> None:
         while not self._closing.is_set() and self._node is not None:

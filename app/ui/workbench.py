@@ -224,9 +224,11 @@ class Workbench(QMainWindow):
 
     # -- the tick ---------------------------------------------------------------------------------
 
-    def refresh(self) -> None:
-        """Let every panel that can be seen show what is new."""
+    def refresh(self, *, pictures: bool = False) -> None:
+        """Let every panel that can be seen show what is new, or only those with ``pictures``."""
         for name, dock in self.docks.items():
+            if pictures and not dock.panel.shows_pictures:
+                continue
             sentence = dock.refresh()
             if sentence is not None:
                 self.panel_failed.emit(name, sentence)

@@ -69,6 +69,8 @@ class PanelWidget(QWidget):
     """
 
     title_changed = Signal()
+    shows_pictures = False
+    """Whether `refresh` is called 60 times a second, so that no picture of 30 a second is passed over."""
 
     def __init__(self, context: PanelContext, title: str) -> None:
         """A panel called ``title``."""

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 class CameraPanel(PanelWidget):
     """The camera of the first robot that has one."""
 
+    shows_pictures = True
+
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Camera")
         self._robot = ""

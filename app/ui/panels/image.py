@@ -29,6 +29,8 @@ CODEC = "image"
 class ImagePanel(PanelWidget):
     """One picture stream; the first one that there is, until a person chooses another in the title."""
 
+    shows_pictures = True
+
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Image")
         self._topic = ""

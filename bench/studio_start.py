@@ -1,0 +1,183 @@
+"""How long Studio takes to start: to a window that can be used, and to the block editor.
+
+    python bench/studio_start.py [--times 7] [--imports]
+
+Each start is a process of its own, on a home of its own, and its times are counted from the moment the
+process was asked for. "window" is the first paint of the window, "usable" the first turn of its event loop
+after it (a click is answered from then on), "master" the first answer of a master that Studio started itself,
+"editor" the block editor's page, up with its blocks. "plain" is a Qt window with one label, and "plain again"
+tells how far to trust the rest. --imports lists what takes longest to import.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import psutil
+
+ROOT = Path(__file__).resolve().parents[1]
+USABLE_S, EDITOR_S, TRUSTED = 0.8, 1.5, 0.1
+STAGES = ("python", "imports", "application", "session", "built", "window", "usable", "master", "editor")
+
+PLAIN = """
+import json, sys, time
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication, QLabel
+class Label(QLabel):
+    def paintEvent(self, event):
+        super().paintEvent(event)
+        QTimer.singleShot(0, lambda: (print(json.dumps({"usable": time.time()}), flush=True), app.quit()))
+app = QApplication([])
+label = Label("Studio")
+label.resize(1440, 900)
+label.show()
+app.exec()
+"""
+
+STUDIO = """
+import gc, json, sys, time
+at = {"python": time.time()}
+gc.disable()  # as `app.__main__` does
+from app.ui import application as module
+from PySide6.QtCore import QEvent, QObject, QTimer
+at["imports"] = time.time()
+module.messages.listen()
+app = module.make_application()
+at["application"] = time.time()
+session = module.Session()
+at["session"] = time.time()
+window, commands = module.make_window(session, module.Options(new_window=True))
+at["built"] = time.time()
+class Eyes(QObject):
+    def eventFilter(self, watched, event):
+        if event.type() == QEvent.Type.Paint and "window" not in at and watched is window:
+            at["window"] = time.time()
+            QTimer.singleShot(0, usable)
+        return False
+eyes = Eyes()
+window.installEventFilter(eyes)
+def usable():
+    at["usable"] = time.time()
+    window.removeEventFilter(eyes)
+    if sys.argv[1] == "editor":
+        commands.run("layout.behaviour")
+def look():
+    if "master" not in at and session.master.kind == "connected":
+        at["master"] = time.time()
+    bench = window.benches.get("behaviour")
+    panel = bench.docks["behaviour"].panel if bench is not None else None
+    editor = getattr(panel, "editor", None)
+    if editor is not None and "editor" not in at and editor.is_ready:
+        at["editor"] = time.time()
+    if "master" in at and "usable" in at and ("editor" in at or sys.argv[1] != "editor"):
+        print(json.dumps(at), flush=True)
+        window.close()
+        app.quit()
+looking = QTimer()
+looking.timeout.connect(look)
+looking.start(10)
+window.show()
+window.begin()
+app.exec()
+"""
+
+
+def environ_with(compiled: str) -> dict[str, str]:
+    """The environment of a start: modules are compiled once, as on a person's computer, into this folder."""
+    environ = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    environ.update(PYTHONPATH=str(ROOT), PYTHONPYCACHEPREFIX=compiled)
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
+    return environ
+
+
+def once(compiled: str, program: str, *arguments: str) -> dict[str, float]:
+    """One start; the stages in seconds after the process was asked for."""
+    with socket.socket() as probe, tempfile.TemporaryDirectory(prefix="nep-start-") as home:
+        probe.bind(("127.0.0.1", 0))
+        environ = {
+            **environ_with(compiled),
+            "NEP_STUDIO_HOME": home,
+            "NEP_MASTER": f"127.0.0.1:{probe.getsockname()[1]}",
+            "NEP_GATEWAY": "0",
+        }
+        probe.close()
+        began = time.time()
+        done = subprocess.run(
+            [sys.executable, "-c", program, *arguments],
+            env=environ,
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    if not lines:
+        raise SystemExit(f"a start failed:\n{done.stderr[-2000:]}")
+    return {stage: moment - began for stage, moment in json.loads(lines[-1]).items()}
+
+
+def medians(starts: list[dict[str, float]]) -> dict[str, float]:
+    """The median of each stage."""
+    return {stage: statistics.median(each[stage] for each in starts) for stage in starts[0]}
+
+
+def imports() -> None:
+    """List the modules that take longest to import by themselves."""
+    command = [sys.executable, "-X", "importtime", "-c", "import app.ui.application"]
+    with tempfile.TemporaryDirectory(prefix="nep-pyc-") as compiled:
+        for _ in range(2):  # the first time compiles
+            done = subprocess.run(
+                command, cwd=ROOT, capture_output=True, text=True, check=True, env=environ_with(compiled)
+            )
+    rows = []
+    for line in done.stderr.splitlines():
+        parts = line.removeprefix("import time:").split("|")
+        if len(parts) == 3 and parts[0].strip().isdigit():
+            rows.append((int(parts[0]), int(parts[1]), parts[2].strip()))
+    print(f"{'own ms':>8} {'all ms':>8}")
+    for own, all_of_it, name in sorted(rows, reverse=True)[:25]:
+        print(f"{own / 1000:>8.1f} {all_of_it / 1000:>8.1f}  {name}")
+
+
+def main() -> int:
+    """Measure, print a table; 0 when the goals were reached and the run counts."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--times", type=int, default=7)
+    parser.add_argument("--imports", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.imports:
+        imports()
+        return 0
+    taken: dict[str, list[dict[str, float]]] = {"plain": [], "plain again": [], "window": [], "editor": []}
+    with tempfile.TemporaryDirectory(prefix="nep-pyc-") as compiled:
+        once(compiled, STUDIO, "editor")  # the first start compiles, and reads everything from the disk
+        for _ in range(arguments.times):
+            for name, starts in taken.items():
+                plain = name.startswith("plain")
+                starts.append(once(compiled, PLAIN) if plain else once(compiled, STUDIO, name))
+    found = {name: medians(starts) for name, starts in taken.items()}
+    print(f"{'s after the start':>18} " + " ".join(f"{stage:>11}" for stage in STAGES))
+    for name, row in found.items():
+        print(f"{name:>18} " + " ".join(f"{row[s]:>11.2f}" if s in row else f"{'':>11}" for s in STAGES))
+    usable, editor = found["window"]["usable"], found["editor"]["editor"]
+    again = found["plain again"]["usable"] / found["plain"]["usable"]
+    counts = abs(again - 1.0) <= TRUSTED
+    print(f"plain against itself: {again:.2f}; this run {'counts' if counts else 'does NOT count'}")
+    print(f"{psutil.getloadavg()[0]:.1f} programs wanted {psutil.cpu_count()} processors in the last minute")
+    print(f"goals: usable {usable:.2f} s of {USABLE_S:g} s, editor {editor:.2f} s of {EDITOR_S:g} s")
+    return 0 if counts and usable <= USABLE_S and editor <= EDITOR_S else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

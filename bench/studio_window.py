@@ -1,0 +1,271 @@
+"""What the benchmarks of the window share: the real window in this process, publishers in others, meters."""
+
+from __future__ import annotations
+
+import gc
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import psutil
+from PySide6.QtCore import QEventLoop, Qt, QTimer
+
+from app.core.session import Session
+from app.core.settings import Settings
+from app.ui import messages
+from app.ui.application import Options, make_application, make_window
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+from nep.masters import start_process
+
+__all__ = [
+    "BARE",
+    "Child",
+    "Meter",
+    "Row",
+    "Studio",
+    "child",
+    "network",
+    "percentile",
+    "run_for",
+    "studio",
+    "until",
+    "verdict",
+]
+
+ROOT = Path(__file__).resolve().parents[1]
+LOOK_MS = 20
+TIMER_MS = 10
+TRUSTED_MS = 5.0
+
+
+@dataclass
+class Studio:
+    """The window that is measured, and what it is made of."""
+
+    window: MainWindow
+    commands: Commands
+    session: Session
+
+
+@contextmanager
+def network() -> Iterator[str]:
+    """A master in a process of its own, as Studio starts one, and our QApplication; the master's address."""
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
+    os.environ["NEP_GATEWAY"] = "0"  # its ports exist once on a computer
+    messages.listen()
+    make_application()
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    master = start_process(address, os.getpid())
+    try:
+        yield address
+    finally:
+        master.kill()
+        master.wait()
+
+
+@contextmanager
+def studio(address: str, layout: str = "developer") -> Iterator[Studio]:
+    """The real window at its real size, on a home of its own; it joins the master at `address`."""
+    with tempfile.TemporaryDirectory(prefix="nep-bench-") as home:
+        os.environ["NEP_STUDIO_HOME"] = home
+        session = Session(
+            Settings(Path(home)), address=address, journal_folder=Path(home), start_companions=False
+        )
+        window, commands = make_window(session, Options(theme="light", new_window=True))
+        window.show()
+        window.begin()
+        commands.run(f"layout.{layout}")
+        try:
+            yield Studio(window, commands, session)
+        finally:
+            window.close()
+            run_for(0.05)
+
+
+def run_for(seconds: float) -> None:
+    """Let the window live for so long."""
+    loop, timer = QEventLoop(), QTimer()
+    timer.setTimerType(Qt.TimerType.PreciseTimer)
+    timer.setSingleShot(True)
+    timer.timeout.connect(loop.quit)
+    timer.start(round(seconds * 1000))
+    loop.exec()
+
+
+def until(true: Callable[[], object], what: str, within_s: float = 20.0) -> None:
+    """Let the window live until it is true; ends the program with `what` when it never is."""
+    end = time.monotonic() + within_s
+    while not true():
+        if time.monotonic() > end:
+            raise SystemExit(f"not within {within_s:g} s: {what}")
+        run_for(LOOK_MS / 1000)
+
+
+class Child:
+    """Another process of ours: one line asks, one line answers, while the window lives."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self.process = process
+        self._buffer = b""
+        assert process.stdout is not None
+        os.set_blocking(process.stdout.fileno(), False)
+
+    def tell(self, line: str) -> None:
+        """Ask; the answer may be read later."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(line.encode() + b"\n")
+        self.process.stdin.flush()
+
+    def answer(self, within_s: float = 60.0) -> str:
+        """The next line that it says; the window lives meanwhile."""
+        until(self._has_line, "another process answers", within_s)
+        line, _, self._buffer = self._buffer.partition(b"\n")
+        return line.decode()
+
+    def _has_line(self) -> bool:
+        assert self.process.stdout is not None
+        part = self.process.stdout.read()
+        if part == b"":
+            raise SystemExit("another process of the benchmark has ended")
+        self._buffer += part or b""
+        return b"\n" in self._buffer
+
+
+@contextmanager
+def child(program: str, arguments: Sequence[str], master: str) -> Iterator[Child]:
+    """A Python process that runs `program`; killed at the end."""
+    environment = {**os.environ, "NEP_MASTER": master, "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=environment,
+    )
+    try:
+        yield Child(process)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def percentile(values: Sequence[float], percent: float) -> float:
+    """The value below which so many percent of them are; 0.0 of none."""
+    if not values:
+        return 0.0
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(len(ordered) * percent / 100))]
+
+
+@dataclass
+class Row:
+    """What was measured over a while. Shares are of one core, times in ms, memory in MB."""
+
+    seconds: float
+    gui: float
+    ticks: float
+    panels: float
+    process: float
+    late_p50: float
+    late_p99: float
+    late_max: float
+    memory: float
+
+
+@dataclass
+class Meter:
+    """Measures the window while it lives: processor time of the thread that paints, and how late a timer is.
+
+    `ticks` is the session's part of the tick, `panels` the panels' `refresh`; both are part of `gui`, which
+    also has the painting.
+    """
+
+    studio: Studio
+    late: list[float] = field(default_factory=list)
+    _parts: dict[str, float] = field(default_factory=lambda: {"tick": 0.0, "refresh": 0.0})
+
+    def __post_init__(self) -> None:
+        session, window = self.studio.session, self.studio.window
+        session.tick = self._timed("tick", session.tick)  # type: ignore[method-assign]
+        bench = window.bench
+        if bench is not None:
+            bench.refresh = self._timed("refresh", bench.refresh)  # type: ignore[method-assign]
+
+    def _timed(self, part: str, does: Callable[..., None]) -> Callable[..., None]:
+        def timed(**given: bool) -> None:
+            began = time.thread_time()
+            does(**given)
+            self._parts[part] += time.thread_time() - began
+
+        return timed
+
+    def measure(self, seconds: float) -> Row:
+        """Let the window live for so long; what it took."""
+        gc.collect()
+        self.late.clear()
+        self._parts = dict.fromkeys(self._parts, 0.0)
+        process = psutil.Process()
+        timer = QTimer()
+        timer.setTimerType(Qt.TimerType.PreciseTimer)
+        timer.setInterval(TIMER_MS)
+        expected = [time.perf_counter() + TIMER_MS / 1000]
+
+        def came() -> None:
+            now = time.perf_counter()
+            self.late.append(max(0.0, (now - expected[0]) * 1000))
+            expected[0] = now + TIMER_MS / 1000
+
+        timer.timeout.connect(came)
+        began, gui, used = time.perf_counter(), time.thread_time(), time.process_time()
+        timer.start()
+        run_for(seconds)
+        timer.stop()
+        took = time.perf_counter() - began
+        return Row(
+            took,
+            (time.thread_time() - gui) / took,
+            self._parts["tick"] / took,
+            self._parts["refresh"] / took,
+            (time.process_time() - used) / took,
+            statistics.median(self.late) if self.late else 0.0,
+            percentile(self.late, 99),
+            max(self.late, default=0.0),
+            process.memory_info().rss / 1e6,
+        )
+
+
+BARE = """
+import sys, threading, time
+pause = threading.Event()
+print("ready", flush=True)
+for line in sys.stdin:
+    late, end = [], time.perf_counter() + float(line)
+    while (began := time.perf_counter()) < end:
+        pause.wait(0.01)
+        late.append(max(0.0, (time.perf_counter() - began - 0.01) * 1000))
+    late.sort()
+    print(late[int(len(late) * 0.99)] if late else 0.0, flush=True)
+"""
+"""A program that does nothing but wait 10 ms again and again: how late the computer itself is."""
+
+
+def verdict(reached: bool, bare_ms: float) -> int:
+    """Say whether the run counts and whether every goal was reached; the exit code is 0 only for both."""
+    counts = bare_ms <= TRUSTED_MS
+    print(
+        f"a program that only waits was late by {bare_ms:.1f} ms (p99): "
+        + ("this run counts" if counts else f"this run does NOT count (at most {TRUSTED_MS:g} ms would)")
+    )
+    print("every goal was reached" if reached else "NOT every goal was reached")
+    return 0 if reached and counts else 1

@@ -1,0 +1,22 @@
+"""Panels with pictures are refreshed twice in a tick, the others once."""
+
+from __future__ import annotations
+
+from app.ui.main_window import MainWindow
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+def test_pictures_are_refreshed_twice_as_often(qtbot, window: MainWindow, commands: object) -> None:
+    window.show()
+    window.show_layout("developer")
+    bench = window.bench
+    assert bench is not None
+    image, topics = bench.docks["image"], bench.docks["topics"]
+    qtbot.waitUntil(lambda: image.shown() and topics.shown())
+    image.panel.shows_pictures = True
+    before = image.panel.refreshed, topics.panel.refreshed  # type: ignore[attr-defined]
+    for _ in range(10):
+        window.timer.timeout.emit()
+    assert image.panel.refreshed == before[0] + 10  # type: ignore[attr-defined]
+    assert topics.panel.refreshed == before[1] + 5  # type: ignore[attr-defined]
