@@ -41,6 +41,16 @@ def same(one: object, other: object) -> bool:
     return _deeply(lambda: one == other)
 
 
+def start_deep(thread: threading.Thread) -> None:
+    """Start a thread that may go as deep as a long stack of blocks."""
+    with _one_at_a_time:
+        size = threading.stack_size(STACK_BYTES)
+        try:
+            thread.start()
+        finally:
+            threading.stack_size(size)
+
+
 def _deeply(work: Callable[[], T]) -> T:
     try:
         return work()

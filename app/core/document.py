@@ -7,19 +7,36 @@ import itertools
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.mend import mend
 from app.core import deep_json
 from app.core.behaviour_file import TOO_DEEP, BehaviourFile, Descriptions, Workspace, read_file, write_file
+from app.core.beside import Beside
 from app.core.journal import Journal, Unsaved
 from app.errors import DescriptionError, DocumentError
 from app.robots.description import Robot, parse
 
 UNNAMED = "New behaviour"
 
+QUICK_S = 0.02
+"""A behaviour that compiles faster than this is compiled at once, in the window's thread."""
+LONG_CHARACTERS = 20_000
+Key = tuple[int, int, int]
+
 _keys = itertools.count(1)
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A program, what it was made of, and how long that took."""
+
+    key: Key
+    program: Program
+    seconds: float
 
 
 class Document:
@@ -35,6 +52,7 @@ class Document:
         """Start with an empty new behaviour; ``journal`` makes the journal of each."""
         self._make_journal = journal
         self._clock = clock
+        self._timer = time.perf_counter
         self._journal = journal()
         self.key = f"behaviour-{next(_keys)}"
         self.path: Path | None = None
@@ -50,7 +68,10 @@ class Document:
         self.definitions_revision = 0
         self._connected: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
-        self._compiled: tuple[tuple[int, int, int], Program] | None = None
+        self._compiled: tuple[Key, Program] | None = None
+        self._compile_s = 0.0
+        self._asked: Key | None = None
+        self.beside: Beside[Compiled] | None = None
         self._definitions: tuple[int, Mapping[str, object]] | None = None
         self.journal_error: str | None = None
 
@@ -154,11 +175,48 @@ class Document:
 
     def program(self) -> Program:
         """The blocks as a program, for the robots known now; compiled once for each edit."""
-        key = (self.revision, self.edits, self.definitions_revision)
+        key = self._key()
         if self._compiled is None or self._compiled[0] != key:
-            made = compile_behaviour(self.workspace, self._connected, absent=self.absent, name=self.name)
-            self._compiled = (key, made)
+            began = self._timer()
+            self._compiled = (key, self._compiling()())
+            self._compile_s = self._timer() - began
         return self._compiled[1]
+
+    def newest(self) -> Program | None:
+        """The program of the newest edit that is compiled; a long one is compiled beside the window.
+
+        So it may be that of an edit before, and None when a long behaviour has just been opened.
+        """
+        key = self._key()
+        if self._compiled is not None and self._compiled[0] == key:
+            return self._compiled[1]
+        if self.beside is None or (self._compile_s < QUICK_S and not self._is_long()):
+            return self.program()
+        done = self.beside.take(self.key)
+        if done is not None:
+            self._compiled, self._compile_s = (done.key, done.program), done.seconds
+        if self._asked != key:
+            self._asked = key
+            self.beside.ask(self.key, partial(_compiled, key, self._compiling(), self._timer))
+        return self._compiled[1] if self._compiled is not None else None
+
+    def _key(self) -> Key:
+        return self.revision, self.edits, self.definitions_revision
+
+    def _compiling(self) -> Callable[[], Program]:
+        """The compilation of what is here now; it may run in any thread."""
+        return partial(compile_behaviour, self.workspace, self._connected, absent=self.absent, name=self.name)
+
+    def _is_long(self) -> bool:
+        """Whether a behaviour that was never compiled is worth a thread: its file is long."""
+        if self._compiled is not None:
+            return False
+        inner = self.workspace.get("blocks")
+        tops = inner.get("blocks") if isinstance(inner, Mapping) else None
+        try:
+            return len(repr(tops)) > LONG_CHARACTERS
+        except RecursionError:
+            return True
 
     def problems(self) -> tuple[Problem, ...]:
         """What the compiler says of the blocks."""
@@ -206,6 +264,11 @@ class Document:
     def _known(self) -> list[Robot]:
         found = (_parsed(description) for description in self.robots.values())
         return [robot for robot in found if robot is not None]
+
+
+def _compiled(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> Compiled:
+    began = timer()
+    return Compiled(key, compiling(), timer() - began)
 
 
 def _parsed(description: Mapping[str, object]) -> Robot | None:

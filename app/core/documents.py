@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from app.blocks import editor_definitions
-from app.core.document import UNNAMED, Document
+from app.core.beside import Beside
+from app.core.document import UNNAMED, Compiled, Document
 from app.core.journal import Unsaved
 from app.errors import DocumentError
 from app.robots.description import Robot
@@ -26,8 +27,9 @@ class Documents:
         self._robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
         self._closed: list[Path] = []
+        self._beside: Beside[Compiled] = Beside("studio-compiler")
         self.revision = 0
-        self.current = make()
+        self.current = self._made()
         self._open = [self.current]
 
     def __iter__(self) -> Iterator[Document]:
@@ -107,6 +109,7 @@ class Documents:
             self._closed = [*(each for each in self._closed if each != document.path), document.path]
             del self._closed[:-CLOSED_KEPT]
         document.close()
+        self._beside.forget(document.key)
         self._open.remove(document)
         if not self._open:
             self._open.append(self._made())
@@ -165,6 +168,7 @@ class Documents:
         """The window closes; unsaved work stays in the journals."""
         for document in self._open:
             document.close()
+        self._beside.close()
 
     # -- from one start to the next ----------------------------------------------------------------------
 
@@ -214,6 +218,7 @@ class Documents:
 
     def _made(self) -> Document:
         made = self._make()
+        made.beside = self._beside
         made.set_connected(self._robots)
         made.set_topics(self._topics)
         return made

@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 
 from app.core.behaviour_file import LARGEST_BYTES
-from app.core.document import Document, read
+from app.core.beside import Beside
+from app.core.document import Compiled, Document, read
 from app.core.journal import Journal, left_behind
 from app.errors import DocumentError
 from app.robots import rize
+from tests.blocks.fakes import until
 
 EMPTY: dict[str, object] = {}
 STARTED: dict[str, object] = {
@@ -209,3 +211,31 @@ def test_definitions_follow_the_robots(document: Document) -> None:
     document.set_connected([rize.robot("Pepper")])
     assert document.definitions_revision > revision
     assert "Pepper" in json.dumps(document.definitions())
+
+
+def _many(count: int) -> dict[str, object]:
+    tops = [{"type": "events_started", "id": f"s{number}", "x": 0, "y": number} for number in range(count)]
+    return {"blocks": {"languageVersion": 0, "blocks": tops}}
+
+
+def test_a_long_behaviour_is_compiled_beside_the_window(document: Document) -> None:
+    beside: Beside[Compiled] = Beside("test compiler")
+    document.beside = beside
+    document.edited(_many(800))
+    assert document.newest() is None, "nothing waits for it"
+    until(lambda: document.newest() is not None)
+    first = document.newest()
+    document._compile_s = 1.0
+    document.edited(_many(801))
+    assert document.newest() is first, "the one before, meanwhile"
+    until(lambda: document.newest() is not first)
+    assert document.newest() is document.program()
+    beside.close()
+
+
+def test_a_short_behaviour_is_compiled_at_once(document: Document) -> None:
+    beside: Beside[Compiled] = Beside("test compiler")
+    document.beside = beside
+    document.edited(STARTED)
+    assert document.newest() is document.program()
+    assert beside._thread is None

@@ -307,6 +307,7 @@ class Document:
         self.known: Callable[[], list[Robot]] = list
         self.source = ""
         self.compiled = 0
+        self._newest: tuple[object, SimpleNamespace] | None = None
         self.absent_blocks: tuple[str, ...] = ("b8", "b9")
 
     def edited(self, workspace: Mapping[str, object]) -> None:
@@ -318,6 +319,12 @@ class Document:
         return SimpleNamespace(
             source=self.source, problems=self.found, sensors=self.sensors, absent=self.absent_blocks
         )
+
+    def newest(self) -> SimpleNamespace:
+        key = (self.revision, self.edits, self.definitions_revision)
+        if self._newest is None or self._newest[0] != key:
+            self._newest = (key, self.program())
+        return self._newest[1]
 
     def problems(self) -> tuple[Problem, ...]:
         return self.found

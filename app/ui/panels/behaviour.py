@@ -18,6 +18,7 @@ from app.ui.sensor_words import reading_of
 from app.ui.widgets import EmptyAction, EmptyState
 
 if TYPE_CHECKING:
+    from app.blocks import Program
     from app.core.document import Document
     from app.core.runs import Runs
     from app.core.watches import Watch
@@ -90,8 +91,10 @@ class BehaviourPanel(PanelWidget):
         if self._new("definitions", documents.definitions_revision):
             self.editor.set_definitions(documents.definitions())
         self._show_blocks(self.editor)
-        if self._new("facts", (document.revision, document.edits, document.definitions_revision)):
-            self._program_changed()
+        program = document.newest()
+        if program is not None and program is not self._shown.get("facts"):
+            self._shown["facts"] = program
+            self._program_changed(program)
         mine = runs.document is document
         if self._new("blocks", (runs.blocks_revision, mine)):
             self.editor.highlight(runs.running_blocks if mine else ())
@@ -143,9 +146,8 @@ class BehaviourPanel(PanelWidget):
                 editor.setFocus(Qt.FocusReason.OtherFocusReason)
         return editor
 
-    def _program_changed(self) -> None:
+    def _program_changed(self, program: Program) -> None:
         """The program is another one: its problems, the sensors it reads, its text."""
-        program = self.session.document.program()
         if self.editor is not None:
             self.editor.set_absent(program.absent)
         self._sensors = tuple(program.sensors)

@@ -1,0 +1,71 @@
+"""Work beside the window: the newest counts, failures come back, the thread ends."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from app.core.beside import Beside
+from tests.blocks.fakes import until
+
+
+@pytest.fixture
+def beside() -> Iterator[Beside[str]]:
+    made: Beside[str] = Beside("test beside")
+    yield made
+    made.close()
+
+
+def test_what_was_asked_is_taken_once(beside) -> None:
+    found: list[str | None] = []
+    beside.ask("a", lambda: threading.current_thread().name)
+    until(lambda: bool(found.append(beside.take("a")) or found[-1]))
+    assert found[-1] == "test beside"
+    assert beside.take("a") is None
+
+
+def test_only_the_newest_waits(beside) -> None:
+    go, did = threading.Event(), []
+
+    def slow() -> str:
+        go.wait(10)
+        return "slow"
+
+    beside.ask("a", slow)
+    until(lambda: not beside._asked)
+    for number in range(5):
+        beside.ask("b", lambda number=number: did.append(number) or str(number))
+    go.set()
+    until(lambda: did == [4])
+    until(lambda: beside.take("b") == "4")
+    assert beside.take("a") == "slow"
+
+
+def test_a_failure_is_raised_where_it_was_asked_and_the_next_work_is_done(beside) -> None:
+    def fail() -> str:
+        raise ValueError("no such luck")
+
+    beside.ask("a", fail)
+    until(lambda: bool(beside._failed))
+    with pytest.raises(ValueError, match="no such luck"):
+        beside.take("a")
+    beside.ask("a", lambda: "well")
+    until(lambda: beside.take("a") == "well")
+
+
+def test_closing_ends_the_thread_and_drops_what_waits(beside) -> None:
+    beside.ask("a", lambda: "x")
+    until(lambda: beside.take("a") == "x")
+    beside.close()
+    beside.ask("a", lambda: "y")
+    assert beside.take("a") is None
+    assert not any(thread.name == "test beside" for thread in threading.enumerate())
+
+
+def test_nothing_asked_makes_no_thread() -> None:
+    beside: Beside[str] = Beside("never")
+    beside.forget("a")
+    beside.close()
+    assert beside._thread is None
