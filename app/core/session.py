@@ -20,7 +20,7 @@ from app.core.doctor import doctor_of
 from app.core.document import Document
 from app.core.documents import Documents
 from app.core.fleet import Fleet
-from app.core.health import Health
+from app.core.health import ASK_DOCTOR, Health
 from app.core.images import Images
 from app.core.journal import Journal
 from app.core.kept_tabs import KeptTabs
@@ -28,6 +28,7 @@ from app.core.mailbox import Drained, Mailbox
 from app.core.master_state import Learning, MasterState
 from app.core.moving import Moving
 from app.core.nodes import Nodes
+from app.core.reach import Reach, ReachChanged
 from app.core.runner import RunnerEvent
 from app.core.runs import Runs
 from app.core.settings import Settings
@@ -102,6 +103,7 @@ class Session:
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
+        self.reach = Reach(self.address, self.settings, self.alerts, self._mailbox.post_event)
         self.tick_ms = 0.0
         self._robots_seen = -1
         self._reachable: tuple[Robot, ...] = ()
@@ -168,6 +170,7 @@ class Session:
         self.doctor.close()
         self.source.close()
         self.companions.close()
+        self.reach.close()
 
     # -- inside ----------------------------------------------------------------------------------------------
 
@@ -228,19 +231,22 @@ class Session:
                     "error",
                     event.sentence,
                     event.detail.splitlines()[-1] if event.detail else "",
-                    button="Start it again" if event.is_robot else None,
-                    action=f"connect:{event.what}" if event.is_robot else None,
+                    button="Start it again" if event.is_robot else ASK_DOCTOR,
+                    action=f"connect:{event.what}" if event.is_robot else "help.doctor",
                 )
             case WatchFailed():
                 self.alerts.put(
                     f"watch:{event.topic}", "warn", f"{event.topic} can't be read.", event.sentence
                 )
+            case ReachChanged():
+                self.reach.changed(event)
             case JobFailed() if event.what:
                 self.console.add("error", "studio", f"can't {event.what}: {event.sentence}")
             case _:
                 pass
 
     def _on_graph(self, view: GraphView, now: float) -> None:
+        self.reach.follow(view)
         if self._learning.still(self.graph, view, now):
             return
         before = self.graph
@@ -264,6 +270,8 @@ class Session:
                 "warn",
                 "The master has gone; a new one is being started.",
                 "Programs that are connected go on; new ones can't join until it is back.",
+                button=ASK_DOCTOR,
+                action="help.doctor",
             )
             self.topics.values_revision += 1
 

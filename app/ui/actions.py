@@ -78,6 +78,7 @@ TABLE: tuple[Row, ...] = (
     Row("robots.turtle", "Robots", "Use the virtual Turtle", "", "bot"),
     Row("robots.show", "Robots", "Try what a robot can do", "", "eye", above=True),
     Row("robots.ask", "Robots", "Ask again before real robots move", "", "footprints"),
+    Row("network.others", "Robots", "Let other computers connect", "", "wifi", above=True),
     Row("help.shortcuts", "Help", "Keyboard shortcuts", "F1", "keyboard"),
     Row("help.doctor", "Help", "Connection doctor", "", "stethoscope"),
     Row("help.about", "Help", "About NEP Studio", "", "info"),

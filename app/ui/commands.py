@@ -14,6 +14,7 @@ from app.ui.docks import Dock
 from app.ui.files import Asks, Files, SystemDialogs
 from app.ui.habits import Habits
 from app.ui.main_window import MainWindow
+from app.ui.others_sheet import OthersSheet
 from app.ui.popup import Sheet
 from app.ui.single_window import Asked
 from app.ui.tabs import Tabs
@@ -57,6 +58,7 @@ class Commands:
         )
         self.tabs = Tabs(window.session, self.files, lambda: self._show("behaviour"))
         self.habits = Habits(window, self.files)
+        self._others: OthersSheet | None = None
         handlers = self._handlers() | self.tabs.handlers() | self.habits.handlers()
         self.actions = Actions(window, window.theme, handlers)
         self._asked: dict[str, Callable[[str], object]] = {
@@ -71,6 +73,7 @@ class Commands:
         }
         self.habits.use(self.actions, self.actions.fill(window.bar.menus))
         window.run = self.run
+        window.status.opened.connect(self._ask_about_others)
         self._connect()
 
     def _handlers(self) -> dict[str, Handler]:
@@ -92,6 +95,7 @@ class Commands:
             "robots.virtual": self._virtual_robot,
             "robots.turtle": self._virtual_turtle,
             "robots.ask": self._ask_before_moving,
+            "network.others": self._ask_about_others,
             "robots.show": lambda: window.open_panel("robots"),
             "help.doctor": self._doctor,
             "help.about": lambda: self._sheet("NEP Studio", [(line, "") for line in ABOUT]),
@@ -204,6 +208,19 @@ class Commands:
     def _ask_before_moving(self) -> None:
         self._session.fleet.moving.forget()
         self._window.toast.say("Studio asks again before a real robot moves")
+
+    def _doctor(self) -> None:
+        self._session.doctor.look()
+        if self._window.bench is None:
+            self._open_in("developer", "doctor")
+        else:
+            self._window.open_panel("doctor")
+
+    def _ask_about_others(self) -> None:
+        window = self._window
+        if self._others is None:
+            self._others = OthersSheet(window.theme, window, self._session.reach)
+        self._others.open()
 
     def _doctor(self) -> None:
         self._session.doctor.look()

@@ -223,11 +223,11 @@ class MainWindow(QMainWindow):
     def _show_facts(self) -> None:
         """Figures that nobody can read 30 times a second."""
         facts, document = self._facts, self.session.document
+        self.status.link = facts.reach()[1]
         if self.showing == "behaviour":
-            self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach()))
+            self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach_quietly()))
         elif self.showing == "developer":
-            reach = ("lock", facts.reach()[1], None)
-            left = (facts.master(), reach, facts.traffic(), facts.lost())
+            left = (facts.master(), facts.reach(), facts.traffic(), facts.lost())
             self.status.show_facts(left, (facts.shown(), facts.window()))
         title = "NEP Studio" if self.showing == START else f"{document.name} - NEP Studio"
         if title != self.windowTitle():

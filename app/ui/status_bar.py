@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.session import Session
+from app.ui.others_sheet import words_of
 from app.ui.theme import Theme
 from app.ui.widgets import Line, StatusItem, paint
 from app.ui.words import grouped
@@ -63,7 +64,12 @@ class Facts:
 
     def reach(self) -> Fact:
         """Who can reach this master."""
-        return "", "This computer only", None
+        return words_of(self._session.reach)
+
+    def reach_quietly(self) -> Fact:
+        """The same; without an icon while it is as it always is."""
+        icon, words, status = self.reach()
+        return ("" if status is None else icon), words, status
 
     def master(self) -> Fact:
         """Whether a master is there, and where."""
@@ -103,7 +109,10 @@ class Facts:
 
 
 class StatusBar(QWidget):
-    """26 px: facts at the left and at the right, divided by lines."""
+    """26 px: facts at the left and at the right, divided by lines. `opened` is told of a press on `link`."""
+
+    opened = Signal()
+    link = ""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -144,6 +153,11 @@ class StatusBar(QWidget):
                     holder.setVisible(bool(fact[1]))
                     holder.setContentsMargins(10 if (at_right or index) else 0, 0, 0, 0)
                 paint.show_when(line, bool(fact[1]) and (at_right or index < len(shown) - 1))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        under = self.childAt(event.position().toPoint())
+        if isinstance(under, StatusItem) and under.text == self.link:
+            self.opened.emit()
 
     def words(self) -> list[str]:
         """All facts shown now, from left to right."""

@@ -1,0 +1,126 @@
+"""Who can reach the programs of this computer: they alone, or other computers too, when a person let them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from app.core.alerts import Alerts
+from nep.addresses import host_of, is_loopback
+from nep.errors import NepError
+from nep.masters import listen
+from nep.network import OwnAddress, own_addresses
+from nep.views import GraphView
+
+KEPT = "listen_at"
+ALERT = "reach"
+
+
+class Keeps(Protocol):
+    """What is needed of the settings."""
+
+    def get(self, key: str, default: list[str]) -> list[str]:
+        """A list that was kept."""
+
+    def set(self, key: str, value: object) -> None:
+        """Keep it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReachChanged:
+    """The master was asked to serve other computers at ``hosts``; ``sentence`` says why it does not."""
+
+    hosts: tuple[str, ...]
+    sentence: str = ""
+
+
+class Reach:
+    """The switch. One thread uses it (the window's); what waits is done in another."""
+
+    def __init__(
+        self,
+        address: str,
+        settings: Keeps,
+        alerts: Alerts,
+        post_event: Callable[[object], None],
+        *,
+        ask: Callable[[Sequence[str], str], None] = listen,
+        here: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
+    ) -> None:
+        """``address`` is the master's; ``ask`` tells it, ``here`` are the addresses of this computer."""
+        self._address, self._settings, self._alerts = address, settings, alerts
+        self._post_event, self._ask, self._here = post_event, ask, here
+        self._epoch = 0
+        self._asking: threading.Thread | None = None
+        self.hosts: tuple[str, ...] = ()
+        """Where the master serves other computers now."""
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the master is on this computer, where alone it can be told."""
+        return is_loopback(self._address)
+
+    @property
+    def master_host(self) -> str:
+        """The computer of the master, as it is known here."""
+        return host_of(self._address)
+
+    def addresses(self) -> tuple[OwnAddress, ...]:
+        """The addresses of this computer that others may reach."""
+        return self._here()
+
+    def typed_by_others(self, host: str) -> str:
+        """What a program on another computer needs to know."""
+        return f"NEP_MASTER={host}:{self._address.rpartition(':')[2]}"
+
+    def let_in(self, hosts: Sequence[str]) -> None:
+        """Serve other computers at these addresses, none: no more. Kept for the next start."""
+        self._settings.set(KEPT, list(hosts))
+        self._tell(tuple(hosts))
+
+    def follow(self, view: GraphView) -> None:
+        """See what the master does; another one is told what a person chose."""
+        self.hosts = view.listens
+        if view.epoch != self._epoch:
+            self._epoch = view.epoch
+            kept = tuple(str(host) for host in self._settings.get(KEPT, []))
+            if kept and self.is_near and set(kept) - set(self.hosts):
+                self._tell(kept)
+
+    def changed(self, event: ReachChanged) -> None:
+        """The master has answered."""
+        if not event.sentence:
+            self.hosts = event.hosts
+            self._alerts.cure(ALERT)
+            return
+        self._alerts.put(
+            ALERT,
+            "warn",
+            "Other computers can't connect.",
+            f"{event.sentence[:1].upper()}{event.sentence[1:]}.",
+            button="Choose an address",
+            action="network.others",
+        )
+
+    def close(self) -> None:
+        """Wait for the thread."""
+        if self._asking is not None:
+            self._asking.join(3.0)
+
+    def _tell(self, hosts: tuple[str, ...]) -> None:
+        before = self._asking
+
+        def work() -> None:
+            if before is not None:
+                before.join()
+            try:
+                self._ask(hosts, self._address)
+            except NepError as error:
+                self._post_event(ReachChanged(hosts, str(error)))
+            else:
+                self._post_event(ReachChanged(hosts))
+
+        self._asking = threading.Thread(target=work, name="studio-reach", daemon=True)
+        self._asking.start()

@@ -1,0 +1,106 @@
+"""Letting other computers connect, as the window asks for it."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from app.core.alerts import Alerts
+from app.core.reach import ALERT, Reach
+from app.core.settings import Settings
+from nep.errors import RequestRefusedError
+from nep.network import OwnAddress
+from nep.views import GraphView
+
+
+class World:
+    """A master that obeys or refuses, and what was posted to the window."""
+
+    def __init__(self):
+        self.asked = []
+        self.refusal = ""
+        self.posted = []
+        self.came = threading.Event()
+
+    def ask(self, hosts, address):
+        self.asked.append((tuple(hosts), address))
+        if self.refusal:
+            raise RequestRefusedError(self.refusal)
+
+    def post(self, event):
+        self.posted.append(event)
+        self.came.set()
+
+    def answer(self, reach):
+        assert self.came.wait(5.0)
+        self.came.clear()
+        reach.changed(self.posted.pop())
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+@pytest.fixture
+def make(world, tmp_path):
+    def make(address="127.0.0.1:7780"):
+        here = (OwnAddress("192.168.1.20", "wlan0"),)
+        alerts = Alerts()
+        reach = Reach(address, Settings(tmp_path), alerts, world.post, ask=world.ask, here=lambda: here)
+        return reach, alerts
+
+    return make
+
+
+def test_a_person_lets_others_in_and_no_more(world, make):
+    reach, alerts = make()
+    assert reach.typed_by_others("192.168.1.20") == "NEP_MASTER=192.168.1.20:7780"
+    reach.let_in(["192.168.1.20"])
+    world.answer(reach)
+    assert world.asked == [(("192.168.1.20",), "127.0.0.1:7780")]
+    assert reach.hosts == ("192.168.1.20",)
+    reach.let_in([])
+    world.answer(reach)
+    assert reach.hosts == ()
+    assert not alerts.active
+    reach.close()
+
+
+def test_what_was_chosen_is_asked_of_the_next_master_but_only_once(world, make):
+    reach, _alerts = make()
+    reach.let_in(["192.168.1.20"])
+    world.answer(reach)
+    again, _alerts = make()
+    again.follow(GraphView(epoch=7, revision=1))
+    world.answer(again)
+    again.follow(GraphView(epoch=7, revision=2))
+    again.follow(GraphView(epoch=8, revision=1, listens=("192.168.1.20",)))
+    again.close()
+    assert len(world.asked) == 2
+    assert again.hosts == ("192.168.1.20",)
+
+
+def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
+    reach, alerts = make()
+    world.refusal = "'192.168.1.20' is no address of this computer; it has 10.0.0.7"
+    reach.let_in(["192.168.1.20"])
+    world.answer(reach)
+    (alert,) = alerts.active
+    assert (alert.id, alert.action) == (ALERT, "network.others")
+    assert "it has 10.0.0.7." in alert.detail
+    assert reach.hosts == ()
+    world.refusal = ""
+    reach.let_in(["10.0.0.7"])
+    world.answer(reach)
+    assert not alerts.active
+    reach.close()
+
+
+def test_the_master_of_another_computer_is_not_told(make, world):
+    reach, _alerts = make("192.168.1.9:7780")
+    assert not reach.is_near
+    assert reach.master_host == "192.168.1.9"
+    reach.follow(GraphView(epoch=1, revision=1, listens=("192.168.1.9",)))
+    assert not world.asked

@@ -1,0 +1,97 @@
+"""The sheet that lets other computers connect, and what the status bar says."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtWidgets import QApplication, QWidget
+
+from app.core.alerts import Alerts
+from app.core.reach import Reach
+from app.core.settings import Settings
+from app.ui.others_sheet import OthersSheet, words_of
+from app.ui.theme import Theme
+from nep.network import OwnAddress
+from nep.views import GraphView
+
+
+@pytest.fixture
+def make(qtbot, tmp_path):
+    """A sheet over a window, and its switch; what is asked is noted."""
+    made = []
+
+    def make(address="127.0.0.1:7780", here=(("192.168.1.20", "wlan0"), ("10.8.0.2", "tun0"))):
+        asked = []
+        own = tuple(OwnAddress(*each) for each in here)
+        reach = Reach(
+            address,
+            Settings(tmp_path),
+            Alerts(),
+            lambda _event: None,
+            ask=lambda hosts, _address: asked.append(tuple(hosts)),
+            here=lambda: own,
+        )
+        window = QWidget()
+        window.resize(1100, 700)
+        qtbot.addWidget(window)
+        window.show()
+        sheet = OthersSheet(Theme("light"), window, reach)
+        made.append((reach, window))
+        return sheet, reach, asked
+
+    yield make
+    for reach, _window in made:
+        reach.close()
+
+
+def test_it_warns_names_the_address_and_lets_them_connect(make):
+    sheet, reach, asked = make()
+    sheet.open()
+    assert sheet.heading.text() == "Let other computers connect?"
+    assert "no password" in sheet.warning.text()
+    assert sheet.first() is sheet.no, "the careful answer has the keyboard"
+    assert sheet.typed.text() == "NEP_MASTER=192.168.1.20:7780"
+    sheet.choice.set_value("10.8.0.2")
+    assert sheet.typed.text() == "NEP_MASTER=10.8.0.2:7780"
+    sheet.copy.click()
+    assert QApplication.clipboard().text() == "NEP_MASTER=10.8.0.2:7780"
+    sheet.yes.click()
+    reach.close()
+    assert asked == [("10.8.0.2",)]
+    assert not sheet.isVisible()
+
+
+def test_not_now_changes_nothing(make):
+    sheet, _reach, asked = make()
+    sheet.open()
+    sheet.no.click()
+    assert not asked
+    assert not sheet.isVisible()
+
+
+def test_it_is_taken_back_where_it_was_given(make):
+    sheet, reach, asked = make()
+    reach.follow(GraphView(epoch=1, revision=1, listens=("192.168.1.20",)))
+    assert words_of(reach) == ("wifi", "Other computers connect at 192.168.1.20", "warn")
+    sheet.open()
+    assert sheet.heading.text() == "Other computers can connect at 192.168.1.20"
+    assert not sheet.yes.isVisible()
+    sheet.end.click()
+    reach.close()
+    assert asked == [()]
+
+
+def test_without_a_network_it_says_what_to_do_first(make):
+    sheet, reach, _asked = make(here=())
+    sheet.open()
+    assert sheet.heading.text() == "This computer is in no network"
+    assert not sheet.yes.isVisible()
+    assert words_of(reach)[1] == "This computer only"
+
+
+def test_the_master_of_another_computer_decides_there(make):
+    sheet, reach, _asked = make(address="192.168.1.9:7780")
+    sheet.open()
+    assert "192.168.1.9" in sheet.heading.text()
+    assert not sheet.yes.isVisible()
+    assert not sheet.end.isVisible()
+    assert words_of(reach) == ("network", "Master on 192.168.1.9", None)
