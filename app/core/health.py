@@ -14,6 +14,7 @@ from nep.views import GraphView
 
 SILENT_S = 3.0
 CURE_S = 1.0
+ASK_DOCTOR = "Open the connection doctor"
 
 
 @dataclass(slots=True)
@@ -101,7 +102,16 @@ class Health:
         ids = set()
         for found in view.alerts:
             ids.add(found.id)
-            self._alerts.put(found.id, "warn", found.sentence, found.hint, count=0)
+            helps = found.id.startswith("port:")
+            self._alerts.put(
+                found.id,
+                "warn",
+                found.sentence,
+                found.hint,
+                button=ASK_DOCTOR if helps else None,
+                action="help.doctor" if helps else None,
+                count=0,
+            )
         for gone in self._from_graph - ids:
             self._alerts.cure(gone)
         self._from_graph = ids
@@ -140,5 +150,7 @@ class Health:
             "error",
             f"The camera of {link.name} has been silent for {int(topic.age_s)} s.",
             "What needs its picture waits.",
+            button=ASK_DOCTOR,
+            action="help.doctor",
             count=0,
         )

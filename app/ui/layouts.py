@@ -44,6 +44,7 @@ BEHAVIOUR = Layout(
     ("robot", "camera"),
     {
         "robots": "behaviour",
+        "doctor": "behaviour",
         "console": "problems",
         "alerts": "problems",
         "nodes": "problems",
@@ -61,7 +62,7 @@ DEVELOPER = Layout(
         Column(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
     ("topics", "inspector"),
-    {"robots": "topics", "robot": "image", "camera": "image"},
+    {"robots": "topics", "doctor": "topics", "robot": "image", "camera": "image"},
 )
 LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 
