@@ -10,17 +10,23 @@ from pathlib import Path
 import platformdirs
 
 from app.core.pictures import png_of
-from app.core.settings import home
+from app.core.settings import Settings, home
 from nep.message import Message
 
 NAME = "NEP Studio"
 
 
-def folder() -> Path:
-    """Where snapshots go: ``NEP Studio`` in the system's folder for pictures.
+CHOSEN = "pictures_folder"
+
+
+def folder(settings: Settings | None = None) -> Path:
+    """Where snapshots go: where a person chose, else ``NEP Studio`` in the system's folder for pictures.
 
     With ``$NEP_STUDIO_HOME`` it is ``Pictures`` in there.
     """
+    chosen = settings.get(CHOSEN, "") if settings is not None else ""
+    if chosen:
+        return Path(chosen)
     if os.environ.get("NEP_STUDIO_HOME"):
         return home() / "Pictures"
     return platformdirs.user_pictures_path() / NAME

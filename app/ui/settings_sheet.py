@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
-from PySide6.QtCore import QSize, QStandardPaths, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from app.core import snapshots
 from app.core.settings import Settings
 from app.ui.overlay import Overlay
 from app.ui.theme import MODES, Theme
@@ -19,14 +19,6 @@ WIDE = 620
 MODE_WORDS = {"light": ("Light", "sun"), "dark": ("Dark", "moon"), "system": ("As the system", "monitor")}
 WISH_WORDS = {"system": "As the system", "on": "On", "off": "Off"}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
-PICTURES = "pictures_folder"
-
-
-def pictures_folder(settings: Settings) -> Path:
-    """Where pictures are kept: what a person chose, else the system's folder for pictures."""
-    chosen = settings.get(PICTURES, "")
-    system = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
-    return Path(chosen or system or Path.home())
 
 
 class SettingsSheet(Overlay):
@@ -37,11 +29,15 @@ class SettingsSheet(Overlay):
     def __init__(self, theme: Theme, window: QWidget, state: WindowState, settings: Settings) -> None:
         super().__init__(theme, window, "Settings")
         self._state, self._settings = state, settings
-        self.mode = Segments(theme, [(mode, *MODE_WORDS[mode]) for mode in MODES], size="form", name="Look")
-        self.text = Segments(theme, [(p, f"{p} %", None) for p in TEXT_SIZES], size="form", name="Text size")
+        self.mode = Segments(
+            theme, [(mode, *MODE_WORDS[mode]) for mode in MODES], check=True, size="form", name="Look"
+        )
+        self.text = Segments(
+            theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name="Text size"
+        )
         wishes = [(wish, WISH_WORDS[wish], None) for wish in WISHES]
-        self.contrast = Segments(theme, wishes, size="form", name="High contrast")
-        self.motion = Segments(theme, wishes, size="form", name="Less motion")
+        self.contrast = Segments(theme, wishes, check=True, size="form", name="High contrast")
+        self.motion = Segments(theme, wishes, check=True, size="form", name="Less motion")
         self.shortcuts = Button(theme, "Change the shortcuts", "keyboard", size="form")
         self.folder = Elided("bodyLarge", "textSecondary")
         self.choose = Button(theme, "Choose a folder", "folder-open", size="form")
@@ -117,7 +113,7 @@ class SettingsSheet(Overlay):
         self.text.set_value(str(theme.text_percent))
         self.contrast.set_value(theme.contrast)
         self.motion.set_value(theme.motion)
-        self.folder.setText(str(pictures_folder(self._settings)))
+        self.folder.setText(str(snapshots.folder(self._settings)))
         if self.isVisible():
             self.place()
 
@@ -139,7 +135,7 @@ class SettingsSheet(Overlay):
 
     def _choose(self) -> None:
         """The system's dialog; it is modal to nothing, so that F12 goes on working."""
-        before = str(pictures_folder(self._settings))
+        before = str(snapshots.folder(self._settings))
         dialog = QFileDialog(self.window_below(), "Folder for pictures", before)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -149,5 +145,5 @@ class SettingsSheet(Overlay):
 
     def keep_folder(self, folder: str) -> None:
         """Keep pictures there from now on."""
-        self._state.keep(PICTURES, folder)
+        self._state.keep(snapshots.CHOSEN, folder)
         self._show()

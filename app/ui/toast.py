@@ -53,6 +53,7 @@ class Toast(QWidget):
         """Show a sentence; ``button`` undoes or follows what it says."""
         self._words.setText(words)
         self.setAccessibleName(words)
+        paint.announce(self, words)
         self._run = run
         self.button.set_word(button)
         paint.show_when(self.button, bool(button and run))

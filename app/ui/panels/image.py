@@ -10,11 +10,13 @@ from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
+from app.core import snapshots
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_actions import PictureActions
 from app.ui.picture_zoom import ZoomablePicture
 from app.ui.robot_boxes import boxes_on, owner_of
 from app.ui.snapshot_job import SnapshotJob
+from app.ui.spoken import speak_as
 from app.ui.widgets import EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
 
@@ -43,7 +45,7 @@ class ImagePanel(PanelWidget):
         self.choose.clicked.connect(self._show_menu)
         self.chips = [self.choose]
         self.view = ZoomablePicture(self.theme)
-        self.view.setAccessibleName("Picture")
+        speak_as(self.view, "Graphic", "Picture")
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.view.customContextMenuRequested.connect(self._show_actions)
         self._make_actions()
@@ -60,7 +62,7 @@ class ImagePanel(PanelWidget):
     def _make_actions(self) -> None:
         own = {"freeze": self._freeze_or_not, "save": self.save_picture, "copy": self.copy_picture}
         self.actions_of = PictureActions(self.theme, self.view, own)
-        self.job = SnapshotJob(self)
+        self.job = SnapshotJob(self, lambda: snapshots.folder(self.session.settings))
         self.job.saved.connect(self._saved)
         self.job.copied.connect(self._copied)
         self.job.failed.connect(self._failed)

@@ -16,17 +16,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.core.companions import VIRTUAL_ROBOTS
+from app.core.problem_list import Listed, Mend, listed
 from app.ui.action_card import Tile
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.rich_line import BoldInLine, is_pressed_key
+from app.ui.spoken import speak_as
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Chip, Scrolled, label, paint
 
 if TYPE_CHECKING:
-    from app.blocks import Problem
+    from app.blocks import Program
 
 STATUS = {"error": "error", "warning": "warn", "info": "info"}
+PLURAL = {"error": ("error", "errors"), "warning": ("warning", "warnings"), "info": ("hint", "hints")}
 NOTHING = "Nothing to mend.\nProblems appear here while you build."
 
 
@@ -52,15 +56,17 @@ class ProblemRow(QWidget):
 
     pressed = Signal(str)
     mend = Signal(str)
+    stepped = Signal(int)
 
-    def __init__(self, theme: Theme, problem: Problem, *, large: bool) -> None:
+    def __init__(self, theme: Theme, line: Listed, *, large: bool) -> None:
         super().__init__()
-        self._theme, self.problem, self._large = theme, problem, large
+        problem = line.problem
+        self._theme, self.line, self.problem, self._large = theme, line, problem, large
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(f"{problem.severity}: {problem.sentence}")
+        speak_as(self, "ListItem", f"{problem.severity}: {problem.sentence}")
         self.setProperty("focusRadius", theme.radius("small"))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         if problem.block_id:
-            self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
             self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         row = QHBoxLayout(self)
@@ -73,10 +79,14 @@ class ProblemRow(QWidget):
             row.addWidget(Tile(theme, icon, category, 22))
         kind = "bodyLarge" if large else "body"
         row.addWidget(BoldInLine(theme, problem.sentence, problem.subject, kind), 1)
-        self.button = Button(theme, problem.mend or "", size="small")
-        self.button.setVisible(bool(problem.mend))
-        self.button.clicked.connect(lambda: self.mend.emit(problem.mend_action or ""))
-        row.addWidget(self.button)
+        self.buttons = [self._mend(mend) for mend in line.mends]
+        for button in self.buttons:
+            row.addWidget(button)
+
+    def _mend(self, mend: Mend) -> Button:
+        button = Button(self._theme, mend.words, size="small")
+        button.clicked.connect(lambda: self.mend.emit(mend.action))
+        return button
 
     def sizeHint(self) -> QSize:
         size = "comfortable" if self._large else "compact"
@@ -87,8 +97,11 @@ class ProblemRow(QWidget):
             self._press()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        steps = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
         if is_pressed_key(event.key()):
             self._press()
+        elif event.key() in steps:
+            self.stepped.emit(steps[Qt.Key(event.key())])
         else:
             super().keyPressEvent(event)
 
@@ -109,8 +122,8 @@ class ProblemsPanel(PanelWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Problems")
-        self._seen: tuple[object, ...] = ()
-        self._found: tuple[Problem, ...] | None = None
+        self._program: Program | None = None
+        self._found: tuple[Listed, ...] | None = None
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
@@ -122,7 +135,8 @@ class ProblemsPanel(PanelWidget):
         self._column.setContentsMargins(0, 4, 0, 4)
         self._column.setSpacing(0)
         self._column.addStretch(1)
-        scroll = QScrollArea()
+        scroll = self._scroll = QScrollArea()
+        speak_as(scroll, "Pane", "Problems")
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -138,39 +152,73 @@ class ProblemsPanel(PanelWidget):
 
     def refresh(self) -> None:
         document = self.session.document
-        now = (document.revision, document.edits, document.definitions_revision)
-        if now == self._seen:
+        program = document.newest()
+        if program is None:
+            self.checked.setText("Checking")
             return
-        self._seen = now
-        found = document.problems()
+        if program is self._program:
+            return
+        self._program = program
+        self.checked.setText("Checked while you build")
+        found = listed(
+            program.problems,
+            document.workspace,
+            document.absent,
+            [link.robot for link in self.session.fleet.connected],
+            VIRTUAL_ROBOTS,
+        )
         if found != self._found:
             self._found = found
             self._show(found)
 
-    def _show(self, found: tuple[Problem, ...]) -> None:
-        for row in self.rows:
-            self._column.removeWidget(row)
-            row.deleteLater()
-        self.rows = []
-        for place, problem in enumerate(found):
-            row = ProblemRow(self.theme, problem, large=self.density == "comfortable")
-            row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
-            row.mend.connect(self.context.run)
-            self.rows.append(row)
+    def _show(self, found: tuple[Listed, ...]) -> None:
+        """The rows of these problems; one that is there already stays, with its focus."""
+        kept = {row.line: row for row in self.rows}
+        for line, row in kept.items():
+            if line not in found:
+                self._column.removeWidget(row)
+                row.hide()
+                row.deleteLater()
+        self.rows = [kept.get(line) or self._row(line) for line in dict.fromkeys(found)]
+        for place, row in enumerate(self.rows):
             self._column.insertWidget(place, row)
         self.pages.setCurrentIndex(1 if found else 0)
-        worst = next(
-            (kind for kind in ("error", "warning") if any(p.severity == kind for p in found)), "info"
-        )
-        if found:
-            self.chip.set(str(len(found)), STATUS[worst])
-            self.chip.setAccessibleName(f"{len(found)} problems")
-        else:
+        self._count(found)
+
+    def _row(self, line: Listed) -> ProblemRow:
+        row = ProblemRow(self.theme, line, large=self.density == "comfortable")
+        row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
+        row.mend.connect(self.context.run)
+        row.stepped.connect(lambda step: self._step(row, step))
+        return row
+
+    def _step(self, row: ProblemRow, step: int) -> None:
+        """The arrow keys go from one problem to the next."""
+        place = self.rows.index(row) + step
+        if 0 <= place < len(self.rows):
+            self.rows[place].setFocus(Qt.FocusReason.TabFocusReason)
+            self._scroll.ensureWidgetVisible(self.rows[place])
+
+    def _count(self, found: tuple[Listed, ...]) -> None:
+        if not found:
             self.chip.set("none", "ok")
+            return
+        kinds = [each.severity for each in found]
+        worst = next((kind for kind in ("error", "warning") if kind in kinds), "info")
+        self.chip.set(str(len(found)), STATUS[worst])
+        words = [
+            f"{kinds.count(kind)} {PLURAL[kind][kinds.count(kind) > 1]}" for kind in PLURAL if kind in kinds
+        ]
+        self.chip.setAccessibleName(", ".join(words))
+        self.chip.setToolTip(", ".join(words))
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)
         if self._found is not None:
+            for row in self.rows:
+                self._column.removeWidget(row)
+                row.deleteLater()
+            self.rows = []
             self._show(self._found)
 
 

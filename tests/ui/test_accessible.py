@@ -1,0 +1,187 @@
+"""People who do not see the window: names and roles of all that takes the keyboard, and what is said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAccessible
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
+
+from app.core.run_view import RunView
+from app.ui.commands import Commands
+from app.ui.docks import Dock
+from app.ui.main_window import MainWindow
+from app.ui.overlay import Overlay
+from app.ui.panels.base import PanelContext
+from app.ui.run_bar import RunBar
+from app.ui.theme import Theme
+from tests.ui.fakes import Session as FakeSession
+from tests.ui.show_panels import SIZES, prepare
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Client, QAccessible.Role.Whitespace}
+OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about")
+
+
+def stops(root: QWidget) -> Iterator[QWidget]:
+    """Everything that Tab can reach."""
+    for widget in [root, *root.findChildren(QWidget)]:
+        takes = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
+        if takes and widget.isVisibleTo(root) and widget.isEnabled() and widget.focusProxy() is None:
+            yield widget
+
+
+def unsaid(root: QWidget) -> list[str]:
+    """What a screen reader would not know how to say."""
+    faults = []
+    for widget in stops(root):
+        spoken = QAccessible.queryAccessibleInterface(widget)
+        where = widget.mapTo(root, QPoint(0, 0)) if widget is not root else QPoint()
+        told = f"{type(widget).__name__} at {where.x()},{where.y()} in {_above(widget)}"
+        if spoken is None or not spoken.text(QAccessible.Text.Name).strip():
+            faults.append(f"{told} has no name")
+        elif spoken.role() in MEANINGLESS:
+            faults.append(f"{told} has no role")
+    return faults
+
+
+def _above(widget: QWidget) -> str:
+    parent = widget.parentWidget()
+    return type(parent).__name__ if parent is not None else ""
+
+
+@pytest.mark.parametrize("name", [name for name in SIZES if name != "behaviour"])
+@pytest.mark.parametrize("full", [True, False], ids=["full", "empty"])
+def test_everything_in_a_panel_has_a_name(qtbot, theme: Theme, name: str, full: bool) -> None:
+    panel, width, height, density = SIZES[name]
+    session = FakeSession.full() if full else FakeSession()
+    widget = panel.make(PanelContext(session, theme, str, str, str))  # type: ignore[arg-type]
+    dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
+    qtbot.addWidget(dock)
+    dock.resize(width, height)
+    dock.show()
+    dock.front = True
+    if full:
+        prepare(name, widget)
+    for _ in range(3):
+        session.tick()
+        dock.refresh()
+    assert list(stops(dock))
+    assert unsaid(dock) == []
+    widget.shut()
+
+
+def test_everything_in_the_window_has_a_name(qtbot, window: MainWindow, commands: Commands) -> None:
+    window.theme.set_motion("on")
+    window.show()
+    window.tick()
+    faults = unsaid(window)
+    for layout in ("behaviour", "developer"):
+        commands.run(f"layout.{layout}")
+        window.tick()
+        for bar in (window.bar, window.run_bar, window.tool_bar, window.status):
+            faults += unsaid(bar)
+        for dock in window.benches[layout].docks.values():
+            faults += unsaid(dock.title)
+    for name in OVER:
+        commands.run(name)
+        shown = next(each for each in window.findChildren(Overlay) if each.isVisible())
+        faults += unsaid(shown)
+        shown.shut()
+    assert faults == []
+
+
+def reached(window: MainWindow, forward: bool = True) -> list[QWidget]:
+    """Where Tab leads, from where the keyboard is until it is there again."""
+    seen: list[QWidget] = []
+    for _ in range(200):
+        focus = QApplication.focusWidget()
+        assert focus is not None
+        if focus in seen:
+            return seen
+        seen.append(focus)
+        QTest.keyClick(focus, Qt.Key.Key_Tab if forward else Qt.Key.Key_Backtab)
+    raise AssertionError("Tab never comes back")
+
+
+@pytest.mark.parametrize("layout", ["behaviour", "developer"])
+def test_tab_reaches_everything_and_comes_back(
+    qtbot, window: MainWindow, commands: Commands, layout: str
+) -> None:
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run(f"layout.{layout}")
+    window.tick()
+    seen = reached(window)
+    bench = window.benches[layout]
+    for dock in bench.docks.values():
+        if dock.shown():
+            assert any(dock.isAncestorOf(each) for each in seen), dock.description.name
+    bar = window.run_bar if layout == "behaviour" else window.tool_bar
+    assert bar.stop in seen
+    assert bar.run in seen
+    assert window.bar.find in seen
+    assert set(reached(window, forward=False)) == set(seen)
+
+
+def test_panels_are_in_the_order_in_which_they_are_read(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run("layout.developer")
+    qtbot.waitUntil(window.benches["developer"].docks["console"].shown)
+    order = []
+    for _ in range(4):
+        QTest.keyClick(window, Qt.Key.Key_F6)
+        dock = window.panel_focus.dock()
+        assert dock is not None
+        order.append(dock.mapTo(window, QPoint(0, 0)))
+    start = order.index(min(order, key=lambda place: (place.x(), place.y())))
+    turned = order[start:] + order[:start]
+    assert turned == sorted(turned, key=lambda place: (place.x(), place.y()))
+
+
+# -- what is said by itself -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What a screen reader is told to say now; there is none in a test, so we stand in its place."""
+    heard: list[str] = []
+    monkeypatch.setattr(QAccessible, "isActive", lambda: True)
+    monkeypatch.setattr(QAccessible, "updateAccessibility", lambda event: heard.append(event.message()))
+    return heard
+
+
+def test_alerts_are_said_once(qtbot, window: MainWindow, commands: Commands, said: list[str]) -> None:
+    window.show()
+    commands.run("layout.behaviour")
+    window.session.alerts.put("camera", "error", "The camera is silent.", "No pictures come.")
+    for _ in range(3):
+        window.tick()
+    assert said == ["The camera is silent. No pictures come."]
+
+
+def test_the_end_of_a_stop_is_said_and_no_figure(qtbot, theme: Theme, said: list[str]) -> None:
+    bar = RunBar(theme)
+    qtbot.addWidget(bar)
+    bar.show()
+    bar.show_view(RunView("running", "Running, 1 s", "", "", can_pause=True))
+    bar.show_view(RunView("running", "Running, 2 s", "", "", can_pause=True))
+    bar.show_view(RunView("stopping", "Stopping", "", "", result="1 of 2 robots stopped"))
+    proven = RunView("proven", "Stopped", "", "", result="all 2 robots stopped (41 ms)", result_ok=True)
+    bar.show_view(proven)
+    bar.show_view(proven)
+    assert said == ["all 2 robots stopped (41 ms)"]
+
+
+def test_a_toast_is_said(qtbot, window: MainWindow, said: list[str]) -> None:
+    window.show()
+    window.toast.say("Copied robots.Pepper.pose.y")
+    assert said == ["Copied robots.Pepper.pose.y"]

@@ -1,0 +1,113 @@
+"""The settings: each choice applies at once and is there again at the next start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.core import snapshots
+from app.core.settings import RecentFile, Settings
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+from app.ui.settings_sheet import SettingsSheet
+from app.ui.shortcut_sheet import ShortcutSheet
+from app.ui.theme import Theme
+from app.ui.window_state import WindowState
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.fixture
+def sheet(qtbot, window: MainWindow, commands: Commands) -> SettingsSheet:
+    window.theme.set_motion("on")
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run("settings.open")
+    made = window.findChild(SettingsSheet)
+    assert made is not None
+    return made
+
+
+def press(segments, value: str) -> None:
+    QTest.mouseClick(segments._segments[value], Qt.MouseButton.LeftButton)
+
+
+def test_every_choice_applies_at_once_and_is_kept(
+    sheet: SettingsSheet, window: MainWindow, home: Path
+) -> None:
+    press(sheet.mode, "dark")
+    press(sheet.text, "150")
+    press(sheet.contrast, "on")
+    press(sheet.motion, "off")
+    theme = window.theme
+    assert (theme.dark, theme.text_percent) == (True, 150)
+    assert (theme.high_contrast, theme.reduced_motion) == (True, False)
+    again = Theme("light")
+    WindowState(Settings(home), lambda _sentence: None).apply_theme(again)
+    assert (again.mode, again.text_percent, again.contrast, again.motion) == ("dark", 150, "on", "off")
+    assert again.high_contrast
+    again.deleteLater()
+
+
+def test_what_menus_change_shows_here(sheet: SettingsSheet, commands: Commands) -> None:
+    commands.run("theme.dark")
+    commands.run("text.larger")
+    commands.run("theme.contrast")
+    assert (sheet.mode.value, sheet.text.value, sheet.contrast.value) == ("dark", "125", "on")
+    press(sheet.contrast, "off")
+    assert not commands.actions["theme.contrast"].isChecked()
+
+
+def test_the_folder_for_pictures_is_kept(sheet: SettingsSheet, window: MainWindow, tmp_path: Path) -> None:
+    settings = window.session.settings
+    assert sheet.folder.text() == str(snapshots.folder(settings))
+    sheet.keep_folder(str(tmp_path))
+    assert snapshots.folder(settings) == tmp_path
+    assert sheet.folder.text() == str(tmp_path)
+
+
+def test_the_shortcuts_are_one_press_away(sheet: SettingsSheet, window: MainWindow) -> None:
+    QTest.mouseClick(sheet.shortcuts, Qt.MouseButton.LeftButton)
+    assert not sheet.isVisible()
+    shown = window.findChild(ShortcutSheet)
+    assert shown is not None
+    assert shown.isVisible()
+
+
+def test_old_settings_for_motion_are_understood(home: Path, theme: Theme) -> None:
+    settings = Settings(home)
+    settings.set("less_motion", True)
+    WindowState(settings, lambda _sentence: None).apply_theme(theme)
+    assert theme.reduced_motion
+    settings.set("less_motion", "nonsense")
+    WindowState(settings, lambda _sentence: None).apply_theme(theme)
+    assert theme.motion == "system"
+
+
+# -- recent files ---------------------------------------------------------------------------------
+
+
+def test_recent_files_that_are_gone_say_so_and_the_list_can_be_cleared(
+    window: MainWindow, commands: Commands, tmp_path: Path
+) -> None:
+    there = tmp_path / "there.nepb"
+    there.write_text("{}", "utf-8")
+    settings = window.session.settings
+    settings.set_recent([RecentFile(there, "there", 0.0), RecentFile(tmp_path / "gone.nepb", "gone", 0.0)])
+    lists = commands.habits._lists
+    lists._list_recent()
+    entries = {entry.text(): entry.isEnabled() for entry in lists._recent.actions() if entry.text()}
+    assert entries == {
+        "there": True,
+        "gone (not there any more)": False,
+        "Clear the list of recent files": True,
+    }
+    commands.run("file.forget_recent")
+    assert settings.recent_known == []
+    window.show()
+    QTest.mouseClick(window.toast.button, Qt.MouseButton.LeftButton)
+    assert [file.name for file in settings.recent_known] == ["there", "gone"]
