@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
@@ -22,6 +23,8 @@ from app.ui.widgets import EmptyAction, EmptyState, paint
 from app.ui.widgets.menus import Menu, drop_below
 
 LEAST_BODY = QSize(160, 60)
+
+_log = logging.getLogger(__name__)
 
 
 class _Corner(QWidget):
@@ -77,17 +80,16 @@ class DockBody(QWidget):
 
     def fail(self, sentence: str, again: Callable[[], object]) -> None:
         """Show in place of the panel that it failed, with a way to try again."""
-
-        def retry() -> None:
-            self._stack.setCurrentIndex(0)
-            again()
-
         if self._failure is None:
             self._failure = EmptyState(self._theme, "circle-x", "This panel stopped", sentence)
             self._stack.addWidget(self._failure)
         self._failure.say("This panel stopped", sentence)
-        self._failure.set_actions([EmptyAction("Try again", retry, "rotate-ccw")])
+        self._failure.set_actions([EmptyAction("Try again", again, "rotate-ccw")])
         self._stack.setCurrentWidget(self._failure)
+
+    def show_panel(self) -> None:
+        """Show the panel itself again."""
+        self._stack.setCurrentIndex(0)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
@@ -140,12 +142,30 @@ class Dock(QDockWidget):
         except Exception as error:  # noqa: BLE001  whatever a panel raises, the window lives on
             self.failed = True
             sentence = f"{type(error).__name__}: {error}"
-            self.body.fail(sentence, self._try_again)
+            self.body.fail(sentence, self.try_again)
             return sentence
         return None
 
-    def _try_again(self) -> None:
-        self.failed = False
+    def try_again(self) -> None:
+        """Show a panel that failed again, from the next refresh on; nothing happens to one that did not."""
+        if self.failed:
+            self.failed = False
+            self.body.show_panel()
+
+    def saved_state(self) -> dict[str, object]:
+        """What the panel wants back at the next start; nothing of one that can't tell."""
+        try:
+            return self.panel.save_state()
+        except Exception:  # noqa: BLE001  as in `refresh`
+            _log.exception("the panel '%s' can't tell its state", self.description.name)
+            return {}
+
+    def shut(self) -> None:
+        """The window closes: the panel ends its watches; one that fails does not keep the window open."""
+        try:
+            self.panel.shut()
+        except Exception:  # noqa: BLE001  as in `refresh`
+            _log.exception("the panel '%s' can't end in order", self.description.name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """``/`` goes to the panel's filter, Esc leaves a field; also while the panel floats."""

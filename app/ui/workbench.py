@@ -136,6 +136,7 @@ class Workbench(QMainWindow):
             return None
         if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
             self._join(dock)
+        dock.try_again()
         dock.show()
         dock.raise_()
         self._tabs_soon()
@@ -257,7 +258,7 @@ class Workbench(QMainWindow):
             ],
             "docks": dock_state.written(self.saveState(dock_state.VERSION)),
             "wide": dock_state.written(self._wide),
-            "panels": {name: dock.panel.save_state() for name, dock in self.docks.items()},
+            "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
             "narrow": self._narrow,
             "moved": self._moved,
         }
@@ -287,7 +288,7 @@ class Workbench(QMainWindow):
     def shut(self) -> None:
         """The window closes: every panel ends its watches."""
         for dock in self.docks.values():
-            dock.panel.shut()
+            dock.shut()
 
 
 def _raiser(dock: Dock) -> Callable[[], object]:
