@@ -22,7 +22,7 @@ _one_at_a_time = threading.Lock()
 
 def loads(text: str | bytes) -> object:
     """The value of a JSON text. ValueError for what is none, RecursionError beyond 9000 levels."""
-    return _deeply(lambda: json.loads(text))
+    return deeply(lambda: json.loads(text))
 
 
 def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> str:
@@ -33,12 +33,12 @@ def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> s
     try:
         return json.dumps(value, indent=indent, ensure_ascii=ascii)
     except RecursionError:
-        return _deeply(lambda: json.dumps(value, ensure_ascii=ascii))
+        return deeply(lambda: json.dumps(value, ensure_ascii=ascii))
 
 
 def same(one: object, other: object) -> bool:
     """Whether two values are equal, however deep."""
-    return _deeply(lambda: one == other)
+    return deeply(lambda: one == other)
 
 
 def start_deep(thread: threading.Thread) -> None:
@@ -51,7 +51,8 @@ def start_deep(thread: threading.Thread) -> None:
             threading.stack_size(size)
 
 
-def _deeply(work: Callable[[], T]) -> T:
+def deeply(work: Callable[[], T]) -> T:
+    """What `work` gives, which may go as deep as a long stack of blocks; it is tried twice, so it is pure."""
     try:
         return work()
     except RecursionError:

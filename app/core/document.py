@@ -13,6 +13,7 @@ from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.mend import mend
+from app.blocks.robot_mend import blocks_of, use_robot
 from app.core import deep_json
 from app.core.behaviour_file import TOO_DEEP, BehaviourFile, Descriptions, Workspace, read_file, write_file
 from app.core.beside import Beside
@@ -125,10 +126,20 @@ class Document:
 
     def mend(self, action: str) -> bool:
         """Do what a problem's button says to the blocks; False when the action is no matter of blocks."""
-        mended = mend(self.workspace, action)
+        mended = deep_json.deeply(lambda: mend(self.workspace, action))
         if mended is None:
             return False
         self.edited(mended)
+        self.mends += 1
+        return True
+
+    def use_robot(self, missing: str, robot: Robot) -> bool:
+        """Let a robot do what the blocks ask of one that is missing; False when nothing asks it."""
+        known = next((each for each in self._known() if each.name == missing), None)
+        if known is None or not blocks_of(self.workspace, missing):
+            return False
+        made = deep_json.deeply(lambda: use_robot(self.workspace, missing, known.model, robot))
+        self.edited(made)
         self.mends += 1
         return True
 

@@ -14,6 +14,7 @@ from app.ui.docks import Dock
 from app.ui.files import Asks, Files, SystemDialogs
 from app.ui.habits import Habits
 from app.ui.main_window import MainWindow
+from app.ui.mends import RobotMends
 from app.ui.others_sheet import OthersSheet
 from app.ui.popup import Sheet
 from app.ui.single_window import Asked
@@ -70,6 +71,7 @@ class Commands:
             "key": lambda key: self.actions.run(self.habits.shortcuts.holder(key)),
             "run.confirm": lambda _nothing: self._session.runs.confirm_still(),
             **self.tabs.asked(),
+            **RobotMends(window.session, self.files, window.toast.say, lambda: self._edit("undo")).asked(),
         }
         self.habits.use(self.actions, self.actions.fill(window.bar.menus))
         window.run = self.run
@@ -221,13 +223,6 @@ class Commands:
         if self._others is None:
             self._others = OthersSheet(window.theme, window, self._session.reach)
         self._others.open()
-
-    def _doctor(self) -> None:
-        self._session.doctor.look()
-        if self._window.bench is None:
-            self._open_in("developer", "doctor")
-        else:
-            self._window.open_panel("doctor")
 
     def _sheet(self, title: str, lines: list[tuple[str, str]]) -> None:
         Sheet(self._window.theme, self._window, title, lines).show_over()

@@ -11,6 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.blocks.mend import mend
+from app.core import deep_json
 from app.core.behaviour_file import SUFFIX
 from app.core.document import Document
 from app.core.journal import Unsaved
@@ -192,14 +193,11 @@ class Files:
     def mend(self, action: str) -> bool:
         """Change the blocks as a problem's button says; False when it says nothing about blocks."""
         document = self._session.document
-        if mend(document.workspace, action) is None:
+        if deep_json.deeply(lambda: mend(document.workspace, action)) is None:
             return False
 
         def change() -> None:
-            made = mend(document.workspace, action)
-            if made is not None:
-                document.edited(made)
-                document.mends += 1
+            document.mend(action)
 
         self.with_newest(change)
         return True

@@ -303,6 +303,7 @@ class Document:
         self.edits = 0
         self.definitions_revision = 0
         self.found: tuple[Problem, ...] = ()
+        self.absent: tuple[Robot, ...] = ()
         self.sensors: tuple[tuple[str, str], ...] = ()
         self.known: Callable[[], list[Robot]] = list
         self.source = ""

@@ -6,7 +6,7 @@ from PySide6.QtTest import QTest
 
 from app.blocks import Problem
 from app.ui.panels.problems import PANEL, ProblemsPanel
-from tests.ui.fakes import Session
+from tests.ui.fakes import Session, pepper
 from tests.ui.panel_case import Window, press
 
 
@@ -29,7 +29,7 @@ def test_each_problem_with_its_sentence_and_what_mends_it(panel, window) -> None
     assert [row.problem.subject for row in panel.rows] == ["wave", "wait until"]
     assert panel.rows[0].accessibleName() == "warning: NAO is not connected, so wave will be skipped."
     assert (panel.chip.text, panel.chip.status) == ("2", "warn")
-    press(panel.rows[1].button)
+    press(panel.rows[1].buttons[0])
     assert window.commands == ["add_time_limit"]
 
 
@@ -53,7 +53,12 @@ def test_it_is_checked_only_when_the_behaviour_changed(panel, window) -> None:
     panel.refresh()
     assert len(panel.rows) == 3
     assert panel.chip.status == "error"
-    assert not panel.rows[0].button.isVisibleTo(panel)
+    assert panel.rows[0].buttons == []
+    assert panel.rows[1:] == rows  # those that were there stay
+    document.found = document.found[1:2]
+    document.edits += 1
+    panel.refresh()
+    assert panel.rows == rows[:1]  # what is cured goes
 
 
 def test_with_nothing_to_mend_it_says_so(qtbot, qapp) -> None:
@@ -65,3 +70,42 @@ def test_with_nothing_to_mend_it_says_so(qtbot, qapp) -> None:
     assert isinstance(panel, ProblemsPanel)
     assert panel.nothing.isVisible()
     assert (panel.chip.text, panel.chip.status) == ("none", "ok")
+
+
+def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, window) -> None:
+    document = window.session.document
+    absent = [
+        Problem("warning", f"b{n}", "robot", "say", "Pepper 2 is not connected, so say will be skipped.",
+                "Connect Pepper 2", "connect:Pepper 2", icon="message-circle")
+        for n in range(3)
+    ]  # fmt: skip
+    document.found, document.edits = tuple(absent), 7
+    document.absent = (pepper("Pepper 2"),)
+    say = {"type": "robot_virtual_pepper_do_say", "fields": {"ROBOT": "Pepper 2"}}
+    document.workspace = {"blocks": {"blocks": [say]}}
+    panel.refresh()
+    (row,) = panel.rows
+    assert row.accessibleName() == "warning: Pepper 2 is not connected, so 3 blocks will be skipped."
+    assert [button.text() for button in row.buttons] == ["Use Pepper"]
+    press(row.buttons[0])
+    assert window.commands == ["robot.use:Pepper 2:Pepper"]
+    assert panel.chip.toolTip() == "1 warning"
+
+
+def test_the_arrow_keys_go_along_the_problems(panel, window) -> None:
+    panel.activateWindow()
+    panel.rows[0].setFocus()
+    QTest.keyClick(panel.rows[0], Qt.Key.Key_Down)
+    assert panel.rows[1].hasFocus()
+    QTest.keyClick(panel.rows[1], Qt.Key.Key_Down)
+    assert panel.rows[1].hasFocus()
+    QTest.keyClick(panel.rows[1], Qt.Key.Key_Up)
+    assert panel.rows[0].hasFocus()
+
+
+def test_while_a_long_behaviour_is_checked_the_old_problems_stay(panel, window, monkeypatch) -> None:
+    rows = list(panel.rows)
+    monkeypatch.setattr(window.session.document, "newest", lambda: None)
+    panel.refresh()
+    assert panel.rows == rows
+    assert panel.checked.text() == "Checking"

@@ -1,0 +1,98 @@
+"""The problems of a behaviour as people see them: a missing robot is one line, with what can be done."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from app.blocks import Problem
+from app.blocks.robot_mend import can_do
+from app.robots.description import Robot
+
+CONNECT = "connect:"
+MOST_MENDS = 2  # a line has no room for more
+
+
+@dataclass(frozen=True)
+class Mend:
+    """A button: its words, and the command that it runs."""
+
+    words: str
+    action: str
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One line: the problem, what mends it (the best first), and how many blocks it is about."""
+
+    problem: Problem
+    mends: tuple[Mend, ...]
+    blocks: int = 1
+
+    @property
+    def severity(self) -> str:
+        """``error``, ``warning`` or ``info``."""
+        return self.problem.severity
+
+
+def listed(
+    problems: Sequence[Problem],
+    workspace: Mapping[str, object],
+    missing: Sequence[Robot],
+    connected: Sequence[Robot],
+    virtual_models: Collection[str],
+) -> tuple[Listed, ...]:
+    """The lines for these problems.
+
+    All blocks of one missing robot are one line. It offers each connected robot that can do the same, and the
+    virtual robot of its model.
+    """
+    found: list[Listed] = []
+    place: dict[str, int] = {}
+    known = {robot.name: robot for robot in missing}
+    for problem in problems:
+        name = _missing(problem)
+        if name is None:
+            own = (Mend(problem.mend, problem.mend_action),) if problem.mend and problem.mend_action else ()
+            found.append(Listed(problem, own))
+        elif name in place:
+            at = place[name]
+            found[at] = replace(found[at], blocks=found[at].blocks + 1)
+        else:
+            place[name] = len(found)
+            mends = robot_mends(name, known.get(name), workspace, connected, virtual_models)
+            found.append(Listed(problem, mends))
+    return tuple(_counted(each) for each in found)
+
+
+def robot_mends(
+    name: str,
+    robot: Robot | None,
+    workspace: Mapping[str, object],
+    connected: Sequence[Robot],
+    virtual_models: Collection[str],
+) -> tuple[Mend, ...]:
+    """What can be done about a missing robot, the best first."""
+    if robot is None:
+        return (Mend(f"Connect {name}", f"{CONNECT}{name}"),)
+    able = [other for other in connected if can_do(workspace, name, robot.model, other)]
+    alike = [other for other in able if other.model == robot.model] or able
+    mends = [Mend(f"Use {other.name}", f"robot.use:{name}:{other.name}") for other in alike[:MOST_MENDS]]
+    if robot.model in virtual_models and len(mends) < MOST_MENDS:
+        mends.append(Mend(f"Use the virtual {name}", f"robot.virtual:{name}"))
+    return tuple(mends) or (Mend(f"Connect {name}", f"{CONNECT}{name}"),)
+
+
+def _missing(problem: Problem) -> str | None:
+    action = problem.mend_action or ""
+    return action.removeprefix(CONNECT) if action.startswith(CONNECT) else None
+
+
+def _counted(line: Listed) -> Listed:
+    """One block is named, several are counted."""
+    if line.blocks == 1:
+        return line
+    name = _missing(line.problem) or ""
+    subject = f"{line.blocks} blocks"
+    sentence = f"{name} is not connected, so {subject} will be skipped."
+    return replace(line, problem=replace(line.problem, subject=subject, sentence=sentence, icon="bot"))

@@ -1,0 +1,96 @@
+"""A missing robot is one line, with the robots that can do its work and the virtual one."""
+
+from __future__ import annotations
+
+from app.blocks import compile_behaviour
+from app.blocks.robot_mend import can_do, use_robot
+from app.core.document import Document
+from app.core.journal import Journal
+from app.core.problem_list import Mend, listed
+from app.robots import simulated
+from app.robots.description import Robot, parse, td_for
+from tests.blocks.samples import block, say, started, text, workspace
+from tests.blocks.samples import robot as sample
+
+MODELS = {"pepper"}
+
+
+def pepper(name: str) -> Robot:
+    return parse(td_for(simulated.ROBOT.thing_model, name))
+
+
+def speaks(robot: str, count: int = 3) -> dict[str, object]:
+    blocks = [block("robot_pepper_do_say", ROBOT=robot, TEXT=text(f"{n}")) for n in range(count)]
+    return workspace(started(*blocks))
+
+
+def lines(saved, missing: list[Robot], connected: list[Robot]):
+    program = compile_behaviour(saved, connected, absent=missing, name="Test")
+    return listed(program.problems, saved, missing, connected, MODELS)
+
+
+def test_all_blocks_of_a_missing_robot_are_one_line() -> None:
+    (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [])
+    assert line.problem.sentence == "Pepper is not connected, so 3 blocks will be skipped."
+    assert line.problem.subject == "3 blocks"
+    assert line.problem.block_id, "a press leads to the first"
+    assert line.mends == (Mend("Use the virtual Pepper", "robot.virtual:Pepper"),)
+
+
+def test_one_block_is_named() -> None:
+    (line,) = lines(speaks("Pepper", 1), [pepper("Pepper")], [])
+    assert line.problem.sentence == "Pepper is not connected, so say will be skipped."
+
+
+def test_a_connected_robot_that_can_do_the_same_comes_first() -> None:
+    (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2"), sample("Other")])
+    assert [mend.words for mend in line.mends] == ["Use Pepper 2", "Use the virtual Pepper"]
+    assert line.mends[0].action == "robot.use:Pepper:Pepper 2"
+
+
+def test_a_robot_of_an_unknown_model_can_only_be_connected() -> None:
+    (line,) = lines(workspace(started(say("Hi"))), [sample("Pepper")], [])
+    assert [mend.words for mend in line.mends] in (["Connect Pepper"], ["Use the virtual Pepper"])
+
+
+def test_the_blocks_of_two_missing_robots_are_two_lines() -> None:
+    both = workspace(
+        started(*(block("robot_pepper_do_say", ROBOT=name, TEXT=text("x")) for name in ("A", "B", "A")))
+    )
+    found = lines(both, [pepper("A"), pepper("B")], [])
+    assert [(line.blocks, line.mends[0].action) for line in found] == [
+        (2, "robot.virtual:A"),
+        (1, "robot.virtual:B"),
+    ]
+
+
+def test_using_another_robot_cures_the_problem_and_can_be_taken_back(tmp_path) -> None:
+    document = Document(lambda: Journal(tmp_path))
+    document.set_connected([pepper("Pepper")])
+    document.edited(speaks("Pepper"))
+    document.set_connected([pepper("Pepper 2")])
+    before, mends = document.workspace, document.mends
+    assert document.problems()
+    assert document.use_robot("Pepper", pepper("Pepper 2"))
+    assert document.problems() == ()
+    assert document.program().robots == ("Pepper 2",)
+    assert (document.mends, document.dirty) == (mends + 1, True)
+    assert before == speaks_again(before), "the blocks of before are as they were: undo shows them"
+    assert not document.use_robot("Nobody", pepper("Pepper 2"))
+
+
+def speaks_again(saved):
+    assert "Pepper 2" not in str(saved)
+    return saved
+
+
+def test_another_model_does_it_when_it_knows_every_block() -> None:
+    other = sample("Rosie")
+    said = workspace(started(block("robot_pepper_do_say", ROBOT="Pepper", TEXT=text("x"))))
+    walks = workspace(started(block("robot_pepper_do_walk", ROBOT="Pepper")))
+    assert can_do(said, "Pepper", "pepper", other)
+    assert not can_do(walks, "Pepper", "pepper", other)
+    assert not can_do(said, "Nobody", "pepper", other), "nothing asks it"
+    made = use_robot(said, "Pepper", "pepper", other)
+    program = compile_behaviour(made, [other], name="Test")
+    assert (program.problems, program.robots) == ((), ("Rosie",))
