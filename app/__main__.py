@@ -40,13 +40,17 @@ def run_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="nep-studio run",
         description="Run a behaviour with no window. Exit codes: 0 ended well; 1 a block failed or a robot "
-        "did not stop; 2 the file can't be run; 3 a robot of it is not there; 130 stopped by Ctrl+C.",
+        "did not stop; 2 the file can't be run; 3 a robot of it is not there; 4 a real robot would move and "
+        "may not; 130 stopped by Ctrl+C.",
     )
     made.add_argument("file", type=Path, metavar="FILE", help="the behaviour")
     made.add_argument(
         "--robot-wait", type=float, metavar="S", default=10.0, help="wait for its robots, in seconds"
     )
     made.add_argument("--master", metavar="HOST:PORT", help="the master to join")
+    made.add_argument(
+        "--allow-moving", action="store_true", help="let robots move that are not virtual; Ctrl+C stops them"
+    )
     return made
 
 
@@ -73,7 +77,12 @@ def run_behaviour(arguments: Sequence[str]) -> int:
     options = run_parser().parse_args(arguments)
     from app.run import run_file  # noqa: PLC0415  a child process needs none of it
 
-    return run_file(options.file, robot_wait_s=options.robot_wait, master=options.master)
+    return run_file(
+        options.file,
+        robot_wait_s=options.robot_wait,
+        master=options.master,
+        allow_moving=options.allow_moving,
+    )
 
 
 def hand_over(module: str, arguments: Sequence[str]) -> int:

@@ -1,7 +1,7 @@
 """``python -m app run FILE``: one behaviour with no window.
 
 Exit codes: 0 it ended well, 1 a block failed or a robot did not stop, 2 the file can't be run, 3 a robot of
-it is not there, 130 it was stopped by Ctrl+C.
+it is not there, 4 a real robot would move and nobody said that it may, 130 it was stopped by Ctrl+C.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from app.blocks import Program, compile_behaviour
 from app.blocks.fleet_search import find_robots
 from app.blocks.workspace import Workspace, parse_workspace
 from app.core.document import read
+from app.core.moving import risky, wanted_by
 from app.core.runner import Runner, RunnerEvent
 from app.core.stopping import RobotStopper, StopReport
 from app.errors import AppError, DescriptionError
 from app.robots.description import Robot, parse
 from nep.errors import NepError
 
-OK, FAILED, UNUSABLE, ROBOT_MISSING, INTERRUPTED = 0, 1, 2, 3, 130
+OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 ROBOT_WAIT_S = 10.0
 STOP_S = 1.0
 SLICE_S = 0.1
@@ -38,12 +39,13 @@ def run_file(
     master: str | None = None,
     out: TextIO | None = None,
     interrupted: threading.Event | None = None,
+    allow_moving: bool = False,
 ) -> int:
     """Run a behaviour file to its end; the exit code of this module's docstring.
 
     It waits `robot_wait_s` for the robots that its blocks name. What happens is written to `out` (stdout),
     one line each. Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots
-    stopped.
+    stopped. Without `allow_moving` a behaviour that would move a robot which is not virtual is refused.
     """
     say = _writer(out or sys.stdout)
     try:
@@ -57,6 +59,8 @@ def run_file(
             if code is not None:
                 return code
             used = [robot for robot in robots if robot.name in program.robots]
+            if not allow_moving and _would_move(program, used, say):
+                return MAY_NOT_MOVE
             stopper = RobotStopper(node)
             try:
                 stopper.set_robots(used)
@@ -111,6 +115,16 @@ def _refused(
         say(f"“{program.name}” can't run.")
         return UNUSABLE
     return None
+
+
+def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], None]) -> bool:
+    """Name each real robot that the program would move; whether there is one."""
+    real = [robot for robot in robots if not robot.virtual]
+    moves = {robot.name: risky(robot, asked) for robot, asked in wanted_by(program.runnable, real)}
+    for name, titles in moves.items():
+        if titles:
+            say(f"{name} would move ({', '.join(titles)}). Add --allow-moving if it may.")
+    return any(moves.values())
 
 
 def _run(

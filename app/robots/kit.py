@@ -10,10 +10,10 @@ from app.robots.calls import Call, Canceled, Clock, Failed, Link, MonotonicClock
 from app.robots.declare import Kind, action, detections, event, picture, safe_stop, sensor
 from app.robots.driver import Driver
 from app.robots.process import main
-from app.robots.typed import Advanced, Colour, Range, Suggested, Text, Title, Words
+from app.robots.typed import Advanced, Colour, Image, Range, Suggested, Text, Title, Words
 
 __all__ = [
-    "Advanced", "Call", "Canceled", "Clock", "Colour", "Driver", "Failed", "Kind", "Link", "MonotonicClock",
-    "Range", "Suggested", "Text", "Title", "Words", "action", "detections", "event", "main", "picture",
-    "safe_stop", "sensor",
+    "Advanced", "Call", "Canceled", "Clock", "Colour", "Driver", "Failed", "Image", "Kind", "Link",
+    "MonotonicClock", "Range", "Suggested", "Text", "Title", "Words", "action", "detections", "event",
+    "main", "picture", "safe_stop", "sensor",
 ]  # fmt: skip

@@ -15,6 +15,7 @@ from types import FrameType
 import psutil
 
 import nep
+from app.robots.calls import Failed
 from app.robots.declare import Kind
 from app.robots.driver import Driver
 
@@ -24,7 +25,8 @@ _OWNER_CHECK_S = 0.5
 def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     """Run a robot of this kind until it is asked to end (SIGTERM, Ctrl+C) or its owner is gone.
 
-    Without a master it waits for one. 0 on an orderly end, 2 for wrong arguments.
+    Without a master it waits for one. 0 on an orderly end, 1 when the robot can't be connected (its class
+    raised Failed), 2 for wrong arguments.
     """
     parser = argparse.ArgumentParser(description=f"Drive a robot: {kind.title}.")
     parser.add_argument("--name", default=kind.title, help="the robot's name; its topics begin with it")
@@ -34,7 +36,11 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(name)s: %(message)s")
     ended = threading.Event()
     _on_signals(ended)
-    run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
+    try:
+        run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
+    except Failed as error:  # the robot's own __init__: it can't be reached
+        sys.stderr.write(f"{chosen.name}: {error}\n")
+        return 1
     return 0
 
 

@@ -65,7 +65,14 @@ class _HexColour:
     """A text that is a colour."""
 
 
+@dataclass(frozen=True)
+class _PictureText:
+    """A text that is a picture."""
+
+
 Colour: TypeAlias = Annotated[str, _HexColour()]
+Image: TypeAlias = Annotated[str, _PictureText()]
+"""A picture as ``data:image/jpeg;base64,...``, or its address."""
 
 
 def schema_of(annotation: object) -> Schema:
@@ -113,6 +120,8 @@ def _noted(note: object, schema: Schema) -> Schema:
         return {"rb:advanced": True}
     if isinstance(note, _HexColour):
         return {"pattern": "^#[0-9a-fA-F]{6}$", "rb:widget": "colour"}
+    if isinstance(note, _PictureText):
+        return {"format": "uri-reference", "contentMediaType": "image/jpeg", "rb:widget": "image"}
     raise TypeError(f"{note!r} says nothing about a robot's value")
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from app import resources
-from app.run import FAILED, INTERRUPTED, OK, ROBOT_MISSING, UNUSABLE, run_file
+from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, robot, say, started, text, workspace, write
 from tests.blocks.wire_robot import RizeRobot, WireRobot
@@ -132,6 +132,25 @@ def test_a_robot_of_rize_is_driven_too(master, tmp_path):
         assert (first["robots"], first["primitives"]["primitive"], first["primitives"]["input"]) == (
             "Rosie", "say", "hello",
         )  # fmt: skip
+    finally:
+        rosie.close()
+
+
+def test_a_real_robot_moves_only_when_it_may(master, tmp_path):
+    rosie = RizeRobot(master.address)
+    try:
+        walk = block("robot_rize_do_walk", ROBOT="Rosie", DIRECTION="forwards", METERS=number(0.5))
+        robots = {"Rosie": dict(rosie.described.source)}
+        content = {"format": "nep-behaviour", "version": 1, "name": "RIZE", "robots": robots}
+        path = tmp_path / "rize.nepb"
+        path.write_text(json.dumps(content | {"workspace": workspace(started(walk))}))
+        code, out = run(path)
+        assert code == MAY_NOT_MOVE, out
+        assert "Rosie would move (walk). Add --allow-moving if it may." in out
+        assert rosie.commands == []
+        code, out = run(path, allow_moving=True)
+        assert code == OK, out
+        assert rosie.commands[0]["primitives"]["primitive"] == "walk"
     finally:
         rosie.close()
 

@@ -50,7 +50,7 @@ def heard(driver: Peer) -> None:
 
 
 def test_blocks_drive_it_without_a_window(driver: Peer, tmp_path: Path) -> None:
-    with Program("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30") as program:
+    with Program("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30", "--allow-moving") as program:
         assert program.wait(60) == 0, program.lines
         program.says("Turtle: stop sent; this robot cannot confirm")
     heard(driver)
@@ -64,5 +64,6 @@ def test_the_window_finds_it_and_blocks_drive_it(
     studio.open_category("Speech")
     studio.screen.key("Escape")
     studio.click("Run", kind="RunButton")
+    studio.click("Let it move")  # it is no virtual robot, and its program walks
     heard(driver)
     studio.says("Turtle cannot confirm")

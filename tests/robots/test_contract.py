@@ -1,0 +1,347 @@
+"""What every driver owes to the people who rely on it: one contract, over each robot and each example."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import nep
+from app import resources
+from app.robots import simulated, turtle
+from app.robots.description import Action, Robot, parse, validate
+from app.robots.driver import Driver
+from app.robots.kit import Kind
+from tests.robots.conftest import Ears, FakeClock, eventually
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+FINAL = {"succeeded", "failed", "canceled"}
+PATIENCE_S = 1.0  # a loaded machine; what stops on its own within its `within` is measured in bench/stop.py
+
+
+def kinds() -> Iterator[Kind]:
+    """The robots of Studio, and whatever in examples/ declares one."""
+    yield simulated.ROBOT
+    yield turtle.ROBOT
+    for path in sorted(EXAMPLES.glob("*.py")):
+        if "app.robots.kit" in path.read_text(encoding="utf-8"):
+            spec = importlib.util.spec_from_file_location(path.stem, path)
+            assert spec is not None
+            assert spec.loader is not None
+            module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
+            yield module.ROBOT
+
+
+KINDS = list(kinds())
+
+
+@dataclass
+class Bench:
+    """A driver whose time a test holds in its hand, and ears on its topics."""
+
+    kind: Kind
+    driver: Driver
+    ears: Ears
+    clock: FakeClock
+    count: int = 0
+
+    @property
+    def robot(self) -> Robot:
+        return self.driver.robot
+
+    def new_id(self) -> str:
+        self.count += 1
+        return f"{self.kind.model}-{self.count}"
+
+    def actions(self) -> list[Action]:
+        stop = self.robot.safe_stop.action
+        return [action for action in self.robot.actions if action.name != stop]
+
+    def long(self) -> list[Action]:
+        """The actions that take time and can be ended: with a clock that stands they run until then."""
+        return [action for action in self.actions() if action.cancellable]
+
+    def invoke(self, action: Action, program: str | None = None) -> str:
+        wanted = self.new_id()
+        self.ears.invoke(wanted, action.name, program, **required(action))
+        return wanted
+
+    def running(self, wanted: str) -> None:
+        eventually(lambda: "running" in self.ears.states(wanted))
+
+    def stop(self) -> dict[str, object]:
+        wanted = self.new_id()
+        self.ears.command(id=wanted, op="stop")
+        return self.ears.final(wanted, "stop", PATIENCE_S + self.robot.safe_stop.within_s)
+
+    def finals(self, wanted: str) -> list[dict[str, object]]:
+        return [answer for answer in self.ears.answers(wanted) if answer["state"] in FINAL]
+
+
+def required(action: Action) -> dict[str, object]:
+    """An input with what must be given."""
+    return {p.name: p.default for p in action.parameters if p.required and p.default is not None}
+
+
+def wrong_for(kind: str) -> object:
+    """A value that no parameter of this kind takes."""
+    return {"x": 1} if kind in {"text", "image", "colour", "choice", "boolean", "list"} else "many"
+
+
+@pytest.fixture(scope="module", params=KINDS, ids=lambda kind: kind.model)
+def shared(request) -> Iterator[Bench]:
+    kind: Kind = request.param
+    clock = FakeClock()
+    name = f"The {kind.model}"
+    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
+        ears = Ears(other, name.replace(" ", "_"))
+        driver = Driver(kind, name, node, clock=clock)
+        driver.start()
+        yield Bench(kind, driver, ears, clock)
+        driver.close()
+
+
+@pytest.fixture
+def bench(shared: Bench) -> Iterator[Bench]:
+    yield shared
+    shared.stop()  # whatever a test left running
+
+
+# ---- what it says about itself ---------------------------------------------------------------------
+
+
+def test_its_description_is_valid_and_every_action_is_there(bench) -> None:
+    assert validate(bench.kind.thing_model) == ()
+    described = json.loads(json.dumps(bench.driver.description))
+    assert parse(described) == bench.robot
+    for action in bench.robot.actions:
+        assert callable(getattr(bench.driver.body, action.name))
+        assert resources.path("icons", f"{action.icon}.svg").is_file()
+        if action.risk:
+            assert action.uses, f"{action.name} moves something, so it uses it"
+    assert bench.robot.beat_s is not None
+    assert bench.robot.safe_stop.confirmed
+    assert bench.robot.safe_stop.watchdog_s is not None
+
+
+# ---- stop ------------------------------------------------------------------------------------------
+
+
+def test_a_stop_at_rest_is_answered(bench) -> None:
+    assert bench.stop()["state"] == "succeeded"
+    assert bench.stop()["state"] == "succeeded"
+
+
+def test_a_stop_ends_whatever_runs_and_whatever_waits(bench) -> None:
+    for action in bench.long():
+        first = bench.invoke(action)
+        bench.running(first)
+        second = bench.invoke(action)
+        eventually(lambda second=second: bench.ears.states(second))
+        assert bench.stop()["state"] == "succeeded", action.name
+        for wanted in (first, second):
+            assert [answer["state"] for answer in bench.finals(wanted)] in (["canceled"], ["failed"])
+
+
+def test_many_stops_at_once_are_all_answered(bench) -> None:
+    started = bench.invoke(bench.long()[0])
+    bench.running(started)
+    ids = [bench.new_id() for _ in range(5)]
+    for wanted in ids:
+        bench.ears.command(id=wanted, op="stop")
+    assert {bench.ears.final(wanted, "stop")["state"] for wanted in ids} == {"succeeded"}
+
+
+def test_the_stop_action_is_a_stop_too(bench) -> None:
+    started = bench.invoke(bench.long()[0])
+    bench.running(started)
+    wanted = bench.new_id()
+    bench.ears.invoke(wanted, bench.robot.safe_stop.action)
+    assert bench.ears.final(wanted)["state"] == "succeeded"
+    assert bench.ears.final(started)["state"] == "canceled"
+
+
+def test_a_stop_that_ends_a_program_refuses_what_it_sent_before(bench) -> None:
+    bench.ears.command(id=bench.new_id(), op="stop", ends="gone")
+    late = bench.invoke(bench.long()[0], "gone")
+    assert bench.ears.final(late)["state"] == "canceled"
+    assert "running" not in bench.ears.states(late)
+
+
+# ---- actions ---------------------------------------------------------------------------------------
+
+
+def test_each_action_is_answered_exactly_once_and_can_be_canceled(bench) -> None:
+    for action in bench.actions():
+        wanted = bench.invoke(action)
+        if action.cancellable:
+            bench.running(wanted)
+            bench.ears.command(id=wanted, op="cancel")
+            assert bench.ears.final(wanted)["state"] == "canceled", action.name
+        else:
+            assert bench.ears.final(wanted)["state"] == "succeeded", action.name
+        bench.stop()  # all answers have been given by now
+        assert len(bench.finals(wanted)) == 1
+        assert bench.ears.states(wanted)[:2] == ["accepted", "running"]
+
+
+def test_a_cancel_that_finds_nothing_says_so(bench) -> None:
+    wanted = bench.new_id()
+    bench.ears.command(id=wanted, op="cancel")
+    answer = bench.ears.final(wanted, "cancel")
+    assert (answer["state"], answer["error"]) == ("failed", "nothing with this id runs")
+
+
+def test_what_takes_too_long_fails_with_its_limit(bench) -> None:
+    late = []
+    for action in (each for each in bench.long() if each.timeout_s):
+        wanted = bench.invoke(action)
+        bench.running(wanted)
+        bench.clock.advance(action.timeout_s + 0.1)
+        ended = bench.ears.final(wanted)
+        if ended["state"] == "succeeded":
+            continue  # one that only lets time pass was done in that moment
+        assert ended["state"] == "failed"
+        assert ended["error"] == f"{action.name} took longer than {action.timeout_s:g} s"
+        late.append(action.name)
+    assert late
+
+
+def test_busy_is_handled_as_the_description_says(bench) -> None:
+    for action in (each for each in bench.long() if each.uses):
+        first = bench.invoke(action)
+        bench.running(first)
+        second = bench.invoke(action)
+        eventually(lambda second=second: bench.ears.states(second))
+        told = bench.ears.answers(second)[0]
+        if action.on_busy == "queue":
+            assert told["waits_for"] == [action.name]
+            bench.ears.command(id=first, op="cancel")
+        elif action.on_busy == "replace":
+            assert told["replaces"] == [action.name]
+        else:
+            assert (told["state"], "is busy with" in str(told["error"])) == ("failed", True)
+            bench.stop()
+            continue
+        assert bench.ears.final(first)["state"] == "canceled"
+        bench.running(second)
+        bench.stop()
+
+
+def test_it_stops_when_the_program_that_moves_it_falls_silent(bench) -> None:
+    wanted = bench.invoke(bench.long()[0], "silent")
+    bench.running(wanted)
+    bench.clock.advance((bench.robot.safe_stop.watchdog_s or 0) + 0.05)
+    ended = bench.ears.final(wanted)
+    assert ended["state"] == "canceled"
+    assert "no sign of life" in str(ended["error"])
+
+
+def test_it_tells_that_it_lives_while_it_does_something(bench) -> None:
+    def beats() -> int:
+        return sum(1 for answer in list(bench.ears.heard["answer"]) if answer["op"] == "alive")
+
+    wanted = bench.invoke(bench.long()[0])
+    bench.running(wanted)
+    told = beats()
+    bench.clock.advance((bench.robot.beat_s or 0) + 0.01)
+    eventually(lambda: beats() > told)
+
+
+# ---- what is wrong ---------------------------------------------------------------------------------
+
+
+def test_wrong_inputs_are_refused_with_a_sentence_and_nothing_runs(bench) -> None:
+    for action in bench.actions():
+        inputs: list[object] = [{"no such thing": 1}, "text", [1, 2]]
+        inputs += [{**required(action), p.name: wrong_for(p.kind)} for p in action.parameters]
+        inputs += [{**required(action), p.name: None} for p in action.parameters]
+        limited = [p for p in action.parameters if p.maximum is not None]
+        inputs += [{**required(action), p.name: (p.maximum or 0) + 1} for p in limited]
+        for given in inputs:
+            wanted = bench.new_id()
+            bench.ears.command(id=wanted, op="invoke", action=action.name, input=given)
+            answer = bench.ears.final(wanted)
+            assert answer["state"] == "failed", (action.name, given)
+            assert str(answer["error"]).startswith(f"{action.name}: ")
+            assert bench.ears.states(wanted) == ["failed"]
+
+
+def test_an_action_that_it_has_not_is_refused(bench) -> None:
+    wanted = bench.new_id()
+    bench.ears.invoke(wanted, "fly to the moon")
+    assert "can't “fly to the moon”" in str(bench.ears.final(wanted)["error"])
+
+
+@pytest.mark.parametrize(
+    "message",
+    [None, 7, "stop", [], {}, {"op": "invoke"}, {"id": 7, "op": "stop"}, {"id": "x" * 500, "op": "stop"},
+     {"id": "", "op": "invoke"}, {"id": None, "op": None}],
+    ids=repr,
+)  # fmt: skip
+def test_messages_that_are_no_commands_change_nothing(bench, message) -> None:
+    before = len(bench.ears.heard["answer"])
+    bench.ears._command.publish(message)
+    wanted = bench.new_id()
+    bench.ears.command(id=wanted, op="dance")
+    answer = bench.ears.final(wanted, "dance")
+    assert "a command is invoke, cancel, stop or alive" in str(answer["error"])
+    assert [a["id"] for a in bench.ears.heard["answer"][before:]] == [wanted]
+
+
+def test_the_same_command_twice_runs_once(bench) -> None:
+    action = bench.long()[0]
+    wanted = bench.invoke(action)
+    bench.running(wanted)
+    bench.ears.invoke(wanted, action.name, **required(action))
+    bench.ears.command(id=wanted, op="cancel")
+    bench.ears.final(wanted)
+    bench.stop()
+    assert bench.ears.states(wanted).count("accepted") == 1
+    assert len(bench.finals(wanted)) == 1
+
+
+# ---- its life --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.model)
+def test_closing_answers_what_is_open_and_leaves_no_thread(kind) -> None:
+    name = f"Closing {kind.model}"
+    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
+        ears = Ears(other, name.replace(" ", "_"))
+        driver = Driver(kind, name, node, clock=FakeClock())
+        driver.start()
+        long = next(action for action in driver.robot.actions if action.cancellable)
+        ears.invoke("1", long.name, **required(long))
+        eventually(lambda: "running" in ears.states("1"))
+        driver.close()
+        driver.close()
+        assert ears.final("1")["state"] == "canceled"
+        ears.invoke("2", long.name)
+        assert ears.answers("2") == []
+    assert [t.name for t in threading.enumerate() if t.name.startswith(name)] == []
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.model)
+def test_what_its_description_suggests_can_be_done(kind) -> None:
+    """With the computer's own clock, all at once where they use different things."""
+    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
+        name = f"Real_{kind.model}"
+        ears = Ears(other, name)
+        with Driver(kind, name, node) as driver:
+            taken: set[str] = set()
+            asked: dict[str, Mapping[str, object]] = {}
+            for action in driver.robot.actions:
+                if taken & set(action.uses) or action.name == driver.robot.safe_stop.action:
+                    continue
+                taken |= set(action.uses)
+                asked[action.name] = required(action)
+                ears.invoke(action.name, action.name, **required(action))
+            for wanted in asked:
+                assert ears.final(wanted, timeout_s=20)["state"] == "succeeded", wanted

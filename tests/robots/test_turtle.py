@@ -1,0 +1,218 @@
+"""The robot on two wheels: how it rolls, what it bumps into and sees, how it stops; its description."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+import nep
+from app import resources
+from app.robots.diffdrive import DIFFDRIVE
+from app.robots.driver import Driver
+from app.robots.turtle import ROBOT
+from app.robots.virtual.camera import Camera
+from app.robots.virtual.colours import colours_in
+from app.robots.virtual.lens import Lens
+from app.robots.virtual.room import Room
+from app.robots.virtual.wheels import BRAKING, RADIUS, START, WheelBody
+from tests.robots.conftest import Ears, eventually
+
+
+def near(value: float, expected: float, within: float) -> bool:
+    return abs(value - expected) <= within
+
+
+# ---- the body --------------------------------------------------------------------------------------
+
+
+def test_it_gets_to_the_speed_that_is_asked_for_and_brakes_within_a_tenth_of_a_second() -> None:
+    body = WheelBody(x=0.0, y=-1.0, theta_deg=180.0)
+    body.drive(0.5, 0.0)
+    body.step(1.0)
+    assert near(body.speed, 0.5, 1e-9)
+    assert body.x < -0.3
+    body.drive(0.0, 0.0)
+    body.step(0.5 / BRAKING + 0.02)
+    assert body.still
+    x = body.x
+    body.step(1.0)
+    assert body.x == x
+
+
+def test_it_turns_to_its_left_and_drives_in_a_circle() -> None:
+    body = WheelBody(x=0.0, y=0.6, theta_deg=180.0)
+    body.drive(0.0, 90.0)
+    body.step(1.0)
+    assert -120 < body.theta_deg < -60  # from 180 over the left
+    body = WheelBody(x=-1.0, y=-0.6, theta_deg=0.0)
+    body.drive(0.3, 60.0)
+    body.step(6.3)
+    assert math.hypot(body.x + 1.0, body.y + 0.6) < 0.2  # once round
+
+
+@pytest.mark.parametrize(
+    ("start", "speed", "side"),
+    [
+        ((2.5, 1.9, 0.0), 0.4, "front"),
+        ((-2.1, -2.0, 0.0), -0.4, "back"),
+        ((0.0, 2.2, 45.0), 0.4, "left"),
+        ((-1.5, -2.2, -45.0), 0.4, "right"),
+    ],
+)
+def test_it_stops_at_what_it_bumps_into_and_says_with_which_side(start, speed, side) -> None:
+    body = WheelBody(x=start[0], y=start[1], theta_deg=start[2])
+    body.drive(speed, 0.0)
+    body.step(3.0)
+    assert body.bumped == side
+    assert body.still
+    assert [(h.event, h.data) for h in body.happenings] == [("bump", {"side": side})]
+    body.drive(-speed, 0.0)
+    body.step(0.5)
+    assert body.bumped == ""
+
+
+def test_it_pushes_the_ball_and_measures_what_is_ahead() -> None:
+    body = WheelBody(x=1.2, y=-0.78, theta_deg=0.0)
+    ball = body.room.ball.x
+    body.drive(0.5, 0.0)
+    body.step(1.8)
+    assert body.room.ball.x > ball + 0.1
+    assert near(body.distance, body.room.x_max - body.x - RADIUS, 0.01)
+
+
+# ---- what it sees ----------------------------------------------------------------------------------
+
+
+def test_it_sees_the_red_ball_and_the_blue_shirt() -> None:
+    room = Room()
+    picture = Camera(room).picture(room, Lens((0.9, -0.78, 0.22), 0.0, -6.0))
+    found = colours_in(picture)
+    assert found["red"].area > 0.01
+    assert abs(found["red"].x) < 0.2
+    person = Camera(room).picture(room, Lens((-0.4, 0.1, 0.22), 0.0, -20.0))
+    assert "blue" in colours_in(person)
+
+
+def test_a_grey_picture_and_specks_have_no_colour() -> None:
+    picture = np.full((240, 320, 3), 120, np.uint8)
+    assert colours_in(picture) == {}
+    cv2.circle(picture, (160, 120), 3, (0, 0, 230), -1)
+    assert colours_in(picture) == {}
+    cv2.circle(picture, (300, 120), 15, (0, 0, 230), -1)
+    seen = colours_in(picture)["red"]
+    assert (seen.name, round(seen.x, 1)) == ("red", 0.9)
+
+
+# ---- its description -------------------------------------------------------------------------------
+
+
+def test_the_thing_model_is_made_from_it() -> None:
+    kept = json.loads(resources.path("robots", "diffdrive.tm.jsonld").read_text(encoding="utf-8"))
+    for part in ("properties", "actions", "events"):
+        for described in kept[part].values():
+            described.pop("rb:ros", None)
+    assert kept == json.loads(json.dumps(DIFFDRIVE.thing_model))
+    assert ROBOT.thing_model["actions"] == DIFFDRIVE.thing_model["actions"]
+
+
+# ---- the whole robot -------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def turtle(node: nep.Node):
+    with nep.node("listener", "memory") as other, Driver(ROBOT, "Turtle", node) as driver:
+        ears = Ears(other, "Turtle")
+        for leaf in ("pose", "state", "bump", "colour", "bumper", "battery", "distance"):
+            ears.listen(leaf)
+        eventually(lambda: ears.heard["state"])
+        yield driver.body, ears
+
+
+def pose(ears: Ears) -> tuple[float, float, float]:
+    told = ears.heard["pose"][-1]
+    return told["x"], told["y"], told["theta"]
+
+
+def test_it_moves_turns_and_goes_to_a_place(turtle) -> None:
+    _, ears = turtle
+    x, y, theta = START
+    ears.invoke("1", "move", distance=0.3)
+    assert near(ears.final("1")["output"]["moved"], 0.3, 0.05)
+    ears.invoke("2", "turn", angle=-35)
+    assert ears.final("2")["state"] == "succeeded"
+    eventually(lambda: near(pose(ears)[2], theta - 35, 6))
+    ears.invoke("3", "go_to", x=x, y=y + 0.2)
+    assert ears.final("3")["state"] == "succeeded"
+    eventually(lambda: near(pose(ears)[0], x, 0.06) and near(pose(ears)[1], y + 0.2, 0.06))
+    told = [a["feedback"] for a in ears.answers("1") if a["feedback"]]
+    assert told
+    assert set(told[0]) == {"moved", "to_go"}
+    ears.invoke("4", "go_to", x=pose(ears)[0], y=pose(ears)[1])
+    assert ears.final("4")["state"] == "succeeded"  # it is there
+
+
+def test_it_drives_until_its_program_falls_silent(turtle) -> None:
+    body, ears = turtle
+    ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)
+    assert ears.final("1")["state"] == "succeeded"
+    eventually(lambda: not body.wheels.still())
+    eventually(body.wheels.still)  # nothing said that the program lives
+    assert ears.heard["state"][-1]["figure"] == "turtle"
+
+
+def test_it_drives_on_while_its_program_lives_and_until_it_is_told_to_stop(turtle) -> None:
+    body, ears = turtle
+    ears.invoke("1", "drive", program="test", speed=0.0, turn=60)
+    ears.final("1")
+    began = len(ears.heard["pose"])
+    while len(ears.heard["pose"]) < began + 40:  # more than a second
+        seen = len(ears.heard["pose"])
+        ears.command(op="alive", id="a", **{"from": "test"})
+        eventually(lambda seen=seen: len(ears.heard["pose"]) > seen)
+    assert not body.wheels.still()
+    ears.command(id="s", op="stop")
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert body.wheels.still()
+
+
+def test_a_stop_in_the_middle_of_a_move_ends_it_still(turtle) -> None:
+    body, ears = turtle
+    ears.invoke("1", "move", distance=1.0)
+    eventually(lambda: not body.wheels.still())
+    ears.command(id="s", op="stop")
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert body.wheels.still()
+    assert ears.final("1")["state"] == "canceled"
+    where = pose(ears)
+    seen = len(ears.heard["pose"])
+    eventually(lambda: len(ears.heard["pose"]) > seen + 3)
+    assert pose(ears) == where
+
+
+def test_something_in_the_way_fails_the_move_and_is_told(turtle) -> None:
+    _, ears = turtle
+    ears.invoke("1", "go_to", x=0.3, y=-2.2)  # into the shelf
+    ended = ears.final("1", timeout_s=15)
+    assert (ended["state"], ended["error"]) == ("failed", "go_to: something is in the way")
+    assert ears.heard["bump"]
+    eventually(lambda: any(told["value"] for told in ears.heard["bumper"]))
+
+
+def test_wheels_that_go_on_turning_fail_the_stop(node: nep.Node) -> None:
+    class Stubborn(ROBOT.body):  # type: ignore[name-defined, misc]
+        def __init__(self, link: object) -> None:
+            super().__init__(link)
+            self.wheels.still = lambda: False
+
+    kind = replace(ROBOT, body=Stubborn)
+    with nep.node("listener", "memory") as other, Driver(kind, "Turtle", node):
+        ears = Ears(other, "Turtle")
+        ears.command(id="s", op="stop")
+        ended = ears.final("s", "stop", timeout_s=8)
+        assert ended["state"] == "failed"
+        assert "may still move" in ended["error"]
