@@ -43,7 +43,7 @@ def test_one_block_is_named() -> None:
 
 
 def test_a_connected_robot_that_can_do_the_same_comes_first() -> None:
-    (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2"), sample("Other")])
+    (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
     assert [mend.words for mend in line.mends] == ["Use Pepper 2", "Use the virtual Pepper"]
     assert line.mends[0].action == "robot.use:Pepper:Pepper 2"
 
