@@ -34,7 +34,7 @@ class AppBar(QWidget):
             theme, [(layout.name, layout.title, layout.icon) for layout in layouts], name="Layout"
         )
         self.switch.changed.connect(self.layout_chosen)
-        self.find = PaletteField(theme)
+        self.search = PaletteField(theme)
         self.chip = Chip(theme, "", "off", large=True)
         self.stop = StopButton(theme, "appBar")
         self.stop.clicked.connect(self.stop_pressed)
@@ -54,7 +54,7 @@ class AppBar(QWidget):
         robots.setContentsMargins(0, 0, 0, 0)
         robots.setSpacing(6)
         robots.addStretch(1)
-        robots.addWidget(self.find)
+        robots.addWidget(self.search)
         robots.addSpacing(6)
         robots.addWidget(self.chip)
         robots.addWidget(self.stop)

@@ -82,7 +82,7 @@ class Habits:
         self.actions, window = actions, self._window
         self._lists = MenuLists(window, actions, menus, self._files.open)
         self._lists.built_in, self._lists.own = self._built_in, self._use_layout
-        window.bar.find.clicked.connect(self.open_palette)
+        window.bar.search.clicked.connect(self.open_palette)
         self.shortcuts.changed.connect(self._show_keys)
         window.bench_made.connect(self.shortcuts.tell)
         window.theme.changed.connect(self._mark)
@@ -91,7 +91,7 @@ class Habits:
 
     def _show_keys(self) -> None:
         self.actions.set_keys(self.shortcuts.of)
-        self._window.bar.find.show_key(self.shortcuts.first("palette.open"))
+        self._window.bar.search.show_key(self.shortcuts.first("palette.open"))
         self.shortcuts.tell()
 
     def _mark(self) -> None:

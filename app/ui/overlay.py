@@ -183,11 +183,11 @@ class Overlay(QWidget):
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab stays inside."""
-        step: QWidget | None = QApplication.focusWidget()
-        if step is None or not (step is self or self.isAncestorOf(step)):
-            step = self
+        focus = QApplication.focusWidget()
+        step: QWidget = focus if focus is not None and self.isAncestorOf(focus) else self
         for _ in range(2000):
-            step = step.nextInFocusChain() if forward else step.previousInFocusChain()
+            further = step.nextInFocusChain() if forward else step.previousInFocusChain()
+            step = further if further is not None else self
             takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
             if self.isAncestorOf(step) and takes and step.isVisible() and step.isEnabled():
                 reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason

@@ -124,7 +124,7 @@ def test_tab_reaches_everything_and_comes_back(
     bar = window.run_bar if layout == "behaviour" else window.tool_bar
     assert bar.stop in seen
     assert bar.run in seen
-    assert window.bar.find in seen
+    assert window.bar.search in seen
     assert set(reached(window, forward=False)) == set(seen)
 
 

@@ -12,6 +12,7 @@ class Scrolled(QScrollArea):
 
     def __init__(self, inside: QWidget) -> None:
         super().__init__()
+        self._inside = inside
         inside.setProperty("bare", "true")
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
@@ -25,12 +26,12 @@ class Scrolled(QScrollArea):
         self.setSizePolicy(policy)
 
     def heightForWidth(self, width: int) -> int:
-        inside = self.widget()
+        inside = self._inside
         return inside.heightForWidth(width) if inside.hasHeightForWidth() else inside.sizeHint().height()
 
     def sizeHint(self) -> QSize:
         wide = max(1, self.width())
-        return QSize(self.widget().sizeHint().width(), self.heightForWidth(wide))
+        return QSize(self._inside.sizeHint().width(), self.heightForWidth(wide))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(60, round(1.5 * QFontMetricsF(self.widget().font()).height()))
+        return QSize(60, round(1.5 * QFontMetricsF(self._inside.font()).height()))
