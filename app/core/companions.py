@@ -40,9 +40,18 @@ def module_command(module: str) -> list[str]:
 class Companions:
     """Starts processes, notices when one ends, ends them with the window."""
 
-    def __init__(self, address: str, post_event: Callable[[object], None]) -> None:
-        """``address`` is the master's; failures are posted as `CompanionFailed`."""
+    def __init__(
+        self,
+        address: str,
+        post_event: Callable[[object], None],
+        is_there: Callable[[str], bool] = lambda _name: False,
+    ) -> None:
+        """``address`` is the master's; failures are posted as `CompanionFailed`.
+
+        ``is_there`` tells whether a robot of a name is connected, whoever started it.
+        """
         self._address = address
+        self._is_there = is_there
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
@@ -68,7 +77,14 @@ class Companions:
         self._starting.start()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
-        """Start a virtual robot of that name and model; nothing happens when it runs already."""
+        """Start a virtual robot of that name and model.
+
+        Nothing happens when one of that name runs already, also one that another Studio started.
+        """
+        if not self._is_there(name):
+            self._start_robot(name, model)
+
+    def _start_robot(self, name: str, model: str) -> None:
         with self._lock:
             held = self._robots.get(name)
             if held is not None and held[0].poll() is None:
@@ -107,7 +123,7 @@ class Companions:
             held[0].kill()
             held[0].wait()
             held[1].close()
-        self.start_virtual_robot(name, model)
+        self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
         """End a virtual robot that was started here."""

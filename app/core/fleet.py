@@ -64,6 +64,11 @@ class Fleet:
         """Those that are there now."""
         return tuple(link for link in self._links.values() if link.connected)
 
+    def is_connected(self, name: str) -> bool:
+        """Whether a robot of this name is there now."""
+        link = self._links.get(name)
+        return link is not None and link.connected
+
     def link(self, name: str) -> RobotLink | None:
         """The robot of that name, or None."""
         return self._links.get(name)

@@ -89,7 +89,7 @@ class Session:
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
-        self.companions = Companions(self.address, self._mailbox.post_event)
+        self.companions = Companions(self.address, self._mailbox.post_event, self.fleet.is_connected)
         self.doctor = doctor_of(self.address, self.settings.path.parent)
         self.runs = Runs(
             self.documents,

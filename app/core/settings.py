@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import platformdirs
 
+from app.core.file_lock import locked
 from app.core.files import write_atomically
 from app.errors import SettingsError
 
@@ -53,11 +54,16 @@ class Settings:
         return default
 
     def set(self, key: str, value: object) -> None:
-        """Keep ``value`` (anything JSON can say) and write the file. Raises SettingsError."""
+        """Keep ``value`` (anything JSON can say) and write the file. Raises SettingsError.
+
+        What another Studio on this computer has kept meanwhile stays, but for this key.
+        """
         if key in self._values and self._values[key] == value:
             return
         self._values[key] = value
-        self._write()
+        with locked(self.path):
+            self._values = {**self._of_others(), key: value}
+            self._write()
 
     @property
     def recent(self) -> list[RecentFile]:
@@ -79,6 +85,7 @@ class Settings:
     def add_recent(self, path: Path, name: str | None = None) -> None:
         """Put ``path`` first among the recent files. Raises SettingsError."""
         path = path.resolve()
+        self._values = self._of_others()
         kept = [file for file in self.recent_known if file.path != path]
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
 
@@ -102,6 +109,14 @@ class Settings:
         except (ValueError, RecursionError):
             return self._set_aside()
         return values if isinstance(values, dict) else self._set_aside()
+
+    def _of_others(self) -> dict[str, object]:
+        """What the file says now; what is known here when it can't be read."""
+        try:
+            values = json.loads(self.path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return self._values
+        return values if isinstance(values, dict) else self._values
 
     def _set_aside(self) -> dict[str, object]:
         self.damaged = self.path.with_name("settings.damaged.json")

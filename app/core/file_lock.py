@@ -1,0 +1,54 @@
+"""A lock that several Studios on one computer share: a file beside what is written."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+LOOK_S = 0.01
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _try(file: IO[bytes]) -> bool:
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+else:
+    import fcntl
+
+    def _try(file: IO[bytes]) -> bool:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True
+
+
+@contextmanager
+def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
+    """Hold the lock of ``path`` (the file ``<name>.lock`` beside it); whether it could be had in time.
+
+    Where there is none to be had (a network disk, a folder that can't be written) the work goes on without.
+    The lock of a process that dies is free at once.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.with_name(f"{path.name}.lock").open("ab")
+    except OSError:
+        yield False
+        return
+    with file:
+        end, pause = time.monotonic() + within_s, threading.Event()
+        held = _try(file)
+        while not held and time.monotonic() < end:
+            pause.wait(LOOK_S)
+            held = _try(file)
+        yield held
