@@ -174,3 +174,22 @@ def test_the_keys_go_to_the_tab_that_is_shown(qtbot, view, two) -> None:
                     timeout=WAIT_MS)  # fmt: skip
     turn_to(two, "a")
     assert two.tops() == [START]
+
+
+def test_a_change_from_outside_is_one_edit_that_undo_takes_back(qtbot, two, view) -> None:
+    told: list[tuple[str, object]] = []
+    view.changed.connect(lambda key, program: told.append((key, program)))
+    here = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklyDraggable')].map(e => e.dataset.id)"
+    before = two.ask(here)
+    mended = workspace({**START, "next": {"block": {"type": "control_wait", "id": "added"}}})
+    view.change(mended)
+    two.wait_for(f"({here}).includes('added')")
+    assert view.workspace == mended
+    view.undo()
+    two.wait_for(f"!({here}).includes('added')")
+    assert two.ask(here) == before
+    qtbot.waitUntil(lambda: bool(told), timeout=WAIT_MS)
+    assert told[-1][0] == "a"
+    assert "added" not in str(told[-1][1])
+    view.redo()
+    two.wait_for(f"({here}).includes('added')")

@@ -46,6 +46,21 @@ export class Program {
     this.goHome();
   }
 
+  /** Another program in the place of this one, as one edit that undo takes back; the view stays. */
+  change(state: Json): void {
+    this.flush();
+    const {scrollX, scrollY} = this.workspace;
+    const group = Blockly.Events.getGroup();
+    Blockly.Events.setGroup(true);
+    try {
+      this.fill(state, {recordUndo: true});
+    } finally {
+      Blockly.Events.setGroup(group);
+    }
+    this.workspace.scroll(scrollX, scrollY);
+    this.told = JSON.stringify(this.save());  // the window made it
+  }
+
   /** Tells nothing any more. */
   dispose(): void {
     window.clearTimeout(this.timer);
@@ -104,27 +119,34 @@ export class Program {
   }
 
   private replace(state: Json): void {
-    const {blocks, ...others} = state;
-    const tops = (blocks as {blocks?: unknown} | undefined)?.blocks;
-    this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
-      !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
     this.loading = true;
-    Checker.lenient = true;
     Blockly.Events.disable();
     try {
-      this.loadOthers(others);
-      for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState);
+      this.fill(state);
     } finally {
       Blockly.Events.enable();
-      Checker.lenient = false;
       this.loading = false;
     }
   }
 
-  /** Clears the workspace and loads what is beside the blocks (variables); what cannot be read is kept as it is. */
-  private loadOthers(others: Json): void {
+  private fill(state: Json, how: {recordUndo?: boolean} = {}): void {
+    const {blocks, ...others} = state;
+    const tops = (blocks as {blocks?: unknown} | undefined)?.blocks;
+    this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
+      !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
+    Checker.lenient = true;
     try {
-      Blockly.serialization.workspaces.load(others, this.workspace);
+      this.loadOthers(others, how);
+      for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
+    } finally {
+      Checker.lenient = false;
+    }
+  }
+
+  /** Clears the workspace and loads what is beside the blocks (variables); what cannot be read is kept as it is. */
+  private loadOthers(others: Json, how: {recordUndo?: boolean}): void {
+    try {
+      Blockly.serialization.workspaces.load(others, this.workspace, how);
     } catch (error) {
       console.warn(`kept unread: ${String(error)}`);
       this.workspace.clear();
@@ -132,14 +154,14 @@ export class Program {
     }
   }
 
-  private append(state: BlockState): void {
+  private append(state: BlockState, how: {recordUndo?: boolean}): void {
     const before = new Set(this.workspace.getTopBlocks(false));
     try {
-      Blockly.serialization.blocks.append(keep(state) as Blockly.serialization.blocks.State, this.workspace);
+      Blockly.serialization.blocks.append(keep(state) as Blockly.serialization.blocks.State, this.workspace, how);
     } catch (error) {
       console.warn(`kept whole: ${String(error)}`);
       for (const block of this.workspace.getTopBlocks(false)) if (!before.has(block)) block.dispose(false);
-      Blockly.serialization.blocks.append(keepWhole(state) as Blockly.serialization.blocks.State, this.workspace);
+      Blockly.serialization.blocks.append(keepWhole(state) as Blockly.serialization.blocks.State, this.workspace, how);
     }
   }
 
