@@ -8,7 +8,6 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.spoken import speak_as
 from app.ui.theme import Theme
 
 SIDE = 44
@@ -42,7 +41,7 @@ class AngleDial(QWidget):
         self._default = default if default is not None else value
         self._value, self._upright = value, upright
         self._grip: float | None = None
-        speak_as(self, "Dial", name)
+        self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", SIDE // 2)

@@ -22,7 +22,7 @@ from tests.ui.fakes import Session as FakeSession
 from tests.ui.show_panels import SIZES, prepare
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
-MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Client, QAccessible.Role.Whitespace}
+MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Whitespace}  # Client is a painted widget of ours
 OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about")
 
 

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QBoxLayout, QFrame, QScrollArea, QStackedWidget, Q
 
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.spoken import speak_as
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyState, label, paint
 from app.ui.words import grouped
@@ -87,7 +86,7 @@ class AlertsPanel(PanelWidget):
         self._column.setSpacing(6)
         self._column.addStretch(1)
         scroll = QScrollArea()
-        speak_as(scroll, "Pane", "Alerts")
+        scroll.setAccessibleName("Alerts")
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

@@ -16,7 +16,6 @@ from app.ui.picture_actions import PictureActions
 from app.ui.picture_zoom import ZoomablePicture
 from app.ui.robot_boxes import boxes_on, owner_of
 from app.ui.snapshot_job import SnapshotJob
-from app.ui.spoken import speak_as
 from app.ui.widgets import EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
 
@@ -45,7 +44,7 @@ class ImagePanel(PanelWidget):
         self.choose.clicked.connect(self._show_menu)
         self.chips = [self.choose]
         self.view = ZoomablePicture(self.theme)
-        speak_as(self.view, "Graphic", "Picture")
+        self.view.setAccessibleName("Picture")
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.view.customContextMenuRequested.connect(self._show_actions)
         self._make_actions()

@@ -22,7 +22,6 @@ from app.ui.action_card import Tile
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.rich_line import BoldInLine, is_pressed_key
-from app.ui.spoken import speak_as
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Chip, Scrolled, label, paint
 
@@ -63,7 +62,7 @@ class ProblemRow(QWidget):
         problem = line.problem
         self._theme, self.line, self.problem, self._large = theme, line, problem, large
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        speak_as(self, "ListItem", f"{problem.severity}: {problem.sentence}")
+        self.setAccessibleName(f"{problem.severity}: {problem.sentence}")
         self.setProperty("focusRadius", theme.radius("small"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         if problem.block_id:
@@ -136,7 +135,7 @@ class ProblemsPanel(PanelWidget):
         self._column.setSpacing(0)
         self._column.addStretch(1)
         scroll = self._scroll = QScrollArea()
-        speak_as(scroll, "Pane", "Problems")
+        scroll.setAccessibleName("Problems")
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

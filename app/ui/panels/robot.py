@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.robot_drawing import RobotDrawing
 from app.ui.robot_state import RobotState
-from app.ui.spoken import speak_as
 from app.ui.theme import Theme
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
@@ -131,7 +130,7 @@ class RobotPanel(PanelWidget):
         self.chips = [self.choose, self.chip]
         self.header = [self.reset]
         self.view = RoomView(self.theme)
-        speak_as(self.view, "Graphic", "The robot in its room")
+        self.view.setAccessibleName("The robot in its room")
         self.view.touched.connect(lambda part, down: self._change({"touch": part, "down": down}))
         self.view.moved.connect(
             lambda what, x, y: self._change({"move": what, "x": round(x, 3), "y": round(y, 3)})

@@ -25,7 +25,6 @@ from app.ui.robot_head import RobotHead
 from app.ui.robot_item import LIST_WIDTH, STATUS
 from app.ui.robot_list import RobotList
 from app.ui.session_pictures import SessionPictures
-from app.ui.spoken import speak_as
 from app.ui.widgets import EmptyAction, EmptyState, Line, label
 from app.ui.words import plural
 
@@ -109,7 +108,7 @@ class RobotsPanel(PanelWidget):
         self._card_column.addWidget(self.none)
         self._card_column.addStretch(1)
         scroll = QScrollArea()
-        speak_as(scroll, "Pane", "Actions")
+        scroll.setAccessibleName("Actions")
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setWidget(inside)

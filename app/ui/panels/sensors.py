@@ -13,7 +13,6 @@ from app.robots.description import Sensor
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.sensor_words import Reading, reading_of
-from app.ui.spoken import speak_as
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyState, paint
 from app.ui.words import age_words
@@ -103,7 +102,7 @@ class SensorsPanel(PanelWidget):
         self._column.setSpacing(0)
         self._column.addStretch(1)
         self._scroll = scroll = QScrollArea()
-        speak_as(scroll, "Pane", "Sensors")
+        scroll.setAccessibleName("Sensors")
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
