@@ -52,7 +52,10 @@ class Question:
     @property
     def sentence(self) -> str:
         """What would move, and how it is stopped."""
-        told = [f"{name} will do: {_listed(list(actions))}." for name, actions in self.moves.items()]
+        told = [
+            f"{_listed(list(actions))} {'moves' if len(actions) == 1 else 'move'} {name}."
+            for name, actions in self.moves.items()
+        ]
         return f"{' '.join(told)} See that nobody stands in the way. Stop is F12, at any time."
 
 
@@ -118,7 +121,7 @@ class Moving:
 def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     """The titles of those actions that move the robot, each once; of many only the first."""
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
-    titles = list(dict.fromkeys(found))
+    titles = [f"“{title}”" for title in dict.fromkeys(found)]
     return (*titles[:MOST_NAMED], "more") if len(titles) > MOST_NAMED else tuple(titles)
 
 

@@ -13,7 +13,7 @@ from app.ui.theme import Theme
 from app.ui.widgets import Button, Switch, label, paint
 
 WIDE = 480
-TOP = 112
+TOP_SHARE = 0.42  # below every Stop: the run bar's and the robots' own
 TILE = 40
 
 
@@ -132,7 +132,8 @@ class MoveQuestion(QWidget):
         layout = self.layout()
         high = layout.heightForWidth(wide) if layout is not None else -1
         self.resize(wide, max(high, self.minimumSizeHint().height()))
-        self.move((window.width() - wide) // 2, TOP)
+        top = round(window.height() * TOP_SHARE)
+        self.move((window.width() - wide) // 2, min(top, max(8, window.height() - self.height() - 8)))
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and self.isVisible():

@@ -30,7 +30,7 @@ def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
     question = moving.question
     assert question is not None
     assert question.title == "Let Rover move?"
-    assert question.sentence.startswith("Rover will do: move and turn.")
+    assert question.sentence.startswith("“move” and “turn” move Rover.")
     assert "Stop is F12" in question.sentence
 
 
@@ -85,7 +85,7 @@ def test_what_a_program_asks_of_robots_is_read_from_it(rover) -> None:
     source = "robot('Rover').do('move', distance=1)\nrobot('Rover').ask('look', 'w')\nrobot('P').get('b')\n"
     assert actions_of(source) == {"Rover": ("move", "look")}
     assert wanted_by(source, [rover]) == [(rover, ("move", "look"))]
-    assert risky(rover, ["move", "move", "light", "unknown"]) == ("move",)
+    assert risky(rover, ["move", "move", "light", "unknown"]) == ("“move”",)
 
 
 @pytest.mark.parametrize("source", ["robot(name).do('move')", "robot('Rover').do(what)", "r.do('move')"])

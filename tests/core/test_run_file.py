@@ -146,7 +146,7 @@ def test_a_real_robot_moves_only_when_it_may(master, tmp_path):
         path.write_text(json.dumps(content | {"workspace": workspace(started(walk))}))
         code, out = run(path)
         assert code == MAY_NOT_MOVE, out
-        assert "Rosie would move (walk). Add --allow-moving if it may." in out
+        assert "Rosie would move (“walk”). Add --allow-moving if it may." in out
         assert rosie.commands == []
         code, out = run(path, allow_moving=True)
         assert code == OK, out

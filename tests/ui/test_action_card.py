@@ -1,0 +1,144 @@
+"""A card of an action: what it waits for or replaces, its time, its answer, its last tries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.robots.inputs import Parameter
+from app.robots.parts import Action, Field
+from app.ui.action_card import ActionCard
+from app.ui.theme import Theme
+from app.ui.try_words import field_words, progress_of
+from tests.ui.fakes import Invocation
+
+MOVE = Action(
+    "go_far", "go far", "move", "Movement",
+    (Parameter("distance", "distance", "number", -1, 1, 0.05, "m", 0.5),),
+    "%robot go far", None, "/c", "/a", risk="moves", cancellable=True, timeout_s=10,
+    feedback=(Field("moved", "moved", "number", "m"),),
+    output=(Field("moved", "moved", "number", "m"), Field("seconds", "seconds", "number", "s")),
+)  # fmt: skip
+
+
+@pytest.fixture
+def card(qtbot) -> ActionCard:
+    titles = {"show_emotion": "show emotion"}
+    made = ActionCard(Theme("light"), MOVE, lambda _: (), title_of=lambda name: titles.get(name, name))
+    qtbot.addWidget(made)
+    made.resize(700, 200)
+    made.show()
+    return made
+
+
+def tried(state: str = "running", **more: object) -> Invocation:
+    return Invocation("1", "go_far", state, given={"distance": 0.5}, **more)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (tried("sent"), "asked"),
+        (tried("accepted", waits_for=("say", "show_emotion")), "waits for say and show emotion"),
+        (tried("accepted", replaces=("turn",)), "replaces turn"),
+        (tried(feedback={"moved": 0.2}), "moved 0.20 m"),
+        (tried(elapsed_s=2.14), "for 2.1 s"),
+    ],
+)
+def test_it_says_what_is_going_on(card, made, words) -> None:
+    card.show_invocation(made)
+    assert card.words.text() == words
+    assert card.try_button.text() == "Cancel"
+
+
+def test_the_time_that_is_left_is_counted_down(card) -> None:
+    card.show_invocation(tried(left_s=7.3))
+    assert card.left.text() == "8 s left"
+    assert card.left.isVisible()
+    card.show_invocation(tried(left_s=-0.1))
+    assert card.left.text() == "0 s left"
+    card.show_invocation(tried())
+    assert not card.left.isVisible()
+
+
+def test_too_late_is_a_sentence_below(card) -> None:
+    card.show_invocation(tried("failed", error="go far took longer than 10 s"))
+    assert (card.result.text, card.error.text()) == ("not done", "Go far took longer than 10 s.")
+    assert card.try_button.text() == "Try"
+
+
+def test_what_was_replaced_says_by_what_and_a_plain_stop_says_no_more(card) -> None:
+    card.show_invocation(tried("canceled", error="turn took its place", elapsed_s=1.0))
+    assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "Turn took its place.")
+    assert card.error.property("role") == "textSecondary"  # that is no error
+    card.show_invocation(tried("canceled", error="stopped", elapsed_s=1.0))
+    assert not card.error.isVisible()
+
+
+def test_what_the_robot_answers_stands_beside_the_result(card) -> None:
+    card.show_invocation(tried("succeeded", output={"moved": 0.5, "seconds": 1.4}, elapsed_s=1.5))
+    assert card.words.text() == "moved 0.50 m, 1.40 s"
+
+
+@pytest.mark.parametrize(
+    ("feedback", "share"),
+    [
+        ({"moved": 0.25}, 0.5),
+        ({"moved": 9}, 1.0),
+        ({"progress": 0.3}, 0.3),
+        ({"moved": "far"}, None),
+        ({}, None),
+    ],
+)
+def test_a_share_of_what_was_asked_is_a_bar(card, feedback, share) -> None:
+    assert progress_of(MOVE, {"distance": -0.5}, feedback) == share
+    card.show_invocation(tried(feedback=feedback))
+    assert card.progress.isVisible() == (share is not None)
+
+
+@pytest.mark.parametrize(
+    "field", [Field("percent", "done", "number"), Field("charge", "charge", "number", "%")]
+)
+def test_per_cents_are_bars_too(field) -> None:
+    action = Action("load", "load", "x", "X", (), "load", None, "/c", "/a", feedback=(field,))
+    assert progress_of(action, {}, {field.name: 40}) == 0.4
+    assert field_words((Field("open", "open", "boolean"),), {"open": True}) == "open yes"
+
+
+def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:
+    card.show_tries(tries)
+    return [f"{row.given}: {row.result}" for row in card.tries.rows]
+
+
+def test_the_last_tries_are_listed_and_give_their_values_back(card) -> None:
+    assert not card.past.isVisible()
+    done = Invocation(
+        "1", "go_far", "succeeded", given={"distance": 0.25}, output={"moved": 0.25}, elapsed_s=1
+    )
+    late = Invocation("2", "go_far", "failed", error="go far took longer than 10 s", given={"distance": -0.5})
+    other = Invocation("3", "say", "succeeded")
+    running = Invocation("4", "go_far", "running")
+    assert show(card, [done, late, other, running]) == [
+        "distance -0.5 m: Go far took longer than 10 s",
+        "distance 0.25 m: done in 1.0 s, moved 0.25 m",
+    ]
+    assert card.past.isVisible()
+    assert not card.tries.isVisible()
+    QTest.mouseClick(card.past, Qt.MouseButton.LeftButton)
+    assert card.tries.isVisible()
+    QTest.mouseClick(card.tries.rows[1], Qt.MouseButton.LeftButton)
+    assert card.form.input() == {"distance": 0.25}
+    many = [Invocation(str(n), "go_far", "canceled", error="stopped") for n in range(9)]
+    assert len(show(card, many)) == 5
+
+
+def test_ctrl_enter_tries_it(card, qtbot) -> None:
+    with qtbot.waitSignal(card.tried) as told:
+        QTest.keyClick(card, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert told.args == [{"distance": 0.5}]
+    card.show_invocation(tried())
+    with qtbot.assertNotEmitted(card.tried):
+        QTest.keyClick(card, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)

@@ -1,0 +1,113 @@
+"""The question before a real robot moves: over the window, below every Stop, with "Not now" first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
+
+from app.core.moving import Moving
+from app.core.settings import Settings
+from app.robots.description import Robot, parse, td_for
+from app.robots.turtle import ROBOT
+from app.ui.move_question import MoveQuestion
+from app.ui.theme import Theme
+
+ROVER: Robot = replace(parse(td_for(ROBOT.thing_model, "Rover")), virtual=False)
+
+
+class Window(QWidget):
+    """Stands for the main window: a field that has the focus, and the question over it."""
+
+    def __init__(self, folder) -> None:
+        super().__init__()
+        self.resize(1000, 700)
+        self.field = QLineEdit()
+        column = QVBoxLayout(self)
+        column.addWidget(self.field)
+        self.moving = Moving(Settings(folder))
+        self.question = MoveQuestion(Theme("light"), self, self.moving)
+        self.done: list[str] = []
+
+    def ask(self, *actions: str) -> None:
+        self.moving.permits([(ROVER, actions)], lambda: self.done.append("moved"))
+        self.question.refresh()
+
+
+@pytest.fixture
+def window(qtbot, tmp_path) -> Window:
+    made = Window(tmp_path)
+    qtbot.addWidget(made)
+    made.show()
+    made.field.setFocus()
+    return made
+
+
+def test_nothing_shows_while_nobody_asks(window) -> None:
+    window.question.refresh()
+    assert not window.question.isVisible()
+
+
+def test_it_says_what_moves_and_how_it_is_stopped(window) -> None:
+    window.ask("move", "turn")
+    question = window.question
+    assert question.isVisible()
+    assert question.title.text() == "Let Rover move?"
+    assert "“move” and “turn” move Rover." in question.sentence.text()
+    assert "F12" in question.sentence.text()
+    assert question.always.text() == "Always for Rover"
+    assert question.y() > 200  # the run bar's Stop and the robot's own stay free
+    assert window.focusWidget() is question.not_now
+    assert question.accessibleName() == "Let Rover move?"
+
+
+def test_let_it_move_goes_on(window) -> None:
+    window.ask("move")
+    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    assert window.done == ["moved"]
+    assert not window.question.isVisible()
+    assert window.focusWidget() is window.field
+    assert window.moving.allowed(ROVER)
+
+
+@pytest.mark.parametrize("how", ["button", "escape", "enter"])
+def test_not_now_moves_nothing(window, how) -> None:
+    window.ask("move")
+    if how == "button":
+        QTest.mouseClick(window.question.not_now, Qt.MouseButton.LeftButton)
+    elif how == "escape":
+        QTest.keyClick(window.question.not_now, Qt.Key.Key_Escape)
+    else:
+        QTest.keyClick(window.question.not_now, Qt.Key.Key_Space)
+    assert window.done == []
+    assert not window.question.isVisible()
+    assert not window.moving.allowed(ROVER)
+
+
+def test_always_is_kept(window, tmp_path) -> None:
+    window.ask("move")
+    QTest.mouseClick(
+        window.question.always, Qt.MouseButton.LeftButton, pos=window.question.always.rect().center()
+    )
+    assert window.question.always.isChecked()
+    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    assert Moving(Settings(tmp_path)).allowed(ROVER)
+
+
+def test_a_stop_takes_the_question_away(window) -> None:
+    window.ask("move")
+    window.moving.withdraw()
+    window.question.refresh()
+    assert not window.question.isVisible()
+    assert window.done == []
+
+
+def test_it_stays_in_a_small_window_and_moves_with_it(window, qtbot) -> None:
+    window.ask("move")
+    window.resize(420, 380)
+    qtbot.waitUntil(lambda: window.question.width() <= 400)
+    inside = window.rect()
+    assert inside.contains(window.question.geometry())
