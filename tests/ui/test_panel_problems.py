@@ -109,3 +109,15 @@ def test_while_a_long_behaviour_is_checked_the_old_problems_stay(panel, window, 
     panel.refresh()
     assert panel.rows == rows
     assert panel.checked.text() == "Checking"
+
+
+def test_a_cured_problem_leaves_the_keyboard_in_the_panel(panel, window) -> None:
+    panel.activateWindow()
+    document = window.session.document
+    panel.rows[0].buttons[0].setFocus()
+    document.found, document.edits = document.found[1:], 20
+    panel.refresh()
+    assert panel.rows[0].hasFocus()
+    document.found, document.edits = (), 21
+    panel.refresh()
+    assert panel.hasFocus()

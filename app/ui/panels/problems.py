@@ -87,6 +87,10 @@ class ProblemRow(QWidget):
         button.clicked.connect(lambda: self.mend.emit(mend.action))
         return button
 
+    def holds_focus(self) -> bool:
+        """Whether it, or one of its buttons, has the keyboard."""
+        return self.hasFocus() or any(button.hasFocus() for button in self.buttons)
+
     def sizeHint(self) -> QSize:
         size = "comfortable" if self._large else "compact"
         return QSize(300, max(round(self._theme.scaled(self._theme.size("row", size))), 30))
@@ -121,6 +125,7 @@ class ProblemsPanel(PanelWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Problems")
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._program: Program | None = None
         self._found: tuple[Listed, ...] | None = None
         self.rows: list[ProblemRow] = []
@@ -173,8 +178,10 @@ class ProblemsPanel(PanelWidget):
     def _show(self, found: tuple[Listed, ...]) -> None:
         """The rows of these problems; one that is there already stays, with its focus."""
         kept = {row.line: row for row in self.rows}
+        held = False
         for line, row in kept.items():
             if line not in found:
+                held = held or row.holds_focus()
                 self._column.removeWidget(row)
                 row.hide()
                 row.deleteLater()
@@ -182,6 +189,8 @@ class ProblemsPanel(PanelWidget):
         for place, row in enumerate(self.rows):
             self._column.insertWidget(place, row)
         self.pages.setCurrentIndex(1 if found else 0)
+        if held:  # a cured problem does not throw the keyboard out of the panel
+            (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
         self._count(found)
 
     def _row(self, line: Listed) -> ProblemRow:
