@@ -9,6 +9,8 @@ from app.core.lazy_json import JsonIndex
 from nep.errors import NepError
 from nep.message import Message
 
+EVERY_S = 1.0
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
@@ -47,6 +49,7 @@ class Reader:
         self._reading: Message | None = None
         self._done: Reading | None = None
         self._closing = False
+        self._asked_at: float | None = None
         self._thread: threading.Thread | None = None
 
     @property
@@ -64,6 +67,17 @@ class Reader:
                 self._thread.start()
             self._wake.notify()
 
+    def ask_at_leisure(self, message: Message, now: float) -> bool:
+        """Read this one unless something is being read, or was begun less than a second ago.
+
+        A large message takes a while, and nobody reads faster. ``now`` is monotonic; whether it will be read.
+        """
+        if self.busy or (self._asked_at is not None and now - self._asked_at < EVERY_S):
+            return False
+        self._asked_at = now
+        self.ask(message)
+        return True
+
     def take(self) -> Reading | None:
         """What was read last, once."""
         with self._wake:
@@ -71,16 +85,19 @@ class Reader:
         return done
 
     def forget(self) -> None:
-        """Nobody wants what waits or is being read."""
+        """Nobody wants what waits or is being read; the next one may be read at once."""
+        self._asked_at = None
         with self._wake:
             self._waiting = self._reading = self._done = None
 
     def close(self) -> None:
-        """End the thread; what is being read is not waited for."""
+        """End the thread; what is being read is waited for a second at most."""
         with self._wake:
             self._closing = True
             self._waiting = self._reading = self._done = None
             self._wake.notify()
+        if self._thread is not None:
+            self._thread.join(1.0)
 
     def _run(self) -> None:
         while True:

@@ -1,22 +1,27 @@
-"""Parts of the inspector: what it says of pictures, what it copies, its search field and its foot."""
+"""Parts of the inspector: what it says of pictures, what it copies, and its foot."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.core.lazy_json import LazyList, LazyObject
 from app.ui.theme import Theme
-from app.ui.widgets import Elided, IconButton, Line, SearchField, label, paint
+from app.ui.widgets import Elided, IconButton, Line, label, paint
 from app.ui.words import grouped, latency_words, size_words
+from nep.errors import NepError
 
 if TYPE_CHECKING:
+    from app.core.topics import Topic
     from nep.message import Message
+
+LARGE_BYTES = 1_000_000  # above, a message is never decoded in the window's thread
 
 
 def image_summary(message: Message) -> Mapping[str, object]:
@@ -47,7 +52,30 @@ def plain_words(value: object) -> str:
         return value
     if isinstance(value, (bytes, bytearray, memoryview)):
         return bytes(value).hex(" ")
+    if isinstance(value, (LazyList, LazyObject)):
+        return str(value.text, "utf-8", "replace")
     return json.dumps(value, indent=2, ensure_ascii=False, default=str)
+
+
+def payload_or(message: Message, otherwise: object) -> object:
+    """A message's decoded value; ``otherwise`` for what can't be read or is too large to be read here."""
+    if message.size_bytes > LARGE_BYTES or message.codec == "image":
+        return otherwise
+    try:
+        return message.payload
+    except NepError:
+        return otherwise
+
+
+def live_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
+    """The words, status and icon of the chip that says whether what is shown is still coming."""
+    if frozen:
+        return "frozen", "off", "snowflake"
+    if topic is None:
+        return "gone", "off", ""
+    if topic.gone_s is not None:
+        return f"gone {int(topic.gone_s)} s", "off", ""
+    return "live", "info", ""
 
 
 def message_facts(message: Message) -> str:
@@ -60,26 +88,6 @@ def message_facts(message: Message) -> str:
         if 0 <= latency < 3600:
             facts.append(f"latency {latency_words(latency)}")
     return "   ".join(facts)
-
-
-class FindField(SearchField):
-    """Finds a key or a value: Return goes to the next one, Esc clears, Down goes into the tree."""
-
-    next_wanted = Signal()
-    leave = Signal()
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, "Find a key or value")
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self.next_wanted.emit()
-        elif event.key() == Qt.Key.Key_Escape and self.text():
-            self.clear()
-        elif event.key() == Qt.Key.Key_Down:
-            self.leave.emit()
-        else:
-            super().keyPressEvent(event)
 
 
 class Legend(QWidget):
@@ -109,15 +117,13 @@ class Legend(QWidget):
 class Foot(QWidget):
     """The path of the chosen value with its copy buttons; below, the message's facts."""
 
-    def __init__(self, theme: Theme, copy_value: Callable[[], None], copy_path: Callable[[], None]) -> None:
+    def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.path = label("", "code", role="textSecondary")
         self.path.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.path.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.copy_value = IconButton(theme, "copy", "Copy value", "Ctrl+C", size=26)
         self.copy_path = IconButton(theme, "link", "Copy path", "Ctrl+Shift+C", size=26)
-        self.copy_value.clicked.connect(copy_value)
-        self.copy_path.clicked.connect(copy_path)
         self.facts = Elided("small", "textTertiary")
         self.legend = Legend(theme)
         rows = QVBoxLayout(self)

@@ -12,11 +12,14 @@ from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem, QTreeVi
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.tree import NODE_ROLE, Node, TreeModel
-from app.ui.tree_values import size_of, words_of
+from app.ui.tree_difference import OFF
+from app.ui.tree_values import is_container, size_of, words_of
 
 Index = QModelIndex | QPersistentModelIndex
 INDENT, LEFT_EDGE, CHEVRON, VALUE_EDGE = 14, 8, 14, 10
 BAR = 3
+BARS = {"": "changed", "changed": "changed", "added": "ok", "removed": "error"}
+SIGNS = {"added": "+ ", "removed": "\u2212 "}
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
@@ -66,7 +69,9 @@ class TreeView(QTreeView):
 
     def share_changed(self, node: Node) -> float:
         """How strongly a node is marked now: 1 just changed, 0 long ago."""
-        if node.changed_s is None:
+        if node.mark:
+            return 1.0
+        if node.changed_s is None or node.base is not OFF:
             return 0.0
         fade_s = self.theme.duration("changedFade") / 1000
         age = self._clock() - node.changed_s
@@ -112,7 +117,8 @@ class TreeView(QTreeView):
             painter.fillRect(rect, ground)
         share = self.share_changed(node)
         if share > 0:
-            painter.fillRect(QRect(0, rect.top() + 4, BAR, rect.height() - 8), self._bar(ground, share))
+            bar = mixed(ground, self.theme.colour(BARS[node.mark]), share)
+            painter.fillRect(QRect(0, rect.top() + 4, BAR, rect.height() - 8), bar)
         key_end = self._paint_key(painter, rect, node, chosen=chosen)
         if not node.is_container:
             self._paint_value(painter, rect, node, key_end, ground, share)
@@ -122,9 +128,6 @@ class TreeView(QTreeView):
             painter.drawRoundedRect(QRectF(rect).adjusted(1, 1, -1, -1), 4, 4)
         painter.restore()
 
-    def _bar(self, ground: QColor, share: float) -> QColor:
-        return mixed(ground, self.theme.colour("changed"), share)
-
     def _paint_key(self, painter: QPainter, rect: QRect, node: Node, *, chosen: bool) -> float:
         theme = self.theme
         left = LEFT_EDGE + node.depth * INDENT
@@ -133,12 +136,15 @@ class TreeView(QTreeView):
             box = QRectF(left, rect.center().y() - CHEVRON / 2 + 0.5, CHEVRON, CHEVRON)
             paint_icon(painter, box, name, theme.colour("textSecondary"))
         font = theme.font("code")
+        font.setStrikeOut(node.mark == "removed")
         metrics = QFontMetricsF(font)
         x = float(left + CHEVRON + 4)
         room = rect.width() - x - VALUE_EDGE
-        key = metrics.elidedText(str(node.key), Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
+        said = SIGNS.get(node.mark, "") + str(node.key)
+        key = metrics.elidedText(said, Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
         painter.setFont(font)
-        painter.setPen(theme.colour("selectedText" if chosen else "text"))
+        role = BARS[node.mark] if node.mark in SIGNS else "selectedText" if chosen else "text"
+        painter.setPen(theme.colour(role))
         width = metrics.horizontalAdvance(key)
         painter.drawText(QRectF(x, rect.top(), width + 2, rect.height()), LEFT, key)
         x += width
@@ -158,16 +164,29 @@ class TreeView(QTreeView):
         text = metrics.elidedText(words_of(node.value), Qt.TextElideMode.ElideRight, room)
         width = metrics.horizontalAdvance(text)
         colour = theme.colour(_role(node.value))
-        if share > 0:
+        if share > 0 and node.mark not in SIGNS:
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(mixed(ground, theme.colour("changedTint"), share))
             painter.drawRoundedRect(
                 QRectF(right - width - 5, rect.top() + 3, width + 10, rect.height() - 6), 4, 4
             )
             colour = mixed(colour, theme.colour("changed"), share)
+        if node.mark in SIGNS:
+            colour = theme.colour(BARS[node.mark])
         painter.setFont(theme.font("code"))
         painter.setPen(colour)
         painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
+        self._paint_before(painter, rect, node, right - width - 10, key_end + 12)
+
+    def _paint_before(self, painter: QPainter, rect: QRect, node: Node, right: float, left: float) -> None:
+        """The value that a compared one had before, where there is room for it."""
+        if node.mark != "changed" or is_container(node.base):
+            return
+        text = f"{words_of(node.base)} \u2192"
+        width = QFontMetricsF(painter.font()).horizontalAdvance(text)
+        if right - width >= left:
+            painter.setPen(self.theme.colour("textTertiary"))
+            painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self._keyboard = False

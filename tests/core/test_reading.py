@@ -99,3 +99,14 @@ def test_what_nobody_wants_any_more_is_not_given(reader: Reader, monkeypatch) ->
     go_on.set()
     reader.ask(message(b"1", seq=2))
     assert taken(reader).value == 2
+
+
+def test_at_leisure_it_reads_one_a_second_and_none_while_it_is_busy(reader: Reader) -> None:
+    assert reader.ask_at_leisure(message(b"[1]", seq=1), 10.0)
+    assert taken(reader).message.seq == 1
+    assert not reader.ask_at_leisure(message(b"[1]", seq=2), 10.9)
+    assert reader.ask_at_leisure(message(b"[1]", seq=3), 11.0)
+    assert taken(reader).message.seq == 3
+    reader.forget()  # another topic is shown
+    assert reader.ask_at_leisure(message(b"[1]", seq=4), 11.1)
+    assert not reader.ask_at_leisure(message(b"[1]", seq=5), 11.1)

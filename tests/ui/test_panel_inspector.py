@@ -1,13 +1,21 @@
 from __future__ import annotations
 
 import json
+import threading
+from collections.abc import Iterator, Mapping
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from app.ui.inspector_parts import image_summary, plain_words
-from app.ui.panels.inspector import LARGE, NOTHING, PANEL, RAW, TREE, InspectorPanel
+from app.core import lazy_json
+from app.ui.inspector_body import LARGE, NOTHING, RAW, TREE
+from app.ui.inspector_compare import changes_words, count_changes
+from app.ui.inspector_parts import LARGE_BYTES, image_summary, plain_words
+from app.ui.panels.inspector import PANEL, InspectorPanel
+from app.ui.tree import Node
+from app.ui.tree_difference import OFF
 from nep.message import Message
 from tests.ui.fakes import Session, blackboard
 from tests.ui.panel_case import Window, button, press, ticks
@@ -19,13 +27,14 @@ def window(qapp) -> Window:
 
 
 @pytest.fixture
-def panel(qtbot, window) -> InspectorPanel:
+def panel(qtbot, window) -> Iterator[InspectorPanel]:
     made = window.make(PANEL, (330, 700))
     qtbot.addWidget(made)
     for widget in made.header:
         qtbot.addWidget(widget)
     assert isinstance(made, InspectorPanel)
-    return made
+    yield made
+    made.shut()
 
 
 def choose(panel: InspectorPanel, *path: str | int) -> None:
@@ -33,9 +42,9 @@ def choose(panel: InspectorPanel, *path: str | int) -> None:
 
 
 def test_with_nothing_chosen_it_says_so_and_leads_to_the_topics(panel, window) -> None:
-    assert panel.pages.currentIndex() == NOTHING
+    assert panel.body.page == NOTHING
     assert window.session.watched == []
-    press(button(panel.empty, "Choose a topic"))
+    press(button(panel.body.empty, "Choose a topic"))
     assert window.commands == ["panel.topics"]
 
 
@@ -50,10 +59,10 @@ def test_it_subscribes_exactly_what_it_shows(panel, window) -> None:
 
 def test_the_newest_message_as_a_tree_with_its_facts(panel, window) -> None:
     panel.show_topic("/blackboard")
-    assert panel.pages.currentIndex() == NOTHING
+    assert panel.body.page == NOTHING
     window.session.send("/blackboard", blackboard())
     panel.refresh()
-    assert panel.pages.currentIndex() == TREE
+    assert panel.body.page == TREE
     choose(panel, "robots", "Pepper", "pose", "y")
     assert panel.foot.path.text() == "robots.Pepper.pose.y"
     assert panel.foot.facts.text().startswith("seq 18\u2009204   ")
@@ -78,15 +87,15 @@ def test_what_cannot_be_decoded_is_shown_as_bytes_with_a_sentence(panel, window)
     panel.show_topic("/faces")
     window.session.send("/faces", b"not json \x00\xff")
     panel.refresh()
-    assert panel.pages.currentIndex() == RAW
+    assert panel.body.page == RAW
     assert panel.mode.value == "raw"
-    assert panel.sentence.isVisible()
-    assert panel.sentence.text().startswith("This can't be read as json: ")
+    assert panel.body.sentence.isVisible()
+    assert panel.body.sentence.text().startswith("This can't be read as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     window.session.send("/faces", {"good": 1})
     panel.refresh()
-    assert panel.pages.currentIndex() == TREE
-    assert not panel.sentence.isVisible()
+    assert panel.body.page == TREE
+    assert not panel.body.sentence.isVisible()
 
 
 def test_raw_shows_the_bytes_of_a_good_message_too(panel, window) -> None:
@@ -94,9 +103,9 @@ def test_raw_shows_the_bytes_of_a_good_message_too(panel, window) -> None:
     window.session.send("/blackboard", {"a": 1})
     panel.refresh()
     press(button(panel.mode, "Raw"))
-    assert panel.pages.currentIndex() == RAW
+    assert panel.body.page == RAW
     assert "7b" in panel.bytes.text()
-    assert not panel.sentence.isVisible()
+    assert not panel.body.sentence.isVisible()
     window.session.send("/blackboard", {"b": 1})
     panel.refresh()
     assert "62" in panel.bytes.text()
@@ -128,22 +137,89 @@ def test_copying_a_value_and_a_path(panel, window) -> None:
     assert QGuiApplication.clipboard().text() == "people[0].name"
     assert window.toasts == ["Copied people[0].name", "Copied the path people[0].name"]
     choose(panel, "robots", "Pepper", "pose")
-    panel.copy_value()
+    panel.own.copy_value()
     assert json.loads(QGuiApplication.clipboard().text())["y"] == pytest.approx(-0.297)
 
 
-def test_large_messages_are_read_only_when_asked_for(panel, window) -> None:
+def test_a_large_json_message_is_read_elsewhere_and_shown_when_it_is_there(qtbot, panel, window) -> None:
     panel.show_topic("/blackboard")
-    message = window.session.send("/blackboard", {"data": "x" * 1_200_000})
+    rows = [{"id": number, "name": f"n{number}"} for number in range(40_000)]
+    message = window.session.send("/blackboard", {"rows": rows, "end": [1, 2]})
+    assert message.size_bytes > LARGE_BYTES
     panel.refresh()
-    assert panel.pages.currentIndex() == LARGE
-    assert panel.large._title.text() == "A message of 1.2 MB"
-    press(button(panel.large, "Read the newest one"))
-    assert panel.pages.currentIndex() == TREE
+    assert panel.body.page == LARGE
+    assert panel.body.large._text.text() == "It is being read."
+    qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == TREE)[1])
+    assert panel.model.rowCount() == 2
+    rows_index = panel.model.index(0, 0)
+    panel.tree.expand(rows_index)
+    panel.model.fetchMore(rows_index)
+    assert panel.model.rowCount(rows_index) < 5000  # what can be seen, by pages
+    choose(panel, "rows", 39_999, "name")
+    assert panel.foot.path.text() == "rows[39999].name"
+    QTest.keyClicks(panel.finder.field, "n3999")
+    assert panel.finder.count.text() == "1 of 11"
+    assert panel.foot.path.text() == "rows[3999].name"
+
+
+def test_no_large_message_is_ever_decoded_in_the_windows_thread(qtbot, panel, window, monkeypatch) -> None:
+    threads: dict[str, set[int]] = {"looked into": set(), "decoded": set()}
+    scan, decode = lazy_json._structure, Message.payload.fget
+    assert decode is not None
+
+    def scanned(data: memoryview) -> object:
+        threads["looked into"].add(threading.get_ident())
+        return scan(data)
+
+    def decoded(self: Message) -> object:
+        if self.size_bytes > LARGE_BYTES:
+            threads["decoded"].add(threading.get_ident())
+        return decode(self)
+
+    monkeypatch.setattr(lazy_json, "_structure", scanned)
+    monkeypatch.setattr(Message, "payload", property(decoded))
+    panel.show_topic("/blackboard")
+    panel.compare.setChecked(True)
+    for number in range(3):
+        panel.reader.forget()
+        window.session.send("/blackboard", {"n": number, "data": ["x" * 90] * 110_000})
+        qtbot.waitUntil(lambda wanted=number: (panel.refresh(), shown_number(panel) == wanted)[1])
+    window.session.topics["/speech/words"].newest = Message(
+        "/speech/words", b"y" * 2_000_000, "string", "string"
+    )
+    panel.show_topic("/speech/words")
+    panel.refresh()
+    press(button(panel.body.large, "Read the newest one"))
+    qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == TREE)[1])
+    assert threads["looked into"]
+    assert threads["decoded"]
+    assert threading.get_ident() not in threads["looked into"] | threads["decoded"]
+
+
+def shown_number(panel: InspectorPanel) -> object:
+    value = panel.model.value()
+    return value.get("n") if panel.body.page == TREE and isinstance(value, Mapping) else None
+
+
+def test_other_large_messages_are_read_only_when_asked_for(qtbot, panel, window) -> None:
+    topic = window.session.topics["/speech/words"]
+    topic.newest = Message("/speech/words", b"x" * 1_200_000, "string", "string", seq=1)
+    panel.show_topic("/speech/words")
+    panel.refresh()
+    assert panel.body.page == LARGE
+    assert panel.body.large._title.text() == "A message of 1.2 MB"
+    press(button(panel.body.large, "Read the newest one"))
     assert panel.frozen  # the next large one would hide it again
-    window.session.send("/blackboard", {"data": "y" * 1_200_000})
-    ticks(window, panel)
-    assert panel.model.value() == message.payload
+    topic.newest = Message("/speech/words", b"y" * 1_200_000, "string", "string", seq=2)
+    qtbot.waitUntil(lambda: (ticks(window, panel), panel.body.page == TREE)[1])
+    assert panel.model.value() == {"value": "x" * 1_200_000}
+
+
+def test_a_large_text_that_is_no_json_is_shown_as_bytes(qtbot, panel, window) -> None:
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", b"[" * 1_100_000)
+    qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == RAW)[1])
+    assert panel.body.sentence.text() == "This can't be read as json: its brackets do not match."
 
 
 def test_pictures_are_summed_up_not_listed() -> None:
@@ -161,11 +237,11 @@ def test_pictures_are_not_decoded_to_be_summed_up(panel, window) -> None:
     told = {"shape": [480, 640, 3], "encoding": "jpeg"}
     topic.newest = Message("/robot/camera", b"no picture at all", "image", "image", seq=1, extension=told)
     panel.refresh()
-    assert panel.pages.currentIndex() == TREE
+    assert panel.body.page == TREE
     assert panel.model.value()["width"] == 640
     topic.newest = Message("/robot/camera", b"no picture at all", "image", "image", seq=2)
     panel.refresh()
-    assert panel.pages.currentIndex() == RAW  # nothing tells its shape, and its bytes are none
+    assert panel.body.page == RAW  # nothing tells its shape, and its bytes are none
 
 
 def test_strings_are_shown_as_one_value(panel, window) -> None:
@@ -180,17 +256,17 @@ def test_finding_goes_through_keys_and_values(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard())
     panel.refresh()
-    QTest.keyClicks(panel.finder, "aiko")
+    QTest.keyClicks(panel.finder.field, "aiko")
     assert panel.foot.path.text() == "people[0].name"
-    panel.finder.clear()
-    QTest.keyClicks(panel.finder, "theta")
+    panel.finder.field.clear()
+    QTest.keyClicks(panel.finder.field, "theta")
     assert panel.foot.path.text() == "robots.Pepper.pose.theta"
-    panel.finder.setText("kind")
+    panel.finder.field.setText("kind")
     first = panel.foot.path.text()
-    panel.next_match()
+    panel.finder.step(1)
     assert (first, panel.foot.path.text()) == ("objects[0].kind", "objects[1].kind")
-    panel.finder.setText("nowhere")
-    assert panel.finder.property("wrong") == "true"
+    panel.finder.field.setText("nowhere")
+    assert panel.finder.field.property("wrong") == "true"
 
 
 def test_a_topic_that_has_gone_says_since_when_and_keeps_its_last_message(panel, window) -> None:
@@ -219,3 +295,107 @@ def test_the_topic_comes_back_with_the_layout(qtbot, panel, window) -> None:
 )
 def test_what_goes_onto_the_clipboard(value: object, words: str) -> None:
     assert plain_words(value) == words
+
+
+def test_finding_counts_and_goes_both_ways_also_when_the_next_message_came(panel, window) -> None:
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", {"a": "x1", "b": "x2", "c": "x3"})
+    panel.refresh()
+    field = panel.finder.field
+    QTest.keyClicks(field, "x")
+    assert (panel.finder.count.text(), panel.foot.path.text()) == ("1 of 3", "a")
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert (panel.finder.count.text(), panel.foot.path.text()) == ("3 of 3", "c")
+    QTest.keyClick(field, Qt.Key.Key_Return, Qt.KeyboardModifier.ShiftModifier)
+    assert panel.foot.path.text() == "b"
+    window.session.send("/blackboard", {"a": "x1", "b": "y", "c": "x3", "d": "x4", "e": "x5"})
+    panel.refresh()
+    press(panel.finder.after)
+    assert (panel.finder.count.text(), panel.foot.path.text()) == ("3 of 4", "d")
+    press(panel.finder.before)
+    assert panel.foot.path.text() == "c"
+    field.clear()
+    assert panel.finder.count.isHidden()
+    assert panel.focus_filter()
+    field.setText("nowhere")
+    assert panel.finder.count.text() == "none"
+
+
+def test_the_message_before_is_compared_and_only_changes_can_be_shown(panel, window) -> None:
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", {"same": 1, "n": 1, "gone": 2})
+    panel.refresh()
+    window.session.send("/blackboard", {"same": 1, "n": 2, "new": {"x": 1}})
+    panel.refresh()
+    panel.compare.setChecked(True)
+    assert panel.strip.isVisible()
+    assert panel.strip.words.text() == "Message before: 1 changed, 1 added, 1 removed"
+    marks = {node.key: node.mark for node in top(panel)}
+    assert marks == {"same": "", "n": "changed", "new": "added", "gone": "removed"}
+    panel.strip.only.setChecked(True)
+    assert [node.key for node in top(panel)] == ["n", "new", "gone"]
+    window.session.send("/blackboard", {"same": 1, "n": 2, "new": {"x": 1}})
+    panel.refresh()
+    assert panel.strip.words.text() == "Message before: no difference"
+    assert top(panel) == []
+    panel.compare.setChecked(False)
+    assert panel.strip.isHidden()
+    assert [node.mark for node in top(panel)] == ["", "", ""]
+
+
+def test_a_pinned_message_stays_the_one_to_compare_with(panel, window) -> None:
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", {"n": 1})
+    panel.refresh()
+    panel.pin.setChecked(True)
+    assert panel.strip.words.text() == "Pinned message: no difference"
+    for number in (2, 3):
+        window.session.send("/blackboard", {"n": number})
+        panel.refresh()
+    (node,) = top(panel)
+    assert (node.value, node.base, node.mark) == (3, 1, "changed")
+    panel.show_topic("/odom")
+    assert not panel.pin.isChecked()
+
+
+def top(panel: InspectorPanel) -> list[Node]:
+    return [panel.model.node(panel.model.index(row, 0)) for row in range(panel.model.rowCount())]
+
+
+def test_the_whole_message_is_copied_as_json(panel, window) -> None:
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", {"a": [1, 2]})
+    panel.refresh()
+    panel.own.copy_message()
+    assert QGuiApplication.clipboard().text() == '{"a": [1, 2]}'
+    assert window.toasts == ["Copied the message of /blackboard"]
+    panel.show_topic("/speech/words")
+    window.session.send("/speech/words", b"hello")
+    panel.refresh()
+    panel.own.copy_message()
+    assert json.loads(QGuiApplication.clipboard().text()) == {"value": "hello"}
+    words = [action.text() for action in panel.more_actions()]
+    assert words[:3] == ["Copy value", "Copy path", "Copy the message as JSON"]
+
+
+def test_comparing_comes_back_with_the_layout(qtbot, panel, window) -> None:
+    panel.show_topic("/odom")
+    panel.compare.setChecked(True)
+    panel.strip.only.setChecked(True)
+    again = window.make(PANEL)
+    qtbot.addWidget(again)
+    for widget in again.header:
+        qtbot.addWidget(widget)
+    again.restore_state(panel.save_state())
+    assert isinstance(again, InspectorPanel)
+    assert again.comparing
+    assert again.strip.only.isChecked()
+
+
+def test_of_a_change_deep_inside_only_the_value_counts() -> None:
+    before, after = {"a": {"b": [1, 2, 3]}, "c": 1}, {"a": {"b": [1, 9]}, "c": 1, "d": {"e": {"f": 1}}}
+    counts = count_changes(after, before)
+    assert counts == {"changed": 1, "added": 1, "removed": 1}
+    assert changes_words(counts) == "1 changed, 1 added, 1 removed"
+    assert count_changes(after, OFF) == {"changed": 0, "added": 0, "removed": 0}

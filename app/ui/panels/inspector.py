@@ -1,4 +1,4 @@
-"""Inspector: the newest message of one topic as a tree, or its bytes."""
+"""Inspector: the newest message of one topic as a tree, or its bytes; found, compared, copied."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QModelIndex, QPoint, Qt
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
-from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QVBoxLayout
 
-from app.ui.hex_view import HexView
+from app.core.reading import Reader, Reading
+from app.ui.inspector_actions import InspectorActions
+from app.ui.inspector_body import LARGE, NOTHING, RAW, TREE, InspectorBody
+from app.ui.inspector_compare import count_changes
 from app.ui.inspector_parts import (
-    FindField,
-    Foot,
+    LARGE_BYTES,
     image_summary,
+    live_words,
     message_facts,
-    plain_words,
+    payload_or,
     tells_its_shape,
 )
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
-from app.ui.tree import Node, TreeModel
-from app.ui.tree_values import search
-from app.ui.tree_view import TreeView
-from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton, Line, Segments, label
+from app.ui.tree_difference import OFF
+from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.menus import Menu
-from app.ui.words import size_words
 
 if TYPE_CHECKING:
+    from app.core.lazy_json import JsonIndex
     from app.core.topics import Topic
     from app.core.watches import Watch
     from nep.message import Message
 
-LARGE_BYTES = 1_000_000
 FIRST_ROWS = 24
-NOTHING, LARGE, TREE, RAW = range(4)
+BEFORE, PINNED = "Message before", "Pinned message"
 
 
 class InspectorPanel(PanelWidget):
@@ -42,74 +42,49 @@ class InspectorPanel(PanelWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Inspector")
+        self.clock = time.monotonic
         self._topic = ""
         self._watch: Watch | None = None
         self._shown: Message | None = None
         self._allowed: Message | None = None  # a large message that a person wants to read
+        self._reading: Reading | None = None  # what the tree shows, when it was read elsewhere
         self._raw_wanted = False
-        self._matches: list[tuple[str | int, ...]] = []
-        self._match = -1
-        self.model = TreeModel()
-        self.live = Chip(self.theme, "", "info", "")
-        self.freeze = IconButton(self.theme, "snowflake", "Freeze this panel", checkable=True, size=26)
-        self.freeze.toggled.connect(lambda _on: self.refresh())
-        self.header = [self.live, self.freeze]
-        self._make_tree()
+        self._value: object = None
+        self._before: object = OFF  # what stood here before, of the same topic
+        self._pinned: object = OFF
+        self.reader = Reader()
+        self.body = InspectorBody(self.theme, self._looked_through)
+        self._make_header()
         self._make_body()
         self._say_nothing()
 
     # -- its parts ----------------------------------------------------------------------------------------
 
-    def _make_tree(self) -> None:
-        self.tree = TreeView(self.theme, self.model)
-        self.tree.setAccessibleName("Newest message")
-        self.tree.selectionModel().currentChanged.connect(self._chosen)
-        self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.tree.customContextMenuRequested.connect(self._show_menu)
-        for words, key, does in (
-            ("Copy value", QKeySequence(QKeySequence.StandardKey.Copy), self.copy_value),
-            ("Copy path", QKeySequence("Ctrl+Shift+C"), self.copy_path),
-        ):
-            action = QAction(words, self.tree)
-            action.setShortcut(key)
-            action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-            action.triggered.connect(does)
-            self.tree.addAction(action)
+    def _make_header(self) -> None:
+        theme = self.theme
+        self.live = Chip(theme, "", "info", "")
+        self.compare = IconButton(theme, "equal", "Compare with the message before", checkable=True, size=26)
+        self.freeze = IconButton(theme, "snowflake", "Freeze this panel", checkable=True, size=26)
+        self.pin = IconButton(theme, "pin", "Pin this message and compare with it", checkable=True, size=26)
+        self.freeze.toggled.connect(lambda _on: self.refresh())
+        self.pin.toggled.connect(self._pin)
+        self.compare.toggled.connect(lambda _on: self._show_value())
+        self.header = [self.live, self.compare, self.freeze, self.pin]
 
     def _make_body(self) -> None:
-        theme = self.theme
-        self.finder = FindField(theme)
-        self.finder.textChanged.connect(self.look_for)
-        self.finder.next_wanted.connect(self.next_match)
-        self.finder.leave.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self.mode = Segments(
-            theme, [("tree", "Tree", None), ("raw", "Raw", None)], size="small", name="Show as"
-        )
+        body = self.body
+        self.model, self.tree, self.finder = body.model, body.tree, body.finder
+        self.mode, self.strip, self.foot, self.bytes = body.mode, body.strip, body.foot, body.bytes
+        self.own = InspectorActions(self)
+        self.foot.copy_value.clicked.connect(self.own.copy_value)
+        self.foot.copy_path.clicked.connect(self.own.copy_path)
+        self.tree.selectionModel().currentChanged.connect(self._chosen)
+        self.tree.customContextMenuRequested.connect(self._show_menu)
         self.mode.changed.connect(self._set_mode)
-        self.bar = QWidget()
-        bar = QHBoxLayout(self.bar)
-        bar.setContentsMargins(8, 7, 8, 7)
-        bar.setSpacing(8)
-        bar.addWidget(self.finder, 1)
-        bar.addWidget(self.mode)
-        self.line = Line(theme)
-        self.sentence = label("", "small", role="warn", wrap=True)
-        self.sentence.setContentsMargins(12, 6, 12, 6)
-        self.bytes = HexView(theme)
-        self.empty = EmptyState(theme, "list-tree", "", "")
-        self.large = EmptyState(theme, "database", "", "")
-        self.foot = Foot(theme, self.copy_value, self.copy_path)
-        self.foot.show_path("")
-        self.pages = QStackedWidget()
-        for page in (self.empty, self.large, self.tree, self.bytes):
-            self.pages.addWidget(page)
+        self.strip.only_changed.connect(lambda _on: self._show_value())
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        for widget in (self.bar, self.line, self.sentence):
-            column.addWidget(widget)
-        column.addWidget(self.pages, 1)
-        column.addWidget(self.foot)
+        column.addWidget(body)
 
     # -- what it shows ------------------------------------------------------------------------------------
 
@@ -117,13 +92,15 @@ class InspectorPanel(PanelWidget):
         """Look at another topic."""
         if name == self._topic:
             return
-        self.shut()
+        self._leave()
         self._topic = name
-        self._shown = self._allowed = None
+        self._shown = self._allowed = self._reading = None
+        self._value, self._before, self._pinned = None, OFF, OFF
         self._raw_wanted = False
         self.model.clear()
         self.foot.show_path("")
-        self.freeze.setChecked(False)
+        for button in (self.freeze, self.pin):
+            button.setChecked(False)
         self.set_title("Inspector", name)
         if name:
             self._watch = self.session.watch(name)
@@ -134,82 +111,104 @@ class InspectorPanel(PanelWidget):
         if not self._topic:
             return
         topic = self.session.topics.get(self._topic)
-        if self.frozen:
-            self.live.set("frozen", "off", "snowflake")
-        elif topic is None or topic.gone_s is not None:
-            gone = topic.gone_s if topic is not None else None
-            self.live.set(f"gone {int(gone)} s" if gone is not None else "gone", "off", "")
-        else:
-            self.live.set("live", "info", "")
-            if topic.newest is not None and topic.newest is not self._shown:
-                self._take(topic, topic.newest)
-        if self.pages.currentIndex() == TREE and self.tree.fading():
+        self.live.set(*live_words(topic, self.frozen))
+        newest = topic.newest if topic is not None and topic.gone_s is None else None
+        if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
+            self._take(topic, newest)
+        done = self.reader.take()
+        if done is not None and not self._raw_wanted:
+            self._show_read(done)
+        if self.body.page == TREE and self.tree.fading():
             self.tree.viewport().update()
 
     def _take(self, topic: Topic, message: Message) -> None:
-        self._shown = message
-        self.foot.facts.setText(message_facts(message))
-        readable = True
         large = message.size_bytes > LARGE_BYTES and message.codec != "image"
         if self._raw_wanted:
             self._show_raw(message, "")
-        elif large and message is not self._allowed:
+        elif large and message.codec != "json" and message is not self._allowed:
             self._offer_large(message)
+        elif large:
+            self._read_elsewhere(message)
         elif tells_its_shape(message) or self.session.topics.check(topic):
-            self._show_tree(message)
+            value = image_summary(message) if message.codec == "image" else message.payload
+            self._show_tree(message, value, None)
         else:
-            readable = False
             self._show_raw(message, topic.decode_error or "")
-        self.mode.set_value("tree" if readable and not self._raw_wanted else "raw")
 
-    def _show_tree(self, message: Message) -> None:
-        value = image_summary(message) if message.codec == "image" else message.payload
-        first = not self.model.rowCount()
-        self.model.set_value(value, time.monotonic())
-        if first:
-            self.tree.expand_small(FIRST_ROWS)
+    def _read_elsewhere(self, message: Message) -> None:
+        """Let the reader's thread look into it; until then what was there stays."""
+        if not self.reader.ask_at_leisure(message, self.clock()):
+            return
+        if self._shown is None or self.body.page == LARGE:
+            self.body.say_large(message.size_bytes, "It is being read.")
+            self._page(LARGE)
+
+    def _show_read(self, done: Reading) -> None:
+        if done.error is not None:
+            self._show_raw(done.message, done.error)
+        else:
+            self._show_tree(done.message, done.value, done)
+
+    def _show_tree(self, message: Message, value: object, reading: Reading | None) -> None:
+        fresh = message is not self._shown
+        self._shown, self._reading = message, reading
+        if fresh:
+            self._before, self._value = (self._value if self._value is not None else OFF), value
+            topic = self.session.topics.get(self._topic)
+            if reading is None and topic is not None and topic.previous is not None:
+                self._before = payload_or(topic.previous, self._before)
+            self.finder.forget()
+        self._value = value
+        self._show_value()
+        self.foot.facts.setText(message_facts(message))
         self._page(TREE)
 
+    def _show_value(self) -> None:
+        """Put the message into the tree, compared or not."""
+        if self._shown is None or self._value is None:
+            return
+        first = not self.model.rowCount()
+        base: object = OFF
+        if self.comparing:
+            base = self._pinned if self.pin.isChecked() else self._before
+            self.strip.say(PINNED if self.pin.isChecked() else BEFORE, count_changes(self._value, base))
+        self.strip.setVisible(self.comparing and self.body.page == TREE)
+        only = self.comparing and base is not OFF and self.strip.only.isChecked()
+        self.model.set_value(self._value, self.clock(), base, changes_only=only)
+        if first:
+            self.tree.expand_small(FIRST_ROWS)
+
     def _show_raw(self, message: Message, sentence: str) -> None:
+        self._shown = message
+        self.foot.facts.setText(message_facts(message))
         self.bytes.show_bytes(message.data)
-        self.sentence.setText(f"This can't be read as {message.codec}: {sentence}." if sentence else "")
+        self.body.sentence.setText(f"This can't be read as {message.codec}: {sentence}." if sentence else "")
         self._page(RAW)
 
     def _offer_large(self, message: Message) -> None:
-        words = "Messages above 1 MB are read only when you ask for it."
-        self.large.say(f"A message of {size_words(message.size_bytes)}", words)
-        if self.pages.currentIndex() != LARGE:
-            read = EmptyAction("Read the newest one", self._read_large, "list-tree", primary=True)
-            self.large.set_actions([read])
+        self._shown = message
+        words = f"Messages of {message.codec} above 1 MB are read only when you ask for it."
+        self.body.say_large(message.size_bytes, words, self._read_large)
         self._page(LARGE)
 
     def _read_large(self) -> None:
         """Read the message that is shown, and hold it: the next one would hide it again."""
-        topic = self.session.topics.get(self._topic)
-        if topic is not None and self._shown is not None:
+        if self._shown is not None:
             self._allowed = self._shown
             self.freeze.setChecked(True)
-            self._take(topic, self._shown)
+            self.reader.ask(self._shown)
+            self.body.say_large(self._shown.size_bytes, "It is being read.")
 
     def _page(self, page: int) -> None:
-        sentence = self.sentence.text() if page == RAW else ""
-        self.sentence.setText(sentence)
-        self.sentence.setVisible(bool(sentence))
-        self.pages.setCurrentIndex(page)
-        for widget in (self.bar, self.line, self.foot):
-            widget.setVisible(page in {TREE, RAW})
-        self.foot.legend.setVisible(page == TREE)
+        self.body.show_page(page, comparing=self.comparing)
+        self.own.set_enabled(page == TREE)
 
     def _say_nothing(self) -> None:
-        if self._topic:
-            self.empty.say("No message yet", f"The next message on {self._topic} appears here.")
-            self.empty.set_actions([])
-        else:
+        self.body.say_nothing(self._topic, lambda: self.context.run("panel.topics"))
+        if not self._topic:
             self.live.set("")
-            self.empty.say("Nothing chosen", "Click a topic to see its newest message.")
-            choose = EmptyAction("Choose a topic", lambda: self.context.run("panel.topics"), "list")
-            self.empty.set_actions([choose])
-        self.freeze.setVisible(bool(self._topic))
+        for button in (self.freeze, self.pin, self.compare):
+            button.setVisible(bool(self._topic))
         self._page(NOTHING)
 
     # -- what a person does -------------------------------------------------------------------------------
@@ -219,76 +218,78 @@ class InspectorPanel(PanelWidget):
         """Whether this panel holds its message."""
         return self.freeze.isChecked()
 
+    @property
+    def comparing(self) -> bool:
+        """Whether the tree shows how the message differs from another one."""
+        return self.compare.isChecked() or self.pin.isChecked()
+
+    @property
+    def message(self) -> Message | None:
+        """What is shown."""
+        return self._shown
+
+    def _pin(self, pinned: bool) -> None:
+        self._pinned = self._value if pinned and self._value is not None else OFF
+        self._show_value()
+
     def _set_mode(self, mode: str) -> None:
         self._raw_wanted = mode == "raw"
-        topic = self.session.topics.get(self._topic)
-        if topic is not None and self._shown is not None:
-            self._take(topic, self._shown)
+        topic, shown = self.session.topics.get(self._topic), self._shown
+        if shown is None:
+            return
+        if self._reading is not None and self._reading.message is shown and not self._raw_wanted:
+            self._show_read(self._reading)
+        elif topic is not None:
+            self._take(topic, shown)
 
     def _chosen(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")
 
-    def _node(self) -> Node | None:
-        index = self.tree.currentIndex()
-        return self.model.node(index) if index.isValid() else None
-
-    def copy_value(self) -> None:
-        """Put the chosen value on the clipboard."""
-        node = self._node()
-        if node is not None:
-            QGuiApplication.clipboard().setText(plain_words(node.value))
-            self.context.toast(f"Copied {node.path}")
-
-    def copy_path(self) -> None:
-        """Put the chosen value's path on the clipboard."""
-        node = self._node()
-        if node is not None:
-            QGuiApplication.clipboard().setText(node.path)
-            self.context.toast(f"Copied the path {node.path}")
+    def _looked_through(self) -> tuple[object, JsonIndex | None]:
+        return self.model.value(), self._reading.index if self._reading is not None else None
 
     def _show_menu(self, at: QPoint) -> None:
         menu = Menu(self.theme, self)
-        menu.addActions(self.tree.actions())
+        menu.addActions(self.own.listed())
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.tree.viewport().mapToGlobal(at))
 
-    def look_for(self, words: str) -> None:
-        """Choose the first key or value with these words."""
-        self._matches = list(search(self.model.value(), words)) if words else []
-        self._match = -1
-        self.finder.setProperty("wrong", "true" if words and not self._matches else "false")
-        self.finder.style().unpolish(self.finder)
-        self.finder.style().polish(self.finder)
-        self.next_match()
-
-    def next_match(self) -> None:
-        """Choose the next one."""
-        if self._matches:
-            self._match = (self._match + 1) % len(self._matches)
-            index = self.model.reveal(self._matches[self._match])
-            self.tree.setCurrentIndex(index)
-            self.tree.scrollTo(index)
+    def more_actions(self) -> list[QAction]:
+        return self.own.listed()
 
     def focus_filter(self) -> bool:
-        self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)
-        return True
+        if self.body.bar.isVisible():
+            self.finder.field.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            self.finder.field.selectAll()
+        return self.body.bar.isVisible()
 
     def theme_changed(self) -> None:
         self.tree.row_height = round(self.theme.scaled(self.theme.size("row", "tree")))
         self.tree.doItemsLayout()
 
     def save_state(self) -> dict[str, object]:
-        return {"topic": self._topic}
+        return {
+            "topic": self._topic,
+            "compare": self.compare.isChecked(),
+            "changes_only": self.strip.only.isChecked(),
+        }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         topic = state.get("topic")
         if isinstance(topic, str):
             self.show_topic(topic)
+        self.compare.setChecked(state.get("compare") is True)
+        self.strip.only.setChecked(state.get("changes_only") is True)
 
-    def shut(self) -> None:
+    def _leave(self) -> None:
+        self.reader.forget()
         if self._watch is not None:
             self._watch.close()
             self._watch = None
+
+    def shut(self) -> None:
+        self._leave()
+        self.reader.close()
 
 
 PANEL = Panel("inspector", "Inspector", "list-tree", (ANY_TYPE,), InspectorPanel)

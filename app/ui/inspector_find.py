@@ -1,0 +1,141 @@
+"""Finding a key or a value in a message: the field, how many there are, next and previous."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from app.ui.theme import Theme
+from app.ui.tree_values import search
+from app.ui.widgets import IconButton, SearchField, label
+
+if TYPE_CHECKING:
+    from app.core.lazy_json import JsonIndex
+
+MOST = 1000
+Path = tuple[str | int, ...]
+
+
+def find_in_text(index: JsonIndex, words: str, most: int = MOST) -> list[Path]:
+    """Where a large JSON text has these words (any case of the letters a to z); each value once."""
+    text, wanted = bytes(index.data).lower(), words.encode().lower()
+    found: list[Path] = []
+    at = text.find(wanted) if wanted else -1
+    while at >= 0 and len(found) < most:
+        path = index.path_to(at)
+        if path and (not found or found[-1] != path):
+            found.append(path)
+        at = text.find(wanted, at + len(wanted))
+    return found
+
+
+class FindField(SearchField):
+    """Return goes to the next one, Shift+Return to the one before, Esc clears, Down goes into the tree."""
+
+    step_wanted = Signal(int)
+    leave = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme, "Find a key or value")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        back = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_F3}:
+            self.step_wanted.emit(-1 if back else 1)
+        elif event.key() == Qt.Key.Key_Escape and self.text():
+            self.clear()
+        elif event.key() == Qt.Key.Key_Down:
+            self.leave.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class FindBar(QWidget):
+    """The field with its count and arrows; `found` with the path of what was found.
+
+    What is found belongs to the message that was looked through: `forget` when another one is shown, then the
+    next step looks anew and goes on where it was.
+    """
+
+    found = Signal(object)
+
+    def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
+        """``source`` gives the message that is shown, and the index of a large one."""
+        super().__init__()
+        self._source = source
+        self._matches: list[Path] | None = None
+        self._more = False
+        self._place = -1
+        self.field = FindField(theme)
+        self.field.textChanged.connect(self.look)
+        self.field.step_wanted.connect(self.step)
+        self.count = label("", "small", role="textTertiary")
+        self.before = IconButton(theme, "chevron-up", "Previous one", "Shift+Return", size=24)
+        self.after = IconButton(theme, "chevron-down", "Next one", "Return", size=24)
+        self.before.clicked.connect(lambda: self.step(-1))
+        self.after.clicked.connect(lambda: self.step(1))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(3)
+        row.addWidget(self.field, 1)
+        for widget in (self.count, self.before, self.after):
+            row.addWidget(widget)
+            widget.hide()
+        self.setFocusProxy(self.field)
+
+    @property
+    def matches(self) -> list[Path]:
+        """Where the words are, as far as the message was looked through."""
+        return self._matches or []
+
+    def look(self, words: str) -> None:
+        """Look for these words and go to the first place."""
+        self._place = -1
+        self._search(words)
+        for widget in (self.count, self.before, self.after):
+            widget.setVisible(bool(words))
+        self._say(wrong=bool(words) and not self.matches)
+        if self.matches:
+            self.step(1)
+
+    def forget(self) -> None:
+        """Another message is shown."""
+        self._matches = None
+
+    def step(self, by: int) -> None:
+        """Go on to the next one, or back."""
+        words = self.field.text()
+        if not words:
+            return
+        if self._matches is None:
+            last = self._place
+            self._search(words)
+            self._place = min(last, len(self.matches) - 1)
+        if self.matches:
+            self._place = (self._place + by) % len(self.matches)
+            self.found.emit(self.matches[self._place])
+        self._say(wrong=not self.matches)
+
+    def _search(self, words: str) -> None:
+        if not words:
+            self._matches = []
+            return
+        value, index = self._source()
+        if index is not None:
+            found = find_in_text(index, words, MOST + 1)
+        else:
+            found = list(islice(search(value, words), MOST + 1))
+        self._more = len(found) > MOST
+        self._matches = found[:MOST]
+
+    def _say(self, *, wrong: bool) -> None:
+        total = f"{len(self.matches)}{'+' if self._more else ''}"
+        self.count.setText(f"{self._place + 1} of {total}" if self.matches else "none")
+        self.field.setProperty("wrong", "true" if wrong else "false")
+        self.field.style().unpolish(self.field)
+        self.field.style().polish(self.field)
