@@ -130,10 +130,13 @@ class RequestRefusedError(NepError):
 
 
 class AddressInUseError(NepError):
-    """`address` is held by another program, or is not an address of this computer."""
+    """`address` is held by another program, or is not an address of this computer; ":*" is any port of it."""
 
     def __init__(self, address: str) -> None:
         self.address = address
+        if address.endswith(":*"):
+            super().__init__(f"no port of '{address[:-2]}' is free; end programs that have many connections")
+            return
         super().__init__(f"'{address}' is in use by another program; close it or choose another port")
 
 

@@ -11,8 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO
 
-from nep.errors import NepError
-from nep.masters import is_running, start_process
+from app.core.master_start import MasterStart
 
 END_WAIT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
@@ -55,8 +54,10 @@ class Companions:
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
-        self._master: subprocess.Popen[bytes] | None = None
-        self._starting: threading.Thread | None = None
+        self._master = MasterStart(
+            address,
+            lambda why: post_event(CompanionFailed("master", "The master can't be started.", why, False)),
+        )
 
     @property
     def virtual_robots(self) -> tuple[str, ...]:
@@ -67,14 +68,15 @@ class Companions:
     @property
     def started_master(self) -> bool:
         """Whether the master that runs was started here."""
-        return self._master is not None and self._master.poll() is None
+        return self._master.runs
 
     def ensure_master(self) -> None:
         """Join the master that runs, or start one; returns at once, a failure is posted."""
-        if self._starting is not None and self._starting.is_alive():
-            return
-        self._starting = threading.Thread(target=self._start_master, name="studio-companions", daemon=True)
-        self._starting.start()
+        self._master.ensure()
+
+    def keep_master(self) -> None:
+        """The same, to be said again and again while there is none: after a failure it takes its time."""
+        self._master.keep()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
         """Start a virtual robot of that name and model.
@@ -146,16 +148,7 @@ class Companions:
         """End the virtual robots. The master lives on while programs that are not ours are registered."""
         for name in list(self._robots):
             self.stop_virtual_robot(name)
-        if self._starting is not None:
-            self._starting.join(timeout=END_WAIT_S)
-
-    def _start_master(self) -> None:
-        if is_running(self._address, timeout_s=0.5):
-            return
-        try:
-            self._master = start_process(self._address, owner_pid=os.getpid())
-        except (NepError, OSError) as error:
-            self._post_event(CompanionFailed("master", "The master can't be started.", str(error), False))
+        self._master.close()
 
 
 def _no_console() -> int:

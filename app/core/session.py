@@ -155,7 +155,7 @@ class Session:
             self._health.check(self.runs.kept if self.runs.active else ())
             self._health.journal(self.documents.journal_error)
             if self.master.kind == "none" and self._start_companions:
-                self.companions.ensure_master()
+                self.companions.keep_master()
         self.tick_ms = (self._clock() - began) * 1000
 
     def close(self) -> None:

@@ -13,7 +13,9 @@ import typer
 
 from nep.addresses import host_of, is_loopback, master_address
 from nep.cli.alert_printer import AlertLog, AlertPrinter
-from nep.cli.screen import console
+from nep.cli.screen import console, say
+from nep.doctor import hindrance
+from nep.doctor.collect import loopback_problem
 from nep.errors import AddressInUseError, NepError
 from nep.gateway.attachment import GatewayAttachment
 from nep.masters import Attachment, Master, is_running
@@ -67,10 +69,16 @@ def master(
             raise NepError(
                 f"a master already runs at '{address}'; use it, or choose another --port"
             ) from error
-        raise
+        hindered = hindrance(address)
+        if hindered is None:
+            raise
+        raise NepError(hindered.as_error) from error
     try:
         running.listen(listen or ())
         _say_running(running.address, joins_originals=gateway)
+        problem = loopback_problem()
+        if problem:
+            say(f"but programs of this computer cannot reach it: {problem}; 'nep doctor' says more")
         _warn_of_others(running.address, listen or ())
         signal.signal(signal.SIGTERM, _end)
         running.wait()

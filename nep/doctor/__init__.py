@@ -4,9 +4,9 @@
 function of the facts alone.
 """
 
-from nep.doctor.collect import gather
+from nep.doctor.collect import gather, hindrance
 from nep.doctor.facts import Facts
 from nep.doctor.judge import findings, report, to_plain, worst
 from nep.doctor.verdict import Finding, Severity
 
-__all__ = ["Facts", "Finding", "Severity", "findings", "gather", "report", "to_plain", "worst"]
+__all__ = ["Facts", "Finding", "Severity", "findings", "gather", "hindrance", "report", "to_plain", "worst"]

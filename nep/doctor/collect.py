@@ -18,12 +18,16 @@ import zmq
 import nep.errors
 from nep.addresses import host_of, master_address
 from nep.doctor import processes
+from nep.doctor.network import loopback, masters
+from nep.doctor.verdict import Finding
 from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact
+from nep.doctor.network import loopback, masters
+from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
 from nep.nodes import Node
 from nep.views import GraphView
 
-__all__ = ["PORTS", "gather"]
+__all__ = ["PORTS", "gather", "hindrance", "loopback_problem"]
 
 PORTS: Mapping[int, str] = {
     7000: "where programs of nep up to 0.5.4.5, nep-js and C# ask",
@@ -75,6 +79,32 @@ def gather(
         tuple(_clocks(view)),
         loopback_problem(),
     )
+
+
+def hindrance(address: str | None = None) -> Finding | None:
+    """Why no master can be started at the address; None when nothing is known to be in its way."""
+    chosen = master_address(address)
+    here = _is_here(chosen)
+    port = _port(int(chosen.rpartition(":")[2]), "", processes.listening()) if here else None
+    facts = Facts(time.time(), chosen, sys.platform, {}, "", master_port=port, loopback=loopback_problem())
+    for finding in (*loopback(facts), *masters(facts)):
+        if finding.id in {"loopback", "master:foreign", "master:hung"} and finding.severity == "error":
+            return finding
+    return None
+
+
+def hindrance(address: str | None = None) -> Finding | None:
+    """Why no master can be started at the address; None when nothing is known to be in its way."""
+    chosen = master_address(address)
+    here = _is_here(chosen)
+    port = _port(int(chosen.rpartition(":")[2]), "", processes.listening()) if here else None
+    facts = Facts(
+        time.time(), chosen, sys.platform, {}, "", master_port=port, loopback=loopback_problem()
+    )
+    for finding in (*loopback(facts), *masters(facts)):
+        if finding.id in {"loopback", "master:foreign", "master:hung"} and finding.severity == "error":
+            return finding
+    return None
 
 
 def _ask(address: str) -> tuple[GraphView | None, float | None]:

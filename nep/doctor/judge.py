@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Literal
 
 from nep.doctor.facts import Facts, FolderFact
-from nep.doctor.network import clocks, masters, originals, ports, told_by_master
+from nep.doctor.network import clocks, loopback, masters, originals, ports, told_by_master
 from nep.doctor.verdict import Finding, Severity
 
 __all__ = ["findings", "report", "to_plain", "worst"]
@@ -27,7 +27,7 @@ EARLIEST_S = 1_704_067_200.0
 def findings(facts: Facts) -> tuple[Finding, ...]:
     """Everything that the facts say, the worst first."""
     parts: Sequence[Callable[[Facts], Iterator[Finding]]] = (
-        _loopback, masters, ports, _packages, originals, told_by_master, _files, _sockets, _folders, clocks,
+        loopback, masters, ports, _packages, originals, told_by_master, _files, _sockets, _folders, clocks,
         _clock, _versions,
     )  # fmt: skip
     found = [finding for part in parts for finding in part(facts)]
@@ -52,19 +52,6 @@ def report(found: Sequence[Finding]) -> str:
 def to_plain(found: Sequence[Finding]) -> list[dict[str, object]]:
     """The findings as maps, for `--json`."""
     return [asdict(finding) for finding in found]
-
-
-def _loopback(facts: Facts) -> Iterator[Finding]:
-    if facts.loopback:
-        yield Finding(
-            "loopback",
-            "error",
-            f"Programs of this computer cannot reach each other: {facts.loopback}.",
-            "Switch the loopback interface on; a firewall or a sandbox may have switched it off.",
-            command="ip link set lo up" if facts.platform == "linux" else "",
-        )
-    else:
-        yield Finding("loopback", "ok", "Programs of this computer can reach each other (127.0.0.1).")
 
 
 def _packages(facts: Facts) -> Iterator[Finding]:

@@ -8,12 +8,26 @@ from nep.addresses import is_loopback
 from nep.doctor.facts import Facts, PortFact, ProcessFact
 from nep.doctor.verdict import Finding, ago, counted
 
-__all__ = ["clocks", "masters", "originals", "ports", "told_by_master"]
+__all__ = ["clocks", "loopback", "masters", "originals", "ports", "told_by_master"]
 
 SLOW_S = 0.5
 NOT_SERVED = ("0.5.4.6", "0.5.4.7")
 _AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
 _NATIVE = {"native", "gateway"}
+
+
+def loopback(facts: Facts) -> Iterator[Finding]:
+    """Whether programs of this computer can reach each other at all."""
+    if facts.loopback:
+        yield Finding(
+            "loopback",
+            "error",
+            f"Programs of this computer cannot reach each other: {facts.loopback}.",
+            "Switch the loopback interface on; a firewall or a sandbox may have switched it off.",
+            command="ip link set lo up" if facts.platform == "linux" else "",
+        )
+    else:
+        yield Finding("loopback", "ok", "Programs of this computer can reach each other (127.0.0.1).")
 
 
 def masters(facts: Facts) -> Iterator[Finding]:

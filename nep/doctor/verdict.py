@@ -23,6 +23,14 @@ class Finding:
     mend: str = ""
     command: str = ""
 
+    @property
+    def as_error(self) -> str:
+        """The finding as an error's sentence: lower case, no full stop, the next step after a semicolon."""
+        first = self.sentence.rstrip(".")
+        step = self.mend.rstrip(".")
+        words = f"{first}; {step[:1].lower()}{step[1:]}" if step else first
+        return words[:1].lower() + words[1:]
+
 
 def counted(count: int, one: str) -> str:
     """How many there are, as in "1 node", "2 nodes"."""

@@ -14,7 +14,7 @@ import typer
 
 import nep
 from nep.cli.doctor import doctor
-from nep.doctor import gather, processes
+from nep.doctor import gather, hindrance, processes
 from nep.doctor.collect import loopback_problem
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -123,3 +123,16 @@ def test_people_see_a_sentence_and_the_next_step(foreign):
     lines = done.stdout.splitlines()
     assert lines[0].startswith("✗ Port")
     assert lines[2].strip() == f"nep master --port {foreign + 1}"
+
+
+def test_what_hinders_a_master_is_one_finding(foreign, master):
+    one = hindrance(f"127.0.0.1:{foreign}")
+    assert one is not None
+    assert one.id == "master:foreign"
+    assert one.as_error.startswith(f"port {foreign} is held by ")
+    assert "; end that program" in one.as_error
+    assert not one.as_error.endswith(".")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        free = probe.getsockname()[1]
+    assert hindrance(f"127.0.0.1:{free}") is None

@@ -1,0 +1,79 @@
+"""Starting a master beside the window when there is none, and not over and over when it can't be started."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+
+from nep.doctor import hindrance
+from nep.errors import NepError
+from nep.masters import is_running, start_process
+
+AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
+"""After how long a master that could not be started is tried again: twice as long each time."""
+END_WAIT_S = 2.0
+
+
+class MasterStart:
+    """Joins the master that runs, or starts one. Each reason why it can't is told once."""
+
+    def __init__(
+        self,
+        address: str,
+        failed: Callable[[str], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``failed`` is given the reason, in the starting thread; ``clock`` gives monotonic seconds."""
+        self._address, self._failed, self._clock = address, failed, clock
+        self._process: subprocess.Popen[bytes] | None = None
+        self._thread: threading.Thread | None = None
+        self._wait_s, self._again_at, self._told = AGAIN_S, 0.0, ""
+
+    @property
+    def runs(self) -> bool:
+        """Whether the master that runs was started here."""
+        return self._process is not None and self._process.poll() is None
+
+    def ensure(self) -> None:
+        """Start one now if there is none; returns at once."""
+        if self._thread is not None and self._thread.is_alive():
+            return
+        self._thread = threading.Thread(target=self._start, name="studio-companions", daemon=True)
+        self._thread.start()
+
+    def keep(self) -> None:
+        """The same, to be said again and again while there is none: after a failure it takes its time."""
+        if self._clock() >= self._again_at:
+            self.ensure()
+
+    def close(self) -> None:
+        """Wait for a start that goes on."""
+        if self._thread is not None:
+            self._thread.join(timeout=END_WAIT_S)
+
+    def _start(self) -> None:
+        why = self._why_not()
+        if not why:
+            self._wait_s, self._again_at, self._told = AGAIN_S, 0.0, ""
+            return
+        self._again_at = self._clock() + self._wait_s
+        self._wait_s = min(2 * self._wait_s, AGAIN_AT_MOST_S)
+        if why != self._told:
+            self._told = why
+            self._failed(why)
+
+    def _why_not(self) -> str:
+        """Start it; "" when there is one now."""
+        if is_running(self._address, timeout_s=0.5):
+            return ""
+        hindered = hindrance(self._address)
+        if hindered is not None:
+            return f"{hindered.sentence} {hindered.mend}"
+        try:
+            self._process = start_process(self._address, owner_pid=os.getpid())
+        except (NepError, OSError) as error:
+            return str(error)
+        return ""

@@ -1,0 +1,73 @@
+"""Starting the master: in the background, told once why not, tried again more and more seldom."""
+
+from __future__ import annotations
+
+import os
+import socket
+
+import psutil
+import pytest
+
+import nep
+from app.core.master_start import AGAIN_AT_MOST_S, MasterStart
+from tests.nep.programs import eventually
+
+
+@pytest.fixture
+def foreign():
+    """The address of a program that is no master."""
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        held.listen(8)
+        yield f"127.0.0.1:{held.getsockname()[1]}"
+
+
+def test_a_program_that_is_no_master_is_named_once_and_asked_more_and_more_seldom(foreign) -> None:
+    now = [0.0]
+    told: list[str] = []
+    start = MasterStart(foreign, told.append, lambda: now[0])
+    asked = []
+
+    def ask() -> None:
+        before = start._thread
+        start.keep()
+        if start._thread is not before:
+            asked.append(now[0])
+            start.close()
+
+    while now[0] < 100:
+        ask()
+        now[0] += 0.5
+    assert asked == [0.0, 2.0, 6.0, 14.0, 30.0, 60.0, 90.0]
+    assert asked[-1] - asked[-2] == AGAIN_AT_MOST_S
+    assert len(told) == 1
+    assert f"(process {os.getpid()}), which is no master." in told[0]
+    assert "NEP_MASTER=" in told[0]
+    assert not start.runs
+    assert not psutil.Process().children()
+
+
+def test_a_master_that_runs_is_joined(master) -> None:
+    told: list[str] = []
+    start = MasterStart(master.address, told.append)
+    start.ensure()
+    start.close()
+    assert (told, start.runs) == ([], False)
+
+
+def test_one_is_started_when_nobody_is_there(monkeypatch) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    monkeypatch.setenv("NEP_GATEWAY", "0")
+    told: list[str] = []
+    start = MasterStart(address, told.append)
+    start.ensure()
+    start.ensure()  # one start at a time
+    eventually(lambda: start.runs, 20)
+    assert nep.is_running(address, 5)
+    start.close()
+    assert told == []
+    assert start._process is not None
+    start._process.terminate()
+    start._process.wait(10)
