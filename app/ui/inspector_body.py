@@ -15,7 +15,7 @@ from app.ui.inspector_parts import Foot
 from app.ui.theme import Theme
 from app.ui.tree import TreeModel
 from app.ui.tree_view import TreeView
-from app.ui.widgets import EmptyAction, EmptyState, Line, Segments, label
+from app.ui.widgets import EmptyAction, EmptyState, IconButton, Line, Segments, label
 from app.ui.words import size_words
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ class InspectorBody(QWidget):
         self.mode = Segments(
             theme, [("tree", "Tree", None), ("raw", "Raw", None)], size="small", name="Show as"
         )
+        self.compare = IconButton(theme, "equal", "Compare with the message before", checkable=True, size=26)
         self.strip = CompareStrip(theme)
         self.sentence = label("", "small", role="warn", wrap=True)
         self.sentence.setContentsMargins(12, 6, 12, 6)
@@ -54,8 +55,9 @@ class InspectorBody(QWidget):
         self.bar = QWidget()
         bar = QHBoxLayout(self.bar)
         bar.setContentsMargins(8, 7, 8, 7)
-        bar.setSpacing(8)
+        bar.setSpacing(6)
         bar.addWidget(self.finder, 1)
+        bar.addWidget(self.compare)
         bar.addWidget(self.mode)
         self.line = Line(theme)
         self.pages = QStackedWidget()

@@ -24,6 +24,7 @@ class Shown(Protocol):
 
     row_height: int
     hovered_row: int
+    last_shown: int  # the last column that is not hidden
 
     @property
     def shown_columns(self) -> Sequence[Column[Any]]:
@@ -37,10 +38,10 @@ class Shown(Protocol):
         """The font of a cell."""
 
 
-def padded(rect: QRect, column: int, columns: int) -> QRectF:
+def padded(rect: QRect, column: int, last: int) -> QRectF:
     """The inside of a cell: the outer columns keep further from the edge."""
     left = EDGE if column == 0 else PADDING
-    right = EDGE if column == columns - 1 else PADDING
+    right = EDGE if column == last else PADDING
     return QRectF(rect.adjusted(left, 0, -right, 0))
 
 
@@ -69,7 +70,7 @@ class CellDelegate(QStyledItemDelegate):
         if chosen and index.column() == 0:
             painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
         figures = self._view.shown_columns[index.column()].figures
-        inside = padded(rect, index.column(), len(self._view.shown_columns))
+        inside = padded(rect, index.column(), self._view.last_shown)
         role = "selectedText" if chosen and cell.role == "text" else cell.role
         if chosen and role == "textTertiary":
             role = "accentText"
@@ -144,7 +145,7 @@ class Head(QHeaderView):
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
         font = theme.font("small")
         font.setWeight(QFont.Weight.Medium)
-        box = padded(rect, section, len(columns))
+        box = padded(rect, section, self._view.last_shown)
         ordered = self._view.shown_order.column is column
         metrics = QFontMetricsF(font)
         arrow = 16.0 if ordered else 0.0

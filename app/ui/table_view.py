@@ -63,6 +63,7 @@ class TableView(QTableView, Generic[Row]):
         self.columns: tuple[Column[Row], ...] = model.columns
         self.order: Order[Row] = Order(next((c for c in self.columns if c.name == key), None))
         self.choice = ColumnChoice(self.columns)
+        self.last_shown = len(self.columns) - 1
         self.row_height = 26
         self.hovered_row = -1
         self.keyboard = False
@@ -191,6 +192,7 @@ class TableView(QTableView, Generic[Row]):
         for place, column in enumerate(self.columns):
             self.setColumnHidden(place, place not in shown)
             self.setColumnWidth(place, max(scaled[place], rest) if column.stretch else scaled[place])
+        self.last_shown = max(shown)
         wide = sum(scaled[place] for place in shown) > room
         policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if wide else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setHorizontalScrollBarPolicy(policy)

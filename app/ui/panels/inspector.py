@@ -63,13 +63,11 @@ class InspectorPanel(PanelWidget):
     def _make_header(self) -> None:
         theme = self.theme
         self.live = Chip(theme, "", "info", "")
-        self.compare = IconButton(theme, "equal", "Compare with the message before", checkable=True, size=26)
         self.freeze = IconButton(theme, "snowflake", "Freeze this panel", checkable=True, size=26)
         self.pin = IconButton(theme, "pin", "Pin this message and compare with it", checkable=True, size=26)
         self.freeze.toggled.connect(lambda _on: self.refresh())
         self.pin.toggled.connect(self._pin)
-        self.compare.toggled.connect(lambda _on: self._show_value())
-        self.header = [self.live, self.compare, self.freeze, self.pin]
+        self.header = [self.live, self.freeze, self.pin]
 
     def _make_body(self) -> None:
         body = self.body
@@ -81,6 +79,8 @@ class InspectorPanel(PanelWidget):
         self.tree.selectionModel().currentChanged.connect(self._chosen)
         self.tree.customContextMenuRequested.connect(self._show_menu)
         self.mode.changed.connect(self._set_mode)
+        self.compare = body.compare
+        self.compare.toggled.connect(lambda _on: self._show_value())
         self.strip.only_changed.connect(lambda _on: self._show_value())
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -207,7 +207,7 @@ class InspectorPanel(PanelWidget):
         self.body.say_nothing(self._topic, lambda: self.context.run("panel.topics"))
         if not self._topic:
             self.live.set("")
-        for button in (self.freeze, self.pin, self.compare):
+        for button in (self.freeze, self.pin):
             button.setVisible(bool(self._topic))
         self._page(NOTHING)
 
