@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import glob
 import os
 import tempfile
+import time
 from pathlib import Path
+
+LEFT_AFTER_S = 60.0
 
 
 def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
@@ -30,6 +35,16 @@ def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
         raise
     if durable:
         _sync_folder(path.parent)
+        _sweep(path)
+
+
+def _sweep(path: Path) -> None:
+    """Take away what writers that were killed left beside the file; a write that goes on now is younger."""
+    before = time.time() - LEFT_AFTER_S
+    for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
+        with contextlib.suppress(OSError):  # somebody else was quicker, or it is not ours to take
+            if part.stat().st_mtime < before:
+                part.unlink()
 
 
 def _keep_mode(old: Path, new: Path) -> None:

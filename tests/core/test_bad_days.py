@@ -1,274 +1,148 @@
-"""Bad days of the stream, on a real network: nothing waits, nothing grows, and every number is exact."""
+"""Bad days of a behaviour's file: no room, cut anywhere, of another version, killed while it is saved."""
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable, Iterator, Mapping
+import json
+import os
+import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-import nep
-from app.core.mailbox import MESSAGES_PER_TOPIC
-from app.core.session import Session
-from app.core.settings import Settings
-from app.core.source import GraphSeen, Job
-from nep.masters import Master
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
-from tests.core.waiting import tick_until
+from app import resources
+from app.core.behaviour_file import BehaviourFile, parse_file, read_file, write_file
+from app.core.document import Document
+from app.core.journal import Journal, left_behind
+from app.errors import DocumentError
 
-BAD = b'{"joints": [1, 2, 3'
-
-
-@pytest.fixture
-def session(master: Master, tmp_path: Path) -> Iterator[Session]:
-    session = Session(
-        Settings(tmp_path), address=master.address, journal_folder=tmp_path, start_companions=False
-    )
-    session.start()
-    yield session
-    session.close()
-
-
-@pytest.fixture
-def talker(master: Master) -> Iterator[nep.Node]:
-    with nep.node("talker") as node:
-        yield node
-
-
-def publisher_of(session: Session, talker: nep.Node, topic: str, kind: str = "json") -> nep.Publisher:
-    publisher = talker.new_pub(topic, kind)
-    tick_until(session, lambda: publisher.subscribers == 1)
-    return publisher
+ROOT = Path(__file__).parents[2]
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of Unix")
+FULL = """
+import json, resource, signal, sys
+from pathlib import Path
+from app.core.document import Document
+from app.core.journal import Journal
+from app.errors import DocumentError
+path, journals = Path(sys.argv[1]), Path(sys.argv[2])
+document = Document(lambda: Journal(journals))
+document.open(path)
+document.edited({"blocks": {"blocks": [{"type": "events_started", "id": "x" * 200000}]}})
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+try:
+    document.save()
+    said = "saved"
+except DocumentError as error:
+    said = str(error)
+resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+print(json.dumps({"said": said, "dirty": document.dirty, "journal": document.journal}))
+"""
 
 
-def bad_count(session: Session, topic: str) -> int:
-    return next((alert.count for alert in session.alerts.active if alert.id == f"message:{topic}"), 0)
+def behaviour(path: Path, *blocks: dict[str, object], **others: object) -> Path:
+    workspace = {"blocks": {"languageVersion": 0, "blocks": list(blocks)}}
+    write_file(path, BehaviourFile(path.stem, workspace, {}, others))
+    return path
 
 
-def test_malformed_messages_at_1000_a_second_are_one_alert_with_the_exact_count(
-    session: Session, talker: nep.Node
-) -> None:
-    with session.watch("/bad"):
-        publisher = publisher_of(session, talker, "/bad")
-        pause, began = threading.Event(), time.perf_counter()
-        for number in range(1500):
-            while time.perf_counter() < began + number / 1000:
-                pause.wait(0.002)
-                session.tick()
-            publisher.publish_bytes(BAD)
-        tick_until(session, lambda: bad_count(session, "/bad") >= 1500)
-        (alert,) = session.alerts.active
-        assert alert.count == 1500
-        assert "(1500 messages)" in alert.title
-        publisher.publish({"good": True})
-        tick_until(session, lambda: not session.alerts.active)
+@posix
+def test_without_room_the_old_file_is_whole_and_the_work_is_kept(tmp_path: Path) -> None:
+    path = behaviour(tmp_path / "Mine.nepb", {"type": "events_started", "id": "old"})
+    before = path.read_bytes()
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, path, tmp_path / "journal"],
+        capture_output=True, text=True, timeout=60, check=True, cwd=ROOT,
+    )  # fmt: skip
+    told = json.loads(done.stdout)
+    assert told["said"].startswith("'Mine.nepb': can't be written (")
+    assert told["said"].endswith("make room there or save it in another place")
+    assert told["dirty"] is True
+    assert path.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir() if each.suffix == ".part"] == [], "no half file is left"
+    (left,) = left_behind(tmp_path / "journal")
+    assert "x" * 200000 in json.dumps(left.workspace), "the journal has the work of before the limit"
 
 
-def test_the_count_is_exact_also_when_the_window_was_busy(session: Session, talker: nep.Node) -> None:
-    with session.watch("/bad"):
-        publisher = publisher_of(session, talker, "/bad")
-        for _ in range(10 * MESSAGES_PER_TOPIC):
-            publisher.publish_bytes(BAD)  # nobody ticks meanwhile
-        tick_until(session, lambda: bad_count(session, "/bad") >= 10 * MESSAGES_PER_TOPIC)
-        assert bad_count(session, "/bad") == 10 * MESSAGES_PER_TOPIC
-        assert session.topics["/bad"].dropped > 0  # the ring was full, and they were counted all the same
-        assert sum(session.topics["/bad"].shown_of) > 0
+def test_a_file_cut_at_every_byte_is_a_sentence(tmp_path: Path) -> None:
+    example = json.loads((resources.path("examples") / "1-greeting.nepb").read_bytes())
+    example["robots"] = {"Päpper": {"title": "long"}}  # a long one would be JSON like the rest
+    whole = json.dumps(example, ensure_ascii=False).encode()
+    assert parse_file(whole, Path("x.nepb")).name == "Greeting"
+    for length in range(len(whole)):
+        with pytest.raises(DocumentError) as told:
+            parse_file(whole[:length], Path("x.nepb"))
+        assert told.value.reason == "is damaged or no behaviour; open a copy from before"
 
 
-def test_100_000_malformed_messages_are_all_accounted_for(session: Session, talker: nep.Node) -> None:
-    sent = 100_000
-    with session.watch("/bad"):
-        publisher = publisher_of(session, talker, "/bad")
-        longest = 0.0
-        for number in range(sent):
-            publisher.publish_bytes(BAD)
-            if number % 2000 == 0:
-                began = time.thread_time()
-                session.tick()
-                longest = max(longest, time.thread_time() - began)
-        publisher.publish_bytes(BAD)
-        topic = session.topics["/bad"]
-
-        def all_told() -> bool:
-            publisher.publish_bytes(BAD)  # what was lost is known by what comes behind it
-            session.traffic.miss(session.source.missed(), time.monotonic())
-            return topic.received + topic.missed >= sent
-
-        tick_until(session, all_told, 30)
-        tick_until(session, lambda: topic.received + topic.missed == publisher.count, 30)
-        (alert,) = session.alerts.active
-        health = session._health._bad["/bad"]
-        assert alert.count == health.count
-        assert health.count + health.unchecked == topic.received
-        assert longest < 0.05  # a tick of the window takes no longer because of them
+def test_bytes_that_were_changed_are_a_sentence_or_open(tmp_path: Path) -> None:
+    whole = (resources.path("examples") / "1-greeting.nepb").read_bytes()
+    dice = random.Random(3)
+    path = tmp_path / "x.nepb"
+    for _ in range(300):
+        data = bytearray(whole)
+        for _ in range(dice.randint(1, 8)):
+            data[dice.randrange(len(data))] = dice.randrange(256)
+        path.write_bytes(data)
+        document = Document(lambda: Journal(tmp_path / "journal"))
+        try:
+            document.open(path)
+        except DocumentError:
+            continue
+        document.program()  # whatever came through: problems, never a traceback
 
 
-def test_a_topic_may_change_its_type(session: Session, talker: nep.Node) -> None:
-    with session.watch("/thing"):
-        first = publisher_of(session, talker, "/thing", "json")
-        first.publish({"n": 1})
-        tick_until(session, lambda: session.topics["/thing"].newest is not None)
-        first.close()
-        second = talker.new_pub("/thing", "string")
-        tick_until(session, lambda: second.subscribers == 1)
-        second.publish("hello")
-
-        def newest() -> object:
-            message = session.topics["/thing"].newest
-            return message is not None and message.codec == "string" and message.payload == "hello"
-
-        tick_until(session, newest)
-        tick_until(session, lambda: session.topics["/thing"].msg_type == "string")
-        tick_until(session, lambda: not session.alerts.active)
+@pytest.mark.parametrize(("version", "reason"), [
+    (2, "newer NEP Studio (version 2) and is left as it is; update this one"),
+    (99, "newer NEP Studio"), (0, "does not say its version"), (-1, "does not say its version"),
+    (True, "does not say its version"), ("1", "does not say its version"), (None, "does not say its version"),
+])  # fmt: skip
+def test_another_version_is_refused_with_the_next_step_and_left_alone(tmp_path, version, reason) -> None:
+    path = tmp_path / "x.nepb"
+    path.write_text(json.dumps({"format": "nep-behaviour", "version": version, "workspace": {}}))
+    before = path.read_bytes()
+    with pytest.raises(DocumentError) as told:
+        read_file(path)
+    assert reason in told.value.reason
+    assert path.read_bytes() == before
 
 
-def test_messages_of_50_mb_arrive_and_only_the_newest_is_held(session: Session, talker: nep.Node) -> None:
-    with session.watch("/huge"):
-        publisher = publisher_of(session, talker, "/huge", "bytes")
-        data = bytes(50_000_000)
-        for _ in range(3):
-            publisher.publish_bytes(data)
-
-        def arrived() -> bool:
-            session.traffic.miss(session.source.missed(), time.monotonic())
-            topic = session.topics.get("/huge")
-            return topic is not None and topic.received + topic.missed == 3
-
-        tick_until(session, arrived, 20)
-        newest = session.topics["/huge"].newest
-        assert newest is not None
-        assert newest.size_bytes == len(data)
-        held = [m for m in (newest, session.topics["/huge"].previous) if m is not None]
-        assert len(held) <= 2
-
-
-def test_a_publisher_that_dies_and_comes_back_a_hundred_times(session: Session, master: Master) -> None:
-    threads = threading.active_count()
-    with session.watch("/phoenix"):
-        sent = 0
-        for life in range(100):
-            node = nep.node("phoenix", master=master.address)
-            publisher = node.new_pub("/phoenix", "json")
-            publisher.publish({"life": life})
-            sent += publisher.count
-            node.close()
-            session.tick()
-        with nep.node("phoenix", master=master.address) as node:
-            publisher = node.new_pub("/phoenix", "json")
-            tick_until(session, lambda: publisher.subscribers == 1)
-            publisher.publish({"life": "last"})
-            tick_until(session, lambda: _last_life(session) == "last")
-            assert session.topics["/phoenix"].publisher_nodes == ("phoenix",)
-        assert len(session.source._subscribers) <= 2  # the log's, and this one
-        tick_until(session, lambda: len(session.nodes) < 20, 15)
-    assert threading.active_count() <= threads + 2
-    assert not session.alerts.active
+def test_what_studio_does_not_know_is_written_again_as_it_was(tmp_path: Path) -> None:
+    strange = {
+        "type": "later_block", "id": "s", "x": 1.5, "y": -2, "extraState": {"a": [None, {"ü": "\ud83d"}]},
+        "fields": {"F": {"deep": [1, 2.0, "x"]}}, "inputs": {"I": {"block": {"type": "other", "id": "o"}}},
+        "icons": {"comment": {"text": "keep me"}}, "later": True,
+    }  # fmt: skip
+    wait = {"type": "control_wait_until", "id": "w", "x": 0, "y": 0}
+    start = {"type": "events_started", "id": "go", "next": {"block": strange}}
+    path = behaviour(tmp_path / "x.nepb", start, wait, description="what it does", later={"z": 1})
+    before = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
+    document = Document(lambda: Journal(tmp_path / "journal"))
+    document.open(path)
+    assert "s" in {each.block_id for each in document.problems()}, "it is told that it will be skipped"
+    assert document.mend("limit:w")
+    document.save()
+    after = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
+    assert json.dumps(after["workspace"]["blocks"]["blocks"][0]) == json.dumps(start), "to the byte"
+    assert (after["description"], after["later"]) == (before["description"], before["later"])
 
 
-def _last_life(session: Session) -> object:
-    topic = session.topics.get("/phoenix")
-    payload = topic.newest.payload if topic is not None and topic.newest is not None else None
-    return payload.get("life") if isinstance(payload, dict) else None
-
-
-class Recorded:
-    """A source that only tells what the test posts."""
-
-    address = "127.0.0.1:1"
-
-    def start(self) -> None: ...
-    def watch(self, topic: str) -> None: ...
-    def unwatch(self, topic: str) -> None: ...
-    def submit(self, what: str, job: Job) -> None: ...
-    def close(self) -> None: ...
-
-    def missed(self) -> Mapping[str, int]:
-        return {}
-
-
-class Clocks:
-    """Both clocks of a session, in the test's hand."""
-
-    def __init__(self) -> None:
-        self.now, self.wall_ns = 100.0, 1_700_000_000_000_000_000
-
-    def go_on(self, seconds: float) -> None:
-        self.now += seconds
-        self.wall_ns += round(seconds * 1e9)
-
-
-@pytest.fixture
-def clocks() -> Clocks:
-    return Clocks()
-
-
-@pytest.fixture
-def quiet(tmp_path: Path, clocks: Clocks) -> Iterator[Session]:
-    session = Session(
-        Settings(tmp_path),
-        address=Recorded.address,
-        source=Recorded(),
-        journal_folder=tmp_path,
-        clock=lambda: clocks.now,
-        clock_ns=lambda: clocks.wall_ns,
-        start_companions=False,
-    )
-    yield session
-    session.close()
-
-
-def graph(revision: int, names: Mapping[str, str], stamp_ns: int) -> GraphView:
-    nodes = {node: NodeInfo(node, node, "there", 5, "python", "native", 0) for node in set(names.values())}
-    one = {
-        name: TopicInfo(
-            name,
-            "json",
-            "json",
-            (PublisherInfo(1, node, (), False, 1, 1, 1, 1, 1.0, 1.0),),
-            rate_hz=1.0,
-            last_stamp_ns=stamp_ns,
-        )
-        for name, node in names.items()
-    }
-    return GraphView(1, revision, nodes, one)
-
-
-def test_10_000_short_lived_topics_leave_nothing_behind(quiet: Session, clocks: Clocks) -> None:
-    post: Callable[[object], None] = quiet._mailbox.post_event
-    most = 0
-    for wave in range(100):
-        names = {f"/short/{wave}/{number}": f"node {wave}" for number in range(100)}
-        post(GraphSeen(graph(wave + 2, names, clocks.wall_ns), 0.001))
-        quiet.tick()
-        clocks.go_on(0.5)
-        most = max(most, len(quiet.topics))
-    assert most <= 100 * (10 / 0.5 + 3)  # what vanished is shown for ten seconds, no longer
-    post(GraphSeen(graph(1000, {}, 0), 0.001))
-    quiet.tick()
-    for _ in range(4):
-        clocks.go_on(11.0)
-        quiet.tick()
-    assert len(quiet.topics) == len(quiet.nodes) == 0
-    assert len(quiet.console.records) < 10_000
-    assert not quiet.alerts.active
-
-
-@pytest.mark.parametrize("jump_s", [-3600.0, 3600.0, -1e9])
-def test_a_clock_that_jumps_makes_no_age_negative_and_loses_nothing(
-    quiet: Session, clocks: Clocks, jump_s: float
-) -> None:
-    names = {"/steady": "steady"}
-    quiet._mailbox.post_event(GraphSeen(graph(2, names, clocks.wall_ns), 0.001))
-    quiet.tick()
-    clocks.wall_ns += round(jump_s * 1e9)
-    for number in range(5):
-        clocks.go_on(0.5)
-        quiet._mailbox.post_event(GraphSeen(graph(2, names, clocks.wall_ns), 0.001))
-        quiet.tick()
-        age = quiet.topics["/steady"].age_s
-        assert age is not None, number
-        assert age >= 0.0
-    assert quiet.topics["/steady"].gone_s is None
-    assert not quiet.alerts.active
+@posix
+@pytest.mark.timeout(90)
+def test_killed_100_times_while_saving_the_file_is_whole_every_time(tmp_path: Path) -> None:
+    path = tmp_path / "Mine.nepb"
+    behaviour(path, {"type": "events_started", "id": "first"})
+    dice = random.Random(9)
+    lives = "".join(f"{dice.randint(1, 60)}\n" for _ in range(100))
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.core.saving", path, tmp_path / "journal"],
+        input=lives, capture_output=True, text=True, timeout=80, check=True, cwd=ROOT,
+    )  # fmt: skip
+    told = done.stdout.splitlines()
+    assert len(told) == 100
+    assert [line for line in told if not line.startswith("whole ")] == []
+    assert len(set(told)) > 5, "it was saved in between"
+    assert path.stat().st_size > 0
+    for left in left_behind(tmp_path / "journal"):
+        assert left.workspace["blocks"], "a journal is whole, too"

@@ -62,3 +62,15 @@ def test_a_killed_writer_never_leaves_a_part(tmp_path: Path) -> None:
         data = path.read_bytes()
         assert len(data) == 200_000
         assert len(set(data)) == 1
+
+
+def test_what_killed_writers_left_is_swept_away_but_no_write_that_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "a [1].nepb"
+    old, young = tmp_path / ".a [1].nepb.x1.part", tmp_path / ".a [1].nepb.x2.part"
+    other = tmp_path / ".b.nepb.x3.part"
+    for each in (old, young, other):
+        each.write_text("half")
+    for each in (old, other):
+        os.utime(each, (1.0, 1.0))
+    write_atomically(path, b"whole")
+    assert (old.exists(), young.exists(), other.exists()) == (False, True, True)

@@ -1,0 +1,60 @@
+"""A process that saves a behaviour again and again and is killed in the middle, for `test_bad_days`.
+
+Reads one line for each life: how many milliseconds it lasts. A child of it saves in a loop until it is killed
+with signal 9; then one line tells what is in the file: "whole N", or what is wrong with it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+
+from app.core.behaviour_file import read_file
+from app.core.document import Document
+from app.core.journal import Journal
+from app.errors import DocumentError
+
+
+def blocks(number: int) -> dict[str, object]:
+    """A behaviour whose length changes, so that a part of one is no whole of another."""
+    tops = [{"type": "events_started", "id": f"{number}-{each}"} for each in range(1 + number * 37 % 400)]
+    return {"blocks": {"languageVersion": 0, "blocks": tops}}
+
+
+def save_for_ever(path: Path, journals: Path, begin: int) -> None:
+    document = Document(lambda: Journal(journals))
+    if path.exists():
+        document.open(path)
+    number = begin
+    while True:
+        number += 1
+        document.edited(blocks(number))
+        document.save(path)
+
+
+def look(path: Path) -> str:
+    try:
+        return f"whole {len(read_file(path).workspace['blocks']['blocks'])}"  # type: ignore[index,call-overload]
+    except FileNotFoundError:
+        return "none yet"
+    except DocumentError as error:
+        return f"none yet: {error}" if not path.exists() else str(error)
+
+
+def main(path: Path, journals: Path) -> None:
+    for life, line in enumerate(sys.stdin):
+        child = os.fork()
+        if child == 0:
+            save_for_ever(path, journals, life * 1000)
+        threading.Event().wait(int(line) / 1000)
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        sys.stdout.write(look(path) + "\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
