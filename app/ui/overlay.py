@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEasingCurve, QEvent, QObject, QPoint, QRectF, QSize, Qt, QVariantAnimation, Signal
+from PySide6.QtCore import (
+    QEasingCurve,
+    QEvent,
+    QObject,
+    QPoint,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+    QVariantAnimation,
+    Signal,
+)
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QRegion
 from PySide6.QtWidgets import QApplication, QGraphicsOpacityEffect, QWidget
 from shiboken6 import isValid
@@ -162,8 +173,10 @@ class Overlay(QWidget):
         window = self.window_below()
         room = QSize(window.width() - 2 * EDGE, window.height() - self.top - 2 * EDGE)
         size = self.wanted_size(room)
-        self.setGeometry((window.width() - size.width()) // 2, self.top, size.width(), size.height())
-        self._scrim.cover()
+        place = QRect(QPoint((window.width() - size.width()) // 2, self.top), size)
+        if place != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
+            self.setGeometry(place)
+            self._scrim.cover()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and watched is self.parentWidget():

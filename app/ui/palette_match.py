@@ -7,14 +7,14 @@ than its middle. Letters that are only somewhere do not fit at all: a person wou
 from __future__ import annotations
 
 import heapq
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 
 WHOLE, WORD, INSIDE, SPREAD = 100.0, 80.0, 55.0, 40.0
 LEAST_SPREAD = 0.6  # share of the letters that begin a word or follow the letter before
 PER_LETTER = 0.05
+MANY = 400  # entries of a kind that are all looked at letter by letter
 LATER = 5.0  # what can't be done now stands below what fits as well
 Span = tuple[int, int]
 
@@ -126,30 +126,40 @@ def _joined(spans: Iterable[Span]) -> tuple[Span, ...]:
 
 
 class Finder:
-    """Searches entries; a query that grows searches only what the shorter one found."""
+    """Searches entries. Of a kind that has very many only whole pieces fit: that is quick, and enough."""
 
     def __init__(self, entries: Sequence[Entry]) -> None:
         """Search ``entries``, in the order in which equals are to stand."""
         self.entries = entries
-        self._last: tuple[str, Sequence[Entry]] = ("", entries)
+        self._kinds: dict[str, list[tuple[str, Entry]]] = {}
+        for entry in entries:
+            self._kinds.setdefault(entry.kind, []).append((entry.words.lower(), entry))
 
     def find(self, query: str, most: int) -> tuple[list[Found], int]:
         """The best for each kind, at most ``most`` of a kind, best first; and how many fit altogether."""
-        query = " ".join(query.split())
-        longer = query.startswith(self._last[0]) and " " not in query
-        candidates = self._last[1] if longer else self.entries
-        if query:
-            letters = re.compile(".*?".join(map(re.escape, query.split(" ")[0].lower())), re.IGNORECASE)
-            candidates = [entry for entry in candidates if letters.search(entry.words)]
-        self._last = (query.split(" ")[0], candidates)
-        kinds: dict[str, list[Found]] = {}
+        pieces = query.lower().split()
+        best: list[list[Found]] = []
         count = 0
-        for entry in candidates:
-            fits = match(query, entry.words)
-            if fits is not None:
-                count += 1
-                score = fits[0] - (LATER if entry.reason else 0.0)
-                kinds.setdefault(entry.kind, []).append(Found(entry, score, fits[1]))
-        best = [heapq.nlargest(most, found, key=attrgetter("score")) for found in kinds.values()]
+        for pairs in self._kinds.values():
+            few = [entry for _lower, entry in pairs]
+            if len(pairs) > MANY:
+                whole = [pair for pair in pairs if all(piece in pair[0] for piece in pieces)]
+                count += len(whole) - min(len(whole), MANY)
+                few = [entry for _lower, entry in heapq.nsmallest(MANY, whole, key=_soonest(pieces))]
+            found = [each for each in (_fitting(query, entry) for entry in few) if each is not None]
+            count += len(found)
+            if found:
+                best.append(heapq.nlargest(most, found, key=attrgetter("score")))
         best.sort(key=lambda found: -found[0].score)
         return [each for found in best for each in found], count
+
+
+def _fitting(query: str, entry: Entry) -> Found | None:
+    fits = match(query, entry.words)
+    return None if fits is None else Found(entry, fits[0] - (LATER if entry.reason else 0.0), fits[1])
+
+
+def _soonest(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:
+    """A first order, cheap: where the first piece stands, then how long the words are."""
+    first = pieces[0] if pieces else ""
+    return lambda pair: (pair[0].find(first), len(pair[0]))

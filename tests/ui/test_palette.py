@@ -54,26 +54,30 @@ def test_scattered_letters_do_not_fit() -> None:
     assert found("Show the inside of every panel that is open", query="hif") == []
 
 
-def test_a_longer_query_finds_what_a_new_search_finds() -> None:
-    entries = [Entry(f"topic:/robot/{n}/camera", f"/robot/{n}/camera") for n in range(50)]
-    growing = Finder(entries)
-    for end in range(1, 9):
-        growing.find("camera 7"[:end], 40)
-    assert growing.find("camera 7", 40) == Finder(entries).find("camera 7", 40)
-    assert growing.find("", 40)[1] == 50
+def test_of_very_many_whole_pieces_are_found_and_all_are_counted() -> None:
+    many = [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
+    finder = Finder([*many, Entry("command:x", "Joists and beams")])
+    rows, count = finder.find("joint", 40)
+    assert count == 10_000
+    assert len(rows) == 40
+    rows, count = finder.find("robot77 joi", 40)
+    assert count == sum("robot77" in entry.words for entry in many)
+    assert rows[0].entry.words == "/robot77/joint/77"
+    rows, count = finder.find("joi", 40)
+    assert rows[0].entry.words == "Joists and beams"
+    assert count == 10_001
 
 
-def test_ten_thousand_topics_are_searched_within_a_frame_or_two() -> None:
+def test_ten_thousand_topics_are_searched_at_once() -> None:
     finder = Finder(
         [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
     )
     times = []
     for query in ("j", "jo", "joi", "joint", "joint 9", "robot9999"):
         began = time.perf_counter()
-        rows, count = finder.find(query, 40)
+        finder.find(query, 40)
         times.append(time.perf_counter() - began)
-        assert len(rows) <= 40 <= count or count == len(rows)
-    assert min(times) < 0.2  # a person does not see it; the bound is wide for a busy machine
+    assert min(times) < 0.1  # 4 ms on a quiet machine; the bound is wide for a busy one
 
 
 # -- in the window --------------------------------------------------------------------------------
