@@ -36,6 +36,8 @@ LEVELS = {
     "error": ("circle-x", "error"),
     "critical": ("octagon-x", "error"),
 }
+WORDS = {"critical": "fatal"}
+"""Words that fit into the column of levels."""
 ROW = {"compact": 22, "comfortable": 30}
 ICON = 14
 _ROOT = QModelIndex()
@@ -175,9 +177,10 @@ class LineDelegate(QStyledItemDelegate):
         square = QRectF(rect.left(), rect.center().y() - ICON / 2, ICON, ICON)
         paint_icon(painter, square, icon, theme.colour(role))
         rect.setLeft(rect.left() + ICON + 4)
-        paint.words(painter, rect, record.level, font, theme.colour(role))
-        # one column for every level, as wide as the widest that is usual; "critical" may take more
-        rect.setLeft(rect.left() + max(paint.width_of(font, word) for word in ("error", record.level)) + 16)
+        level = WORDS.get(record.level, record.level)
+        paint.words(painter, rect, level, font, theme.colour(role))
+        # one column for every level, as wide as the widest
+        rect.setLeft(rect.left() + max(paint.width_of(font, word) for word in ("debug", "error")) + 16)
         for words, colour, most in self._parts(record):
             part = QRectF(rect)
             part.setWidth(min(paint.width_of(font, words) + 1, rect.width() * most))

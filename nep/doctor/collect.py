@@ -58,7 +58,7 @@ def gather(
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
     package = Path(nep.errors.__file__).parent
-    state = ("Which original program has which port", default_file(number).parent)
+    state = ("The ports of original programs", default_file(number).parent)
     return Facts(
         time.time(),
         chosen,

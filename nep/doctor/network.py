@@ -70,7 +70,11 @@ def masters(facts: Facts) -> Iterator[Finding]:
 
 def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
     view = facts.view
-    people = f"{counted(len(view.nodes), 'node')}, {counted(len(view.topics), 'topic')}" if view else ""
+    people = ""
+    if view is not None:
+        # what nep itself only waits for, such as log records, is nobody's topic yet
+        live = [name for name, info in view.topics.items() if info.publishers or not name.startswith("/nep/")]
+        people = f"{counted(len(view.nodes), 'node')}, {counted(len(live), 'topic')}"
     since = ""
     if holder is not None and holder.since_s is not None:
         since = f" for {ago(facts.now_s - holder.since_s)}"

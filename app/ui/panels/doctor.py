@@ -58,7 +58,7 @@ class FindingRow(QWidget):
         theme, painter = self._theme, QPainter(self)
         status = theme.status(STATUS[self.finding.severity])
         edge = BORDERS.get(self.finding.severity)
-        top = 6.0
+        top = 4.0
         if edge is not None:
             fill = theme.colour(status.tint or "panel")
             paint.box(painter, QRectF(self.rect()), theme.radius("panel"), fill, theme.colour(edge))
