@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
 import queue
-import subprocess
-import sys
 import threading
 import time
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import IO, Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal
 
 from app.blocks.program import Program
+from app.core.child_output import Gate, Output, text_of, texts
+from app.core.child_process import MOST_BYTES, ChildProcess, home
+from app.core.child_process import child_command as child_command
 from app.core.runner_event import RunnerEvent as RunnerEvent
 from app.errors import RunnerError
 
@@ -26,20 +25,31 @@ ASK_S = 0.04
 """How long a stopped program may take to end by itself; then it is killed. Together well below 100 ms."""
 END_S = 2.0
 """How long a process whose program has ended may take to end."""
-LONGEST_LINE = 1_000_000
+LOOK_S = 0.1
+"""How often its memory is looked at."""
+PIPE_S = 0.5
+"""How long its pipes may go on after it has gone: somebody that it has started may hold them."""
+EVENTS_PER_S = 300
+MOST_BLOCKS = 100
+WORTH_TELLING = 10_000
+LONGEST_ERROR = 100_000
 ERRORS_KEPT = 40
 
 _runs = itertools.count(1)
 
 
 class Runner:
-    """Runs one program. `on_event` is called in its reader's thread; "ended" comes exactly once, and last."""
+    """Runs one program. `on_event` is called in threads of its own; "ended" comes exactly once, and last.
+
+    A program that floods Studio, takes too much memory or leaves processes behind is bounded, and told about.
+    """
 
     def __init__(
         self,
         on_event: Callable[[RunnerEvent], object],
         *,
         command: Sequence[str] | None = None,
+        most_bytes: int = MOST_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """`command` starts the child, by default this Python or this frozen Studio."""
@@ -49,19 +59,19 @@ class Runner:
         self.state: State = "ready"
         self._on_event = on_event
         self._command = tuple(command) if command is not None else child_command()
-        self._clock = clock
-        self._process: subprocess.Popen[bytes] | None = None
+        self._clock, self._most_bytes = clock, most_bytes
+        self._child: ChildProcess | None = None
         self._threads: list[threading.Thread] = []
         self._errors: deque[str] = deque(maxlen=ERRORS_KEPT)
         self._orders: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
         self._began_s = 0.0
-        self._ended = threading.Event()
+        self._ended, self._output_over = threading.Event(), threading.Event()
         self._last: RunnerEvent | None = None
 
     @property
     def pid(self) -> int | None:
         """The child's process id, None before `start`."""
-        return None if self._process is None else self._process.pid
+        return None if self._child is None else self._child.popen.pid
 
     def start(
         self,
@@ -77,19 +87,9 @@ class Runner:
 
         `pace_s` is slow motion (`set_pace`). RunnerError if its process can't be started.
         """
-        if self._process is not None:
+        if self._child is not None:
             raise RunnerError("this runner has run its program; make another one")
-        try:
-            self._process = subprocess.Popen(
-                self._command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                env={**os.environ, "PYTHONIOENCODING": "utf-8", "PYTHONUNBUFFERED": "1"},
-                cwd=_home(),
-            )
-        except OSError as error:
-            raise RunnerError(f"the program's process can't be started: {error}") from error
+        self._child = child = ChildProcess(self._command, home(), most_bytes=self._most_bytes)
         self._began_s = self._clock()
         self.state = "paused" if paused else "running"
         kept = program.to_json() | ({} if name is None else {"name": name})
@@ -105,8 +105,9 @@ class Runner:
             }
         )
         self._thread(self._write, "input")
-        errors = self._thread(self._read_errors, "errors")
-        self._thread(lambda: self._read(errors), "output")  # last: it waits for the errors' end
+        errors = self._thread(lambda: self._read_errors(child), "errors")
+        reader = self._thread(lambda: self._read(child), "output")
+        self._thread(lambda: self._watch(child, reader, errors), "watch")  # last: it waits for the others
 
     def _thread(self, work: Callable[[], None], label: str) -> threading.Thread:
         thread = threading.Thread(target=work, name=f"runner {label}", daemon=True)
@@ -137,18 +138,16 @@ class Runner:
 
         Works in every state and from any thread. Its robots are another matter: `app.core.stopping`.
         """
-        process = self._process
-        if process is None:
+        child = self._child
+        if child is None:
             return
         if self.state != "ended":
             self.state = "stopping"
         self._orders.put({"do": "stop"})
         self._orders.put(None)
-        try:
-            process.wait(ASK_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait(END_S)
+        if not child.wait(ASK_S):
+            child.kill()
+            child.wait(END_S)
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until the program has ended and its last event was told; whether it has."""
@@ -165,48 +164,69 @@ class Runner:
 
     def _write(self) -> None:
         """Send orders; a thread of its own, because a child that hangs does not read."""
-        process = self._process
-        if process is None or process.stdin is None:
+        child = self._child
+        if child is None or child.popen.stdin is None:
             return
         try:
-            with process.stdin as stream:
+            with child.popen.stdin as stream:
                 while (order := self._orders.get()) is not None:
                     stream.write(json.dumps(order).encode() + b"\n")
                     stream.flush()
         except (OSError, ValueError):
             return  # it has ended; the reader tells
 
-    def _read(self, errors: threading.Thread) -> None:
-        process = self._process
-        if process is None or process.stdout is None:
+    def _read(self, child: ChildProcess) -> None:
+        """Tell what the child says, until its last word or the end of its pipe."""
+        if child.popen.stdout is None:
             return
-        for line in _lines(process.stdout):
+        output, gate = Output(child.popen.stdout, self._ended, self._clock), Gate(EVENTS_PER_S, self._clock)
+        for line in output:
             event = self._event(line)
             if event is None:
-                continue
-            if event.kind == "ended":
+                output.strange_bytes += len(line)
+            elif event.kind == "ended":
                 self._last = event
                 break
-            if event.kind in ("running", "paused") and self.state in ("running", "paused"):
-                self.state = "paused" if event.kind == "paused" else "running"
-            self._on_event(event)
-        self._finish(process, errors)
+            elif event.kind == "ready" or gate.passes():
+                self._tell(event, gate)
+        self._left_out(gate.kept_back, output.strange_bytes)
+        child.popen.stdout.close()
+        self._output_over.set()
 
-    def _finish(self, process: subprocess.Popen[bytes], errors: threading.Thread) -> None:
+    def _tell(self, event: RunnerEvent, gate: Gate) -> None:
+        if event.kind in ("running", "paused") and self.state in ("running", "paused"):
+            self.state = "paused" if event.kind == "paused" else "running"
+        missed = gate.take_kept_back()
+        if missed:
+            self._left_out(missed, 0)
+        self._on_event(event)
+
+    def _left_out(self, events: int, strange_bytes: int) -> None:
+        """Say how much was not shown."""
+        if events:
+            text = f"{events} lines were left out: too many at once"
+            self._on_event(RunnerEvent("print", self.run, text=text))
+        if strange_bytes >= WORTH_TELLING:
+            text = f"{strange_bytes / 1e6:.1f} MB that no block wrote were left out"
+            self._on_event(RunnerEvent("print", self.run, text=text))
+
+    def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
+        """Look after the child until it has gone, then tell its end."""
+        while not child.ended and not self._output_over.wait(LOOK_S):
+            child.look()
         self._orders.put(None)  # its input ends, and with it a child that still waits for orders
-        try:
-            code = process.wait(END_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            code = process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
-        errors.join(timeout=END_S)  # its last words
+        hung = not child.wait(END_S)
+        if hung:
+            child.kill()
+            child.wait(END_S)
+        child.end_family()  # what it has left behind would hold its pipes open
+        reader.join(timeout=PIPE_S)
+        errors.join(timeout=PIPE_S)  # its last words
         was_stopped = self.state == "stopping"
         self.state = "ended"
         last = self._last
         if last is None:
-            text = "" if was_stopped else self._why(code)
+            text = "" if was_stopped else self._why(child, hung=hung)
             last = RunnerEvent("ended", self.run, text=text, ok=was_stopped, elapsed_s=self._elapsed())
         self._on_event(last)
         self._ended.set()
@@ -214,40 +234,48 @@ class Runner:
     def _elapsed(self) -> float:
         return round(self._clock() - self._began_s, 3)
 
-    def _why(self, code: int) -> str:
+    def _why(self, child: ChildProcess, *, hung: bool) -> str:
         """Why a process ended that did not say so."""
+        if child.too_large:
+            return f"The program used more than {self._most_bytes / 1e9:g} GB of memory and was ended."
+        if hung:
+            return "The program closed its line to Studio and was ended."
+        code = child.popen.returncode
         words = next((line for line in reversed(self._errors) if line.strip()), "")
         how = f"was killed (signal {-code})" if code < 0 else f"ended with code {code}"
         return f"The program's process {how}{': ' + words.strip() if words else ''}."
 
-    def _read_errors(self) -> None:
-        process = self._process
-        if process is None or process.stderr is None:
+    def _read_errors(self, child: ChildProcess) -> None:
+        """Keep the last lines of what went wrong; a line without an end is cut."""
+        stream = child.popen.stderr
+        if stream is None:
             return
-        for line in _lines(process.stderr):
-            self._errors.append(line.decode("utf-8", "replace")[:500].rstrip())
-        process.stderr.close()
+        try:
+            for line in iter(lambda: stream.readline(LONGEST_ERROR), b""):
+                self._errors.append(line.decode("utf-8", "replace")[:500].rstrip())
+        finally:
+            stream.close()
 
     def _event(self, line: bytes) -> RunnerEvent | None:
         """The event of a line; None for what the child's protocol does not know."""
         try:
             said = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             return None
         if not isinstance(said, Mapping):
             return None
         kind = said.get("is")
         block = said.get("block")
         first = (block,) if isinstance(block, str) else ()
-        blocks = (*first, *(each for each in _texts(said.get("blocks")) if each not in first))
+        blocks = (*first, *(each for each in texts(said.get("blocks"))[:MOST_BLOCKS] if each not in first))
         if kind == "ready":
             return RunnerEvent("ready", self.run)
         if kind in ("running", "paused"):
-            return RunnerEvent(kind, self.run, blocks=blocks, says=str(said.get("says", "")))
+            return RunnerEvent(kind, self.run, blocks=blocks, says=text_of(said, "says"))
         if kind == "error":
-            return RunnerEvent("error", self.run, blocks=first, text=str(said.get("sentence", "")), ok=False)
+            return RunnerEvent("error", self.run, blocks=first, text=text_of(said, "sentence"), ok=False)
         if kind == "print":
-            return RunnerEvent("print", self.run, text=str(said.get("text", "")))
+            return RunnerEvent("print", self.run, text=text_of(said, "text"))
         if kind == "ended":
             elapsed_s = said.get("elapsed_s")
             return RunnerEvent(
@@ -255,27 +283,6 @@ class Runner:
                 self.run,
                 ok=said.get("ok") is True,
                 elapsed_s=float(elapsed_s) if isinstance(elapsed_s, (int, float)) else self._elapsed(),
-                silent=_texts(said.get("silent")),
+                silent=texts(said.get("silent")),
             )
         return None
-
-
-def child_command() -> tuple[str, ...]:
-    """How to start a program's process: this Python, or the frozen Studio as its own child."""
-    if getattr(sys, "frozen", False):
-        return (sys.executable, "--child")
-    return (sys.executable, "-m", "app.blocks.child")
-
-
-def _home() -> Path | None:
-    """Where ``app`` is found when it is not installed."""
-    return None if getattr(sys, "frozen", False) else Path(__file__).resolve().parents[2]
-
-
-def _lines(stream: IO[bytes]) -> Iterator[bytes]:
-    """The lines of a pipe until its end; a line that is too long comes in pieces, which are no JSON."""
-    return iter(lambda: stream.readline(LONGEST_LINE), b"")
-
-
-def _texts(said: object) -> tuple[str, ...]:
-    return tuple(str(each) for each in said) if isinstance(said, (list, tuple)) else ()

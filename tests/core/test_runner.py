@@ -223,7 +223,10 @@ def test_what_is_no_event_is_left_out(runner, heard):
     made = runner(TALKS)
     made.start(program(), [], None)
     assert heard.until("ended").elapsed_s == 1.5
-    assert [event.kind for event in heard.events] == ["ended"]
+    assert [(event.kind, event.text) for event in heard.events] == [
+        ("print", "3.0 MB that no block wrote were left out"),
+        ("ended", ""),
+    ]
 
 
 def test_a_program_that_cannot_be_started(runner):
