@@ -18,8 +18,6 @@ import zmq
 import nep.errors
 from nep.addresses import host_of, master_address
 from nep.doctor import processes
-from nep.doctor.network import loopback, masters
-from nep.doctor.verdict import Finding
 from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact
 from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
@@ -87,20 +85,6 @@ def hindrance(address: str | None = None) -> Finding | None:
     here = _is_here(chosen)
     port = _port(int(chosen.rpartition(":")[2]), "", processes.listening()) if here else None
     facts = Facts(time.time(), chosen, sys.platform, {}, "", master_port=port, loopback=loopback_problem())
-    for finding in (*loopback(facts), *masters(facts)):
-        if finding.id in {"loopback", "master:foreign", "master:hung"} and finding.severity == "error":
-            return finding
-    return None
-
-
-def hindrance(address: str | None = None) -> Finding | None:
-    """Why no master can be started at the address; None when nothing is known to be in its way."""
-    chosen = master_address(address)
-    here = _is_here(chosen)
-    port = _port(int(chosen.rpartition(":")[2]), "", processes.listening()) if here else None
-    facts = Facts(
-        time.time(), chosen, sys.platform, {}, "", master_port=port, loopback=loopback_problem()
-    )
     for finding in (*loopback(facts), *masters(facts)):
         if finding.id in {"loopback", "master:foreign", "master:hung"} and finding.severity == "error":
             return finding
