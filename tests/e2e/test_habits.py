@@ -1,0 +1,62 @@
+"""A person with the keyboard alone finds commands, changes a key, and stops: also from inside the page."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(110)
+FIELD = "Find a command, panel, topic, robot or file"
+
+
+def chosen_first(studio: Studio, words: str) -> None:
+    """Wait until the palette shows this as its best."""
+    until(
+        lambda: words in [row["texts"][0] for row in studio.rows("What fits")][1:2],
+        lambda: f"{words} is first: {studio.rows('What fits')[:3]}",
+    )
+
+
+def test_keys_lead_from_the_page_to_every_command(studio: Studio) -> None:
+    studio.click("New behaviour")
+    studio.point(".blocklySvg", 300, 200)  # the keyboard is in the page now
+    studio.screen.key("k", ["Ctrl"])
+    studio.find(FIELD, focus=True)
+    studio.screen.type("larger")
+    chosen_first(studio, "Larger text")
+    small = studio.find("Blocks")["rect"]
+    studio.screen.key("Return")
+    until(lambda: not studio.all(FIELD), "the palette closes")
+    until(lambda: studio.find("Blocks")["rect"][2] > small[2], "the text grows")
+
+    studio.screen.key("k", ["Ctrl"])
+    studio.find(FIELD, focus=True)
+    studio.screen.type("smaller")
+    chosen_first(studio, "Smaller text")
+    studio.screen.key("Return", ["Ctrl"])  # another key for it
+    studio.says("Press the new key for “Smaller text”")
+    studio.screen.key("F7")
+    studio.says("“Smaller text” has F7 now.")
+    studio.screen.key("Escape")
+    until(lambda: not studio.all("Reset all"), "the sheet closes")
+
+    studio.point(".blocklySvg", 300, 200)
+    studio.screen.key("F7")
+    until(lambda: studio.find("Blocks")["rect"][2] == small[2], "the new key works inside the page")
+
+
+def test_stop_is_alive_under_the_palette(studio: Studio) -> None:
+    studio.click("Use the virtual robot")
+    studio.says("Pepper ready", 40)
+    studio.screen.key("k", ["Ctrl"])
+    studio.find(FIELD, focus=True)
+    studio.screen.key("F12")
+    studio.says("Pepper stopped (")
+    assert studio.all(FIELD)
+    red = studio.picture(studio.find("Stop", kind="StopButton"))
+    middle = red[red.shape[0] // 2, 12]
+    assert tuple(middle) == (0xC8, 0x28, 0x2D)  # the token "stop" of the light theme: not dimmed
+    studio.click("Stop", kind="StopButton")
+    until(lambda: not studio.all(FIELD), "who goes elsewhere leaves the palette")
