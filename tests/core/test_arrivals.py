@@ -43,3 +43,10 @@ def test_the_gateway_and_a_behaviours_program_are_told_elsewhere() -> None:
     assert arrivals(graph(), graph(**{"program Greeting": []})) == []
     gateway = NodeInfo("g", "gateway", "here", 1, "python", "gateway", 0)
     assert arrivals(graph(), GraphView(1, 1, {"g": gateway}, {})) == []
+
+
+def test_what_nep_itself_publishes_and_who_logs_for_the_master_are_not_told() -> None:
+    assert arrivals(graph(one=[]), graph(one=["/nep/log"])) == []
+    assert arrivals(graph(), graph(master=["/nep/log"])) == []
+    assert arrivals(graph(master=["/nep/log"]), graph()) == []
+    assert arrivals(graph(), graph(one=["/nep/log"])) == ["one is here"]

@@ -12,6 +12,7 @@ from app.core.checks import Checked
 from app.core.fleet import Fleet
 from app.core.health import CURE_S, Health
 from app.core.topics import Topics
+from nep import graph
 
 
 class Case:
@@ -92,3 +93,12 @@ def test_a_topic_that_fell_silent_after_bad_messages_stays_told_until_nobody_loo
 def test_good_messages_are_nothing_to_tell(case: Case) -> None:
     case.look(0, 500, unchecked=7, last_good=True)
     assert case.alert() is None
+
+
+def test_a_taken_port_leads_to_the_doctor_and_other_notes_of_the_master_do_not(case: Case) -> None:
+    noticed = (graph.Alert("port:7000", "Port 7000 is taken", "Close it."), graph.Alert("name:x", "2 x", ""))
+    case.health.graph_alerts(graph.GraphView(1, 1, alerts=noticed))
+    steps = {alert.id: (alert.button, alert.action) for alert in case.alerts.active}
+    assert steps == {"port:7000": ("Open the connection doctor", "help.doctor"), "name:x": (None, None)}
+    case.health.graph_alerts(graph.GraphView(1, 2))
+    assert not case.alerts.active

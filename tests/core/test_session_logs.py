@@ -1,0 +1,112 @@
+"""What programs log reaches the session's console, once and bounded; alerts lead to the doctor."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.alerts import Alerts
+from app.core.companions import CompanionFailed
+from app.core.session import Session
+from app.core.settings import Settings
+from app.core.source import MasterFound, MasterLost
+from nep.masters import Master
+from tests.blocks.samples import number, stack, started, text, workspace, write
+from tests.core.waiting import tick_until
+
+
+@pytest.fixture
+def session(master: Master, tmp_path: Path) -> Iterator[Session]:
+    session = Session(
+        Settings(tmp_path),
+        address=master.address,
+        journal_folder=tmp_path / "journal",
+        start_companions=False,
+    )
+    session.start()
+    yield session
+    session.close()
+
+
+def told(session: Session, origin: str) -> list[str]:
+    return [line.text for line in session.console.records if line.origin == origin]
+
+
+def listening(session: Session, node: nep.Node) -> None:
+    """Until Studio has subscribed the log records, which it does before anybody publishes any."""
+
+    def subscribed() -> bool:
+        topic = node.graph().topics.get("/nep/log")
+        return topic is not None and bool(topic.subscribers)
+
+    tick_until(session, subscribed)
+
+
+def test_the_first_record_of_a_node_arrives_and_is_nobodys_new_topic(session: Session) -> None:
+    with nep.node("driver") as node:
+        listening(session, node)
+        node.log.warning("low battery")
+        tick_until(session, lambda: told(session, "driver"))
+        tick_until(session, lambda: "/nep/log" in session.topics)
+        assert told(session, "driver") == ["low battery"]
+        assert not any("/nep/log" in line for line in told(session, "master"))
+    tick_until(session, lambda: "driver has left" in told(session, "master"))
+
+
+def test_a_storm_of_records_is_bounded_and_counted_exactly(session: Session) -> None:
+    with nep.node("storm") as node:
+        listening(session, node)
+        for count in range(10_000):
+            node.log.info("%d", count)
+    shown: list[str] = []
+
+    def counted() -> bool:
+        nonlocal shown
+        lines = told(session, "storm") + told(session, "studio")
+        shown = [line for line in lines if "left out" not in line]
+        left_out = sum(int(line.split()[0]) for line in lines if "left out" in line)
+        return len(shown) + left_out == 10_000
+
+    tick_until(session, counted)
+    assert 0 < len(shown) < 1000
+
+
+def test_what_a_program_prints_stands_there_once_though_it_is_on_the_bus(session: Session) -> None:
+    heard: list[object] = []
+    with nep.node("page") as page, page.new_sub("/nep/log", "nep/log") as records:
+        tick_until(session, lambda: session.master.kind == "connected")
+        session.document.edited(workspace(stack(started(), write(text("hello")), write(number(7)))))
+        session.runs.run()
+
+        def both() -> bool:
+            heard.extend(payload for ok, payload in [records.listen()] if ok)
+            return len(heard) >= 2 and not session.runs.active
+
+        tick_until(session, both, 20)
+        name = session.document.name
+        assert [record["text"] for record in heard] == ["hello", "7"]  # type: ignore[index]
+        assert {record["node"] for record in heard} == {f"program {name}"}  # type: ignore[index]
+    session.tick()
+    printed = [line for line in session.console.records if line.text in {"hello", "7"}]
+    assert [(line.origin, line.text) for line in printed] == [(name, "hello"), (name, "7")]
+
+
+def test_alerts_of_the_connection_lead_to_the_doctor(session: Session) -> None:
+    def next_steps(alerts: Alerts) -> dict[str, str | None]:
+        return {alert.id: alert.action for alert in alerts.active}
+
+    session._on_event(MasterFound("127.0.0.1:1"), 0.0)
+    session._on_event(MasterLost("127.0.0.1:1", "no master answers"), 0.0)
+    session._on_event(CompanionFailed("master", "The master can't be started.", "Port …", False), 0.0)
+    assert next_steps(session.alerts) == {"master": "help.doctor", "companion:master": "help.doctor"}
+    assert {alert.button for alert in session.alerts.active} == {"Open the connection doctor"}
+
+
+def test_the_doctor_ends_with_the_session(session: Session) -> None:
+    session.doctor.look()
+    session.close()
+    assert not any(thread.name == "studio-doctor" for thread in threading.enumerate())

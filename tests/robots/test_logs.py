@@ -1,0 +1,49 @@
+"""What a driver logs is published: people see in Studio why a robot did not do what it was told."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+import nep
+from app.robots.kit import Call, Kind, Link, action, safe_stop
+from app.robots.process import run
+from tests.robots.conftest import eventually
+
+
+class Clumsy:
+    """A robot whose only action fails."""
+
+    def __init__(self, link: Link) -> None:
+        logging.getLogger("clumsy.arm").warning("the arm is cold")
+
+    @action("fall", category="Movement", icon="move")
+    def fall(self, call: Call) -> None:
+        """Falls."""
+        raise ValueError("no legs")
+
+    @safe_stop(watchdog_s=0.5)
+    def stop(self) -> None:
+        """Stands still at once."""
+
+
+def test_a_drivers_own_records_and_what_breaks_off_are_on_the_bus(master):
+    ended, records = threading.Event(), []
+    with nep.node("page") as page:
+        page.new_sub("/nep/log", "nep/log", sink=lambda batch: records.extend(each.payload for each in batch))
+        robot = threading.Thread(target=run, args=(Kind("clumsy", "Clumsy", Clumsy), "Bob", ended))
+        robot.start()
+        eventually(lambda: records)
+        assert (records[0]["node"], records[0]["name"]) == ("Bob", "clumsy.arm")
+        assert records[0]["text"] == "the arm is cold"
+        eventually(lambda: "/Bob/command" in page.graph().topics)
+        page.new_pub("/Bob/command", "robot/command").publish(
+            {"id": "1", "op": "invoke", "from": "me", "action": "fall", "input": {}}
+        )
+        eventually(lambda: any("no legs" in record["text"] for record in records))
+        ended.set()
+        robot.join(10)
+    (broke,) = [record for record in records if "no legs" in record["text"]]
+    assert broke["level"] == "warning"
+    assert "Traceback" in broke["text"]
+    assert not any(isinstance(each, nep.logs.LogHandler) for each in logging.getLogger().handlers)
