@@ -41,6 +41,7 @@ class VirtualWheels:
         self._start_room = self.body.room
         self._camera = Camera(self.body.room)
         self._seen: set[str] = set()
+        self._stepped_s = clock.now()
         self._threads = [
             threading.Thread(target=self._move, name=f"{link.name} wheels", daemon=True),
             threading.Thread(target=self._look, name=f"{link.name} camera", daemon=True),
@@ -68,6 +69,7 @@ class VirtualWheels:
     def still(self) -> bool:
         """Whether it stands still."""
         with self._lock:
+            self._advance()  # who waits for it need not wait for the next beat
             return self.body.still
 
     def bumped(self) -> str:
@@ -89,11 +91,11 @@ class VirtualWheels:
     # ---- living -----------------------------------------------------------------------------------
 
     def _move(self) -> None:
-        last = self._clock.now()
-        for step, now in enumerate(Beat(self._clock, self._ended, 1 / BODY_HZ)):
-            seconds, last = min(now - last, _LONGEST_STEP_S), now
+        with self._lock:
+            self._stepped_s = self._clock.now()
+        for step, _ in enumerate(Beat(self._clock, self._ended, 1 / BODY_HZ)):
             with self._lock:
-                self.body.step(seconds)
+                self._advance()
                 happenings = list(self.body.happenings)
                 self.body.happenings.clear()
                 state, distance = self._drawable(), self.body.distance
@@ -107,6 +109,12 @@ class VirtualWheels:
                 self._link.sense("bumper", bool(state["bumped"]))
             if step % _CALM_EVERY == 0:
                 self._link.sense("battery", int(self.body.battery))
+
+    def _advance(self) -> None:
+        """Let the body come to the present; the lock is held."""
+        now = self._clock.now()
+        self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
+        self._stepped_s = now
 
     def _drawable(self) -> dict[str, object]:
         body = self.body

@@ -19,6 +19,7 @@ _LOOK_EVERY = 3  # pictures; people and balls do not come and go faster
 _SLOW_EVERY = 3  # steps between two values of pose and distance
 _CALM_EVERY = 30  # steps between two values of what hardly changes
 _LONGEST_STEP_S = 0.25  # after a suspended computer the world goes on from where it was
+_SMALL_STEP_S = 0.004  # while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
 _STOP_S = 2.0
 
@@ -34,6 +35,7 @@ class Life:
         self._start_room = body.room
         self._camera, self._eyes = Camera(body.room), Eyes()
         self._ended = threading.Event()
+        self._stepped_s = clock.now()
         self._face: str | None = None
         self._face_seen_s = 0.0
         self._threads = [
@@ -54,18 +56,30 @@ class Life:
             thread.join(_STOP_S)
 
     def wait_for(self, true: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait, step by step, until something is true of the body; False when it took too long."""
+        """Wait, in small steps, until something is true of the body; False when it took too long."""
+        limit = self._clock.now() + timeout_s
         with self.changed:
-            return self.changed.wait_for(true, timeout_s)
+            while self._clock.now() < limit:
+                self._advance()
+                if true():
+                    return True
+                self.changed.wait(_SMALL_STEP_S)
+        return False
+
+    def _advance(self) -> None:
+        """Let the body come to the present; the lock is held."""
+        now = self._clock.now()
+        self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
+        self._stepped_s = now
 
     # ---- moving -----------------------------------------------------------------------------------
 
     def _move(self) -> None:
-        last = self._clock.now()
-        for step, now in enumerate(self._beat(BODY_HZ)):
-            seconds, last = min(now - last, _LONGEST_STEP_S), now
+        with self.changed:
+            self._stepped_s = self._clock.now()
+        for step, _ in enumerate(self._beat(BODY_HZ)):
             with self.changed:
-                self.body.step(seconds)
+                self._advance()
                 happenings = list(self.body.happenings)
                 self.body.happenings.clear()
                 self.changed.notify_all()

@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass, field
 
 WALK_ACCELERATION = 0.5  # m/s²
-WALK_BRAKING = 6.0
+WALK_BRAKING = 14.0
 TURN_ACCELERATION = 160.0  # °/s²
-TURN_BRAKING = 1500.0
+TURN_BRAKING = 4000.0
 
 
 @dataclass
