@@ -59,6 +59,11 @@ class Census:
                 if roles or self._was_briefly_joined(registration):
                     self._was_joined.add(registration)
 
+    def expect(self, registration: Registration) -> None:
+        """A program has asked: it may have left this line a moment ago, and is about to come to it."""
+        self._was_joined.discard(registration)
+        self._openings.pop(registration, None)
+
     def forget_the_gone(self) -> bool:
         """Take out who is no more: its process ended, or it was joined and closed its connections."""
         gone = {registration for registration in self._known.registrations if self._is_gone(registration)}

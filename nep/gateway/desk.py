@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
@@ -19,6 +20,10 @@ from nep.gateway.requests import (
     read_request,
     refuse,
 )
+
+_logger = logging.getLogger("nep.gateway")
+_LARGEST_BYTES = 2**24
+"""ZeroMQ ends a connection that sends more at once. Requests have a few hundred bytes."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,9 @@ class Desk:
             reply = grant(request, self._decide(request))
         except RequestError as error:
             reply = refuse(error)
+        except Exception:  # an answer is owed, or the port would be dead for everybody
+            _logger.exception("the gateway could not carry out a request")
+            reply = refuse(RequestError("the gateway could not carry this out; its log says why"))
         counter.send(reply)
 
     def tell(self, members: Iterable[Member]) -> None:
@@ -99,6 +107,7 @@ class Desk:
 
     def _bind(self, kind: int, port: int, consequence: str) -> zmq.Socket[bytes] | None:
         socket = self._context.socket(kind)
+        socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_BYTES)
         try:
             socket.bind(f"tcp://{LOOPBACK}:{port}")
         except zmq.ZMQError:

@@ -101,7 +101,7 @@ class Shape:
         if self.framing == "prefixed":
             if frame.startswith(own):
                 return frame[len(own) :]
-            if self.codec == "json" and frame[:1] in b'{["':
+            if self.codec == "json" and frame.startswith((b"{", b"[", b'"')):
                 return frame
             raise FrameError(f"A message on “{self.topic}” does not begin with the topic")
         if self.codec == "json":

@@ -197,7 +197,9 @@ class Gateway:
         if line.is_service:
             line = Line(request.topic, "bare", codec, "many2many")
         base = self._port_for(line)
-        self._known.add(self._registration(request, line))
+        registration = self._registration(request, line)
+        self._known.add(registration)
+        self._census.expect(registration)
         self._save()
         self._census.look([line])
         self._show()

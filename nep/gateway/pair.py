@@ -20,6 +20,8 @@ _CLOSED = zmq.EVENT_DISCONNECTED
 _QUEUE = 1000
 _QUEUE_OF_PICTURES = 20
 _LINGER_MS = 200
+_LARGEST_BYTES = 2**28
+_LARGEST_FILTER_BYTES = 2**16
 
 
 @dataclass(frozen=True)
@@ -77,19 +79,25 @@ class Pair:
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
         self.languages: frozenset[str] = frozenset()
         with contextlib.ExitStack() as undo:
-            self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo)
-            self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo)
+            self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo, _LARGEST_BYTES)
+            self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo, _LARGEST_FILTER_BYTES)
             self.incoming.send(b"\x01")  # everything: an original's role shows in its traffic
             self._closing = undo.pop_all()
 
     def _open(
-        self, context: zmq.Context[zmq.Socket[bytes]], kind: int, end: End, undo: contextlib.ExitStack
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        kind: int,
+        end: End,
+        undo: contextlib.ExitStack,
+        largest_bytes: int,
     ) -> zmq.Socket[bytes]:
         opened = context.socket(kind)
         undo.callback(opened.close, _LINGER_MS)
         queue = _QUEUE_OF_PICTURES if self.line.codec == "image" else _QUEUE
         opened.setsockopt(zmq.SNDHWM, queue)
         opened.setsockopt(zmq.RCVHWM, queue)
+        opened.setsockopt(zmq.MAXMSGSIZE, largest_bytes)  # who sends more at once is disconnected
         if end.bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
         monitor = opened.get_monitor_socket(_OPENED | _CLOSED)

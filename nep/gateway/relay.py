@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import zmq
@@ -53,6 +54,16 @@ Who = Callable[[Line, Role], Sequence[str]]
 """The names of the programs that publish or subscribe on a line, as far as they are known."""
 
 
+@dataclass
+class _Refused:
+    """Messages of a topic that can't be read, since the last good one."""
+
+    reason: str
+    count: int = 0
+    told: int = 0
+    is_cured: bool = False
+
+
 class Relay:
     """All lines that are open now. Belongs to the gateway's thread. `who` names programs in alerts."""
 
@@ -70,6 +81,7 @@ class Relay:
         self._pairs: dict[Line, Pair] = {}
         self._subscribed: set[Key] = set()
         self._publishing: set[Key] = set()
+        self._refused: dict[str, _Refused] = {}
 
     @property
     def pairs(self) -> Iterable[Pair]:
@@ -129,6 +141,12 @@ class Relay:
         """A second has passed: try again what failed, clear away what late frames of the gone have left."""
         for key in {(line.topic, line.codec) for line in self._pairs}:
             self.settle(key)
+        for topic, refused in list(self._refused.items()):
+            if refused.count != refused.told:
+                self._tell_refused(topic, refused)
+            elif refused.is_cured:
+                del self._refused[topic]
+                self._alerts.cure(f"message:{topic}")
 
     def settle(self, key: Key) -> None:
         """Hold native publishers and subscriptions exactly while originals need them."""
@@ -156,7 +174,8 @@ class Relay:
         except FrameError as error:
             self._refuse(pair, error)
             return
-        self._alerts.cure(f"message:{pair.line.topic}")
+        if pair.line.topic in self._refused:
+            self._refused[pair.line.topic].is_cured = True
         for other in self._of(key):
             if other is pair:
                 other.pass_on(frame, data)
@@ -166,10 +185,20 @@ class Relay:
         self._native.publish(*key, data)
 
     def _refuse(self, pair: Pair, error: FrameError) -> None:
-        if error.version is None:
-            self._alerts.tell(f"message:{pair.line.topic}", str(error))
-        else:
+        if error.version is not None:
             self._tell_version("publisher", pair, error.version)
+            return
+        topic = pair.line.topic
+        refused = self._refused.setdefault(topic, _Refused(str(error)))
+        refused.reason, refused.is_cured = str(error), False
+        refused.count += 1
+        if refused.count == 1:  # further ones are told once a second
+            self._tell_refused(topic, refused)
+
+    def _tell_refused(self, topic: str, refused: _Refused) -> None:
+        refused.told = refused.count
+        times = f" ({refused.count} messages)" if refused.count > 1 else ""
+        self._alerts.tell(f"message:{topic}", refused.reason + times)
 
     def _judge(self, pair: Pair) -> None:
         """Name again who can't be served (its name may be known by now), or take it back."""
