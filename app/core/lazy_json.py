@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 CHUNK = 1 << 20
 DEEPEST = 1000
+MANY = 256  # separators
+KEPT = 1000  # containers
 OPEN, CLOSE = b"{[", b"}]"
 QUOTE, BACKSLASH, COMMA, COLON = b'"\\,:'
 SPACE = b" \t\r\n"
@@ -64,9 +66,11 @@ class JsonIndex:
         self._levels = [  # `take` lets other threads run, an index in brackets does not
             (np.take(self._places, order[a:b]), np.take(kinds, order[a:b])) for a, b in pairwise(bounds)
         ]
+        self._kept: dict[int, _Lazy] = {}
+        self._many: dict[int, tuple[int, Places, Places]] = {}
         self._ends = [places[np.isin(kinds, list(CLOSE))] for places, kinds in self._levels]
 
-    @property
+    @cached_property
     def root(self) -> object:
         """The whole text as a value."""
         return self.value(0, len(self.data), 0)
@@ -76,10 +80,8 @@ class JsonIndex:
         while start < end and self.data[start] in SPACE:
             start += 1
         first = self.data[start] if start < end else 0
-        if first == OPEN[0]:
-            return LazyObject(self, start, level)
-        if first == OPEN[1]:
-            return LazyList(self, start, level)
+        if first in OPEN:
+            return self._container(start, level, first)
         text = bytes(self.data[start:end])
         try:
             found: object = orjson.loads(text)
@@ -87,16 +89,30 @@ class JsonIndex:
             return Unreadable(text)
         return found
 
+    def _container(self, start: int, level: int, first: int) -> _Lazy:
+        """The container that opens here, the same one each time as long as there are few."""
+        found = self._kept.get(start)
+        if found is None:
+            found = (LazyObject if first == OPEN[0] else LazyList)(self, start, level)
+            if len(self._kept) < KEPT:
+                self._kept[start] = found
+        return found
+
     def inside(self, start: int, level: int) -> tuple[int, Places, Places]:
         """Of the container that opens at ``start``: where it closes, its commas and its colons."""
         import numpy as np  # noqa: PLC0415
 
+        if start in self._many:
+            return self._many[start]
         places, kinds = self._levels[level]
         ends = self._ends[level]
         end = int(ends[np.searchsorted(ends, start)])
         first, last = np.searchsorted(places, start) + 1, np.searchsorted(places, end)
         own, kind = places[first:last], kinds[first:last]
-        return end, own[kind == COMMA], own[kind == COLON]
+        found = end, own[kind == COMMA], own[kind == COLON]
+        if len(own) > MANY:  # asked for again and again, and not at once to be had
+            self._many[start] = found
+        return found
 
     def path_to(self, place: int) -> tuple[str | int, ...]:
         """The keys that lead to what stands at this place of the text."""
@@ -149,13 +165,22 @@ class _Lazy:
         start, end = self._bounds(row)
         return self._index.value(start, end, self._level + 1)
 
-    @cached_property
+    @property
+    def raw(self) -> memoryview:
+        """Its JSON text as it lies in the message."""
+        return self._index.data[self._start : self._parts[0] + 1]
+
+    @property
     def text(self) -> bytes:
         """Its JSON text."""
-        return bytes(self._index.data[self._start : self._parts[0] + 1])
+        return bytes(self.raw)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, type(self)) and other.text == self.text
+        if not isinstance(other, type(self)) or len(other.raw) != len(self.raw):
+            return False
+        import numpy as np  # noqa: PLC0415
+
+        return bool(np.array_equal(np.frombuffer(self.raw, np.uint8), np.frombuffer(other.raw, np.uint8)))
 
     def __hash__(self) -> int:
         return hash(self.text)

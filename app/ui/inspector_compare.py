@@ -6,38 +6,45 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.ui.theme import Theme
+from app.ui.tree_difference import MOST as LOOKED_THROUGH
 from app.ui.tree_difference import OFF, Mark, mark_of, parts_of
-from app.ui.tree_values import is_container
+from app.ui.tree_values import is_container, size_of
 from app.ui.widgets import Elided, IconButton
 
 MOST = 20_000
+Counts = dict[Mark, int]
 
 
-def count_changes(value: object, base: object, most: int = MOST) -> dict[Mark, int]:
-    """How many values were changed, added and removed; of something added or removed only its top counts.
+def count_changes(value: object, base: object, most: int = MOST) -> tuple[Counts, bool]:
+    """How many values were changed, added and removed, and whether these are all.
 
-    At most ``most`` values are looked at.
+    Of something added or removed only its top counts. At most ``most`` values are looked at, and the first
+    ones of long lists.
     """
-    counts: dict[Mark, int] = {"changed": 0, "added": 0, "removed": 0}
+    counts: Counts = {"changed": 0, "added": 0, "removed": 0}
     if base is OFF:
-        return counts
+        return counts, True
+    whole = True
     waiting: list[tuple[object, object, Mark]] = [(value, base, mark_of(value, base))]
     looked = 0
     while waiting and looked < most:
         here, before, mark = waiting.pop()
         looked += 1
         if mark == "changed" and is_container(here) and is_container(before):
-            parts = parts_of(here, before, mark, changes_only=True)
+            parts, _total = parts_of(here, before, mark, most, changes_only=True)
+            whole = whole and max(size_of(here), size_of(before)) <= LOOKED_THROUGH
             waiting += [(below, was, how) for _key, below, was, how in parts]
         elif mark:
             counts[mark] += 1
-    return counts
+    return counts, whole and not waiting
 
 
-def changes_words(counts: dict[Mark, int]) -> str:
-    """``3 changed, 1 added``; ``no difference``."""
-    said = [f"{count} {mark}" for mark, count in counts.items() if count]
-    return ", ".join(said) or "no difference"
+def changes_words(counts: Counts, whole: bool = True) -> str:
+    """``3 changed, 1 added``; ``no difference``; ``at least`` in front when not all was looked through."""
+    said = ", ".join(f"{count} {mark}" for mark, count in counts.items() if count)
+    if not said:
+        return "no difference" if whole else "no difference at the start of long lists"
+    return said if whole else f"at least {said}"
 
 
 class CompareStrip(QWidget):
@@ -58,7 +65,7 @@ class CompareStrip(QWidget):
         row.addWidget(self.only)
         self.hide()
 
-    def say(self, compared_with: str, counts: dict[Mark, int]) -> None:
+    def say(self, compared_with: str, counts: Counts, whole: bool) -> None:
         """``Message before: 3 changed, 1 added``."""
-        self.words.setText(f"{compared_with}: {changes_words(counts)}")
+        self.words.setText(f"{compared_with}: {changes_words(counts, whole)}")
         self.setAccessibleDescription(self.words.text())

@@ -21,15 +21,13 @@ MOST = 1000
 Path = tuple[str | int, ...]
 
 
-def find_in_text(index: JsonIndex, words: str, most: int = MOST) -> list[Path]:
-    """Where a large JSON text has these words (any case of the letters a to z); each value once."""
+def find_in_text(index: JsonIndex, words: str, most: int = MOST) -> list[int]:
+    """The places in a large JSON text where these words are (any case of the letters a to z)."""
     text, wanted = bytes(index.data).lower(), words.encode().lower()
-    found: list[Path] = []
+    found: list[int] = []
     at = text.find(wanted) if wanted else -1
     while at >= 0 and len(found) < most:
-        path = index.path_to(at)
-        if path and (not found or found[-1] != path):
-            found.append(path)
+        found.append(at)
         at = text.find(wanted, at + len(wanted))
     return found
 
@@ -68,7 +66,8 @@ class FindBar(QWidget):
         """``source`` gives the message that is shown, and the index of a large one."""
         super().__init__()
         self._source = source
-        self._matches: list[Path] | None = None
+        self._matches: list[Path] | list[int] | None = None
+        self._index: JsonIndex | None = None
         self._more = False
         self._place = -1
         self.field = FindField(theme)
@@ -89,8 +88,8 @@ class FindBar(QWidget):
         self.setFocusProxy(self.field)
 
     @property
-    def matches(self) -> list[Path]:
-        """Where the words are, as far as the message was looked through."""
+    def matches(self) -> list[Path] | list[int]:
+        """Where the words are, as far as the message was looked through: paths, or places in a large text."""
         return self._matches or []
 
     def look(self, words: str) -> None:
@@ -118,16 +117,19 @@ class FindBar(QWidget):
             self._place = min(last, len(self.matches) - 1)
         if self.matches:
             self._place = (self._place + by) % len(self.matches)
-            self.found.emit(self.matches[self._place])
+            found = self.matches[self._place]
+            place = isinstance(found, int) and self._index is not None
+            self.found.emit(self._index.path_to(found) if place else found)  # type: ignore[union-attr, arg-type]
         self._say(wrong=not self.matches)
 
     def _search(self, words: str) -> None:
         if not words:
             self._matches = []
             return
-        value, index = self._source()
-        if index is not None:
-            found = find_in_text(index, words, MOST + 1)
+        value, self._index = self._source()
+        found: list[Path] | list[int]
+        if self._index is not None:
+            found = find_in_text(self._index, words, MOST + 1)
         else:
             found = list(islice(search(value, words), MOST + 1))
         self._more = len(found) > MOST

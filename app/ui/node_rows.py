@@ -166,7 +166,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
     ),
     Column("cpu", "CPU", 66, _of_node(_cpu), lambda r: r.node.cpu_ratio, figures=True, tip=_cpu_tip),
     Column(
-        "publishes", "Publishes", 70, _of_node(lambda n: str(len(n.publishes))),
+        "publishes", "Publishes", 80, _of_node(lambda n: str(len(n.publishes))),
         lambda r: len(r.node.publishes), figures=True, yields=1,
     ),
     Column(

@@ -167,9 +167,9 @@ class TreeModel(QAbstractItemModel):
         if node.base is OFF:
             pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
             return [(key, value, OFF, "") for key, value in pairs]
-        parts = parts_of(node.value, node.base, node.mark, changes_only=self._changes_only)
-        node.total = len(parts)
-        return parts[:count]
+        only = self._changes_only
+        parts, node.total = parts_of(node.value, node.base, node.mark, count, changes_only=only)
+        return parts
 
     def _update(self, node: Node, part: Part, now: float | None) -> None:
         _key, value, base, mark = part
@@ -251,11 +251,14 @@ class TreeModel(QAbstractItemModel):
         """The index of a value, loading what leads to it; invalid when it is not there."""
         node = self._root
         for key in path:
-            keys = [part[0] for part in self._parts(node, size_of(node.value) + size_of(node.base))]
+            keys: list[str | int] = keys_of(node.value, size_of(node.value))
             if key not in keys:
                 return QModelIndex()
             self._load(node, max(keys.index(key) + 1, min(PAGE, len(keys))))
-            node = (node.children or [])[keys.index(key)]
+            below = next((child for child in node.children or () if child.key == key), None)
+            if below is None:
+                return QModelIndex()  # it is left out as it has not changed
+            node = below
         return self.index_of(node)
 
 

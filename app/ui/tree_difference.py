@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Final, Literal
 
 import orjson
@@ -12,7 +13,7 @@ from app.ui.tree_values import is_container, keys_of, size_of, values_of
 
 Mark = Literal["", "changed", "added", "removed"]
 Key = str | int
-MOST = 50_000  # children of one value that are compared
+MOST = 5000  # children of one value that are looked through for changes
 
 
 class _Nothing:
@@ -50,23 +51,48 @@ def mark_of(value: object, base: object) -> Mark:
     return "changed" if differs(base, value) else ""
 
 
-def parts_of(value: object, base: object, mark: Mark, *, changes_only: bool) -> list[Part]:
-    """The children of a value: key, value, the value before, how they differ.
+def parts_of(
+    value: object, base: object, mark: Mark, count: int, *, changes_only: bool
+) -> tuple[list[Part], int]:
+    """The first ``count`` children of a value, and how many there are.
 
-    What was removed stands after what is there, with its old value. All below something added is added, all
-    below something removed is removed (``mark`` is the parent's).
+    A child is its key, its value, the value before, and how they differ. What was removed stands after what
+    is there, with its old value. All below something added is added, all below something removed is removed
+    (``mark`` is the parent's). For ``changes_only`` the first `MOST` children are looked through.
     """
-    keys, values = keys_of(value, MOST), values_of(value, MOST)
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         whole: Mark = "removed" if mark == "removed" else "added"
-        return [(key, below, MISSING, whole) for key, below in zip(keys, values, strict=False)]
-    before = dict(zip(keys_of(base, MOST), values_of(base, MOST), strict=False))
-    parts: list[Part] = []
-    for key, below in zip(keys, values, strict=False):
-        was = before.pop(key, MISSING)
-        parts.append((key, below, was, mark_of(below, was)))
-    parts += [(key, was, MISSING, "removed") for key, was in before.items()]
-    return [part for part in parts if part[3]] if changes_only else parts
+        pairs = zip(keys_of(value, count), values_of(value, count), strict=False)
+        return [(key, below, MISSING, whole) for key, below in pairs], size_of(value)
+    if changes_only:
+        found = [part for part in islice(_compared(value, base), MOST) if part[3]]
+        return found[:count], len(found)
+    return list(islice(_compared(value, base), count)), _total(value, base)
+
+
+def _compared(value: object, base: object) -> Iterator[Part]:
+    """The children of two containers of one kind, one after the other, as somebody asks for them."""
+    if isinstance(value, Mapping) and isinstance(base, Mapping):
+        before = {str(key): key for key in base}
+        for key, below in value.items():
+            own = before.pop(str(key), MISSING)
+            was = MISSING if own is MISSING else base[own]
+            yield str(key), below, was, mark_of(below, was)
+        for name, key in before.items():
+            yield name, base[key], MISSING, "removed"
+    elif isinstance(value, Sequence) and isinstance(base, Sequence):
+        for row, below in enumerate(value):
+            was = base[row] if row < len(base) else MISSING
+            yield row, below, was, mark_of(below, was)
+        for row in range(len(value), len(base)):
+            yield row, base[row], MISSING, "removed"
+
+
+def _total(value: object, base: object) -> int:
+    """How many children two containers of one kind have together."""
+    if isinstance(value, Mapping) and isinstance(base, Mapping):
+        return len({str(key) for key in value} | {str(key) for key in base})
+    return max(size_of(value), size_of(base))
 
 
 def _kind(value: object) -> str:
@@ -79,7 +105,7 @@ def _same(before: object, after: object) -> bool:
     Large ones that are not decoded are compared by their texts.
     """
     if isinstance(before, (LazyList, LazyObject)) and isinstance(after, (LazyList, LazyObject)):
-        return before.text == after.text
+        return before == after
     return size_of(before) == size_of(after) and _written(before) == _written(after)
 
 

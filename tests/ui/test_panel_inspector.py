@@ -395,7 +395,13 @@ def test_comparing_comes_back_with_the_layout(qtbot, panel, window) -> None:
 
 def test_of_a_change_deep_inside_only_the_value_counts() -> None:
     before, after = {"a": {"b": [1, 2, 3]}, "c": 1}, {"a": {"b": [1, 9]}, "c": 1, "d": {"e": {"f": 1}}}
-    counts = count_changes(after, before)
+    counts, whole = count_changes(after, before)
+    assert whole
     assert counts == {"changed": 1, "added": 1, "removed": 1}
     assert changes_words(counts) == "1 changed, 1 added, 1 removed"
-    assert count_changes(after, OFF) == {"changed": 0, "added": 0, "removed": 0}
+    assert count_changes(after, OFF) == ({"changed": 0, "added": 0, "removed": 0}, True)
+    long = list(range(6000))
+    counts, whole = count_changes([*long[:-1], 0], long)
+    assert (counts["changed"], whole) == (0, False)
+    assert changes_words(counts, whole) == "no difference at the start of long lists"
+    assert changes_words(*count_changes([1, *long[1:]], long)) == "at least 1 changed"

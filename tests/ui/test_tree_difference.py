@@ -43,18 +43,21 @@ def test_what_is_not_there_is_something_else_than_null() -> None:
 
 def test_children_are_marked_and_removed_ones_stand_at_the_end() -> None:
     before, after = {"x": 1, "gone": 2, "same": 3}, {"x": 5, "same": 3, "new": {"deep": 1}}
-    parts = parts_of(after, before, "changed", changes_only=False)
+    parts, total = parts_of(after, before, "changed", 9, changes_only=False)
+    assert total == 4
     assert [(key, value, mark) for key, value, _base, mark in parts] == [
         ("x", 5, "changed"), ("same", 3, ""), ("new", {"deep": 1}, "added"), ("gone", 2, "removed"),
     ]  # fmt: skip
-    only = parts_of(after, before, "changed", changes_only=True)
-    assert [part[0] for part in only] == ["x", "new", "gone"]
-    below = parts_of({"deep": 1}, MISSING, "added", changes_only=True)
+    only, total = parts_of(after, before, "changed", 2, changes_only=True)
+    assert total == 3
+    assert [part[0] for part in only] == ["x", "new"]
+    below, _total = parts_of({"deep": 1}, MISSING, "added", 9, changes_only=True)
     assert [(part[0], part[3]) for part in below] == [("deep", "added")]
 
 
 def test_lists_are_compared_by_index() -> None:
-    parts = parts_of([1, 9], [1, 2, 3], "changed", changes_only=False)
+    parts, total = parts_of([1, 9], [1, 2, 3], "changed", 9, changes_only=False)
+    assert total == 3
     assert [(key, value, mark) for key, value, _base, mark in parts] == [
         (0, 1, ""), (1, 9, "changed"), (2, 3, "removed"),
     ]  # fmt: skip
@@ -129,3 +132,23 @@ def test_expanded_parts_survive_while_messages_are_compared() -> None:
         model.set_value({**AFTER, "pose": {"x": x, "y": 3}}, float(x), AFTER)
     assert model.node(model.index(0, 0)) is first
     assert [child.key for child in first.children or ()] == ["x", "y"]
+
+
+def test_of_a_long_list_only_what_is_asked_for_is_compared() -> None:
+    class Watched(list[object]):
+        asked = 0
+
+        def __getitem__(self, row: object) -> object:
+            Watched.asked += 1
+            return super().__getitem__(row)  # type: ignore[index]
+
+    model = TreeModel()
+    model.set_value({"rows": list(range(100_000))}, 0.0, {"rows": Watched(range(1, 100_001))})
+    rows = model.index(0, 0)
+    before = Watched.asked
+    model.fetchMore(rows)
+    assert model.rowCount(rows) == 500
+    assert Watched.asked - before == 500
+    assert model.reveal(("rows", 700)).isValid()
+    assert model.rowCount(rows) == 701
+    assert not model.reveal(("rows", 100_000)).isValid()

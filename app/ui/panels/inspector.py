@@ -171,7 +171,7 @@ class InspectorPanel(PanelWidget):
         base: object = OFF
         if self.comparing:
             base = self._pinned if self.pin.isChecked() else self._before
-            self.strip.say(PINNED if self.pin.isChecked() else BEFORE, count_changes(self._value, base))
+            self.strip.say(PINNED if self.pin.isChecked() else BEFORE, *count_changes(self._value, base))
         self.strip.setVisible(self.comparing and self.body.page == TREE)
         only = self.comparing and base is not OFF and self.strip.only.isChecked()
         self.model.set_value(self._value, self.clock(), base, changes_only=only)
