@@ -14,12 +14,13 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVB
 from app.core.settings import RecentFile
 from app.ui.miniature import Row, rows
 from app.ui.start_art import EmptyPageArt, RobotArt
-from app.ui.start_parts import BigCard, DevelopersLine, ExampleCard, RecentRow
+from app.ui.start_parts import BigCard, DevelopersLine, ExampleCard, LinkButton, RecentRow
 from app.ui.theme import Theme
 from app.ui.widgets import Button, label, paint
 
 WIDTH = 1080
-EXAMPLES_SHOWN = 3
+EXAMPLES_SHOWN = 4
+IN_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 RECENT_SHOWN = 3
 
 
@@ -46,6 +47,11 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
             text = str(data.get("description", ""))
             found.append(Example(path, str(data.get("name", path.stem)), text, rows(workspace)))
     return tuple(found)
+
+
+def all_words(count: int) -> str:
+    """The words of the link that shows every example."""
+    return f"All {IN_WORDS[count] if count < len(IN_WORDS) else count} examples"
 
 
 class StartPage(QWidget):
@@ -80,6 +86,7 @@ class StartPage(QWidget):
             "Start with an empty page and the blocks of your robot.",
             [self._new],
         )
+        self._shows_all = False
         self._recent_box = QWidget()
         self._open = Button(theme, "Open a file", "folder-open", kind="ghost", size="normal")
         self._open.clicked.connect(self.open_pressed)
@@ -110,7 +117,12 @@ class StartPage(QWidget):
         cards.addWidget(self.new_card, 318)
         column.addLayout(cards)
         column.addSpacing(26)
-        column.addLayout(self._head(label("Open an example", "heading"), self._open))
+        self._all = LinkButton(self._theme, all_words(len(examples)), "arrow-right")
+        self._all.clicked.connect(lambda: self.show_all(not self._shows_all))
+        head = self._head(label("Open an example", "heading"), self._open)
+        head.addSpacing(8)
+        head.addWidget(self._all)
+        column.addLayout(head)
         column.addSpacing(10)
         column.addLayout(self._examples(examples))
         column.addSpacing(22)
@@ -156,13 +168,24 @@ class StartPage(QWidget):
         grid = QGridLayout()
         grid.setSpacing(16)
         self.example_cards: list[ExampleCard] = []
-        for index, example in enumerate(examples[:EXAMPLES_SHOWN]):
+        for index, example in enumerate(examples):
             card = ExampleCard(self._theme, example.path, example.name, example.text, example.rows)
             card.clicked.connect(lambda _on=False, path=example.path: self.example_chosen.emit(path))
-            grid.addWidget(card, 0, index)
-            grid.setColumnStretch(index, 1)
+            grid.addWidget(card, index // EXAMPLES_SHOWN, index % EXAMPLES_SHOWN)
             self.example_cards.append(card)
+        for place in range(EXAMPLES_SHOWN):
+            grid.setColumnStretch(place, 1)
+        self.show_all(False)
         return grid
+
+    def show_all(self, shown: bool) -> None:
+        """All examples, or the first row of them."""
+        self._shows_all = shown
+        for card in self.example_cards[EXAMPLES_SHOWN:]:
+            paint.show_when(card, shown)
+        paint.show_when(self._all, len(self.example_cards) > EXAMPLES_SHOWN)
+        words = "Fewer examples" if shown else all_words(len(self.example_cards))
+        self._all.set_word(words, None if shown else "arrow-right")
 
     def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
         """The files opened lately; without any the section is not there."""

@@ -19,6 +19,7 @@ from app.ui.widgets import Button, Card, Chip, Elided, label, paint
 EXAMPLE_ART = 112
 RECENT_HEIGHT = 48
 TILE = 30
+ARROW = 16
 
 
 class BigCard(Card):
@@ -148,11 +149,11 @@ class RecentRow(QAbstractButton):
 
 
 class LinkButton(QAbstractButton):
-    """Words in the accent that lead somewhere."""
+    """Words in the accent that lead somewhere, perhaps with an arrow."""
 
-    def __init__(self, theme: Theme, text: str) -> None:
+    def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
         super().__init__()
-        self._theme = theme
+        self._theme, self._icon = theme, icon
         self.setText(text)
         self.setAccessibleName(text)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -160,9 +161,18 @@ class LinkButton(QAbstractButton):
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
+    def set_word(self, text: str, icon: str | None) -> None:
+        """Other words, and another arrow or none."""
+        self._icon = icon
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.updateGeometry()
+        self.update()
+
     def sizeHint(self) -> QSize:
         font = self._theme.font("title")
-        return QSize(round(paint.width_of(font, self.text())) + 2, max(24, round(paint.height_of(font)) + 4))
+        width = round(paint.width_of(font, self.text())) + 2 + (ARROW + 6 if self._icon else 0)
+        return QSize(width, max(24, round(paint.height_of(font)) + 4))
 
     def minimumSizeHint(self) -> QSize:
         return QSize(80, self.sizeHint().height())
@@ -175,7 +185,12 @@ class LinkButton(QAbstractButton):
         painter = QPainter(self)
         font = self._theme.font("title")
         font.setUnderline(self.underMouse())
-        paint.words(painter, QRectF(self.rect()), self.text(), font, self._theme.colour("accentText"))
+        rect, ink = QRectF(self.rect()), self._theme.colour("accentText")
+        if self._icon is not None:
+            square = QRectF(rect.right() - ARROW, rect.center().y() - ARROW / 2, ARROW, ARROW)
+            paint_icon(painter, square, self._icon, ink)
+            rect.adjust(0, 0, -ARROW - 6, 0)
+        paint.words(painter, rect, self.text(), font, ink)
         painter.end()
 
 

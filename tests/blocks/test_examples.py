@@ -18,12 +18,17 @@ def read(path):
     return saved, parse(saved["robots"]["Pepper"])
 
 
-def test_there_are_the_three_of_the_start_page():
+def test_these_are_the_examples_of_the_start_page():
     named = [(read(path)[0]["name"], read(path)[0]["description"]) for path in EXAMPLES]
     assert named == [
         ("Greeting", "Says hello when it sees a face"),
         ("Reaction to touch", "Laughs when its head is touched"),
         ("Tour guide", "Walks, stops and explains"),
+        ("A quiz", "Asks, listens and answers"),
+        ("A dance", "Moves that are put together of functions"),
+        ("A careful walk", "Looks ahead and decides"),
+        ("The finder", "Finds the ball and a face in its picture"),
+        ("Weather station", "Sends and receives messages on a topic"),
     ]
 
 
@@ -60,10 +65,11 @@ def test_the_behaviour_of_the_designs_picture_has_the_problems_of_the_picture():
     assert program.starts == 3
 
 
-def run(number: int) -> tuple[Play, FakeLink]:
+def run(number: int, link: FakeLink | None = None) -> tuple[Play, FakeLink]:
     saved, pepper = read(EXAMPLES[number])
-    link = FakeLink()
-    link.sensors = {("Pepper", "sees_face"): True, ("Pepper", "distance"): 2.0}
+    if link is None:
+        link = FakeLink()
+        link.sensors = {("Pepper", "sees_face"): True, ("Pepper", "distance"): 2.0}
     return Play(
         compile_behaviour(saved["workspace"], [pepper], name=saved["name"]), (pepper,), link
     ).start(), link
@@ -102,3 +108,64 @@ def test_tour_guide():
     assert link.published == [("/tour", {"station": station}) for station in (1, 2, 3)]
     assert said(link)[1] == "This is station 1"
     assert play.runtime.error is None
+
+
+def actions(link: FakeLink) -> list[str]:
+    return [action for _, action, _ in link.invoked]
+
+
+def test_a_quiz_counts_what_is_right():
+    link = FakeLink()
+    link.sensors[("Pepper", "head_touched")] = True  # always yes
+    play, link = run(3, link)
+    play.end()
+    assert play.runtime.error is None
+    assert said(link)[-1] == "Right answers: 2 of 3"
+    assert actions(link).count("show_emotion") == 3
+
+
+def test_a_dance_calls_its_functions():
+    play, link = run(4)
+    play.end()
+    assert play.runtime.error is None
+    turns = [given["angle"] for _, action, given in link.invoked if action == "turn"]
+    assert turns == [20, 20, 20, 20, 40, 40]
+    assert actions(link).count("light") == 4
+    assert said(link)[-1] == "Thank you."
+
+
+@pytest.mark.parametrize(("distance", "steps", "last"), [(2.0, 5, "enough"), (0.5, 0, "after 0 steps.")])
+def test_a_careful_walk_looks_before_each_step(distance, steps, last):
+    link = FakeLink()
+    link.sensors |= {("Pepper", "distance"): distance, ("Pepper", "battery"): 15}
+    play, link = run(5, link)
+    play.end()
+    assert play.runtime.error is None
+    assert actions(link).count("walk") == steps
+    assert last in said(link)[-2]
+    assert said(link)[-1] == "My battery is low."
+
+
+def test_the_finder_tells_what_it_sees():
+    link = FakeLink()
+    link.sensors |= {("Pepper", "sees_ball"): True, ("Pepper", "sees_face"): True}
+    play, link = run(6, link)
+    play.end()
+    assert play.runtime.error is None
+    assert said(link) == ["I look for the ball.", "There is the ball.", "Hello! Did you lose a ball?"]
+    assert actions(link).count("look_at") == 2
+
+
+def test_the_weather_station_hears_its_own_messages():
+    play, link = run(7)
+    until(lambda: bool(link.published))
+    topic, message = link.published[0]
+    assert topic == "/weather"
+    link.happen("/weather", {"temperature": 25})
+    until(lambda: "It is warm, 25 degrees." in said(link))
+    link.happen("/weather", {"temperature": 12})
+    until(lambda: "It is cold, 12 degrees." in said(link))
+    assert 10 <= message["temperature"] <= 30
+    play.stop()
+    play.end()
+    assert play.lines == ["temperature: 25", "temperature: 12"]

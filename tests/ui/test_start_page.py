@@ -66,7 +66,8 @@ def test_what_is_pressed_is_told(qtbot, page: StartPage, tmp_path: Path) -> None
         if button.text() in {"Use the virtual robot", "New behaviour"}:
             QTest.mouseClick(button, Qt.MouseButton.LeftButton)
     QTest.keyClick(page.example_cards[1], Qt.Key.Key_Space)
-    QTest.mouseClick(page.findChildren(LinkButton)[0], Qt.MouseButton.LeftButton)
+    (developers,) = [each for each in page.findChildren(LinkButton) if "Developer" in each.text()]
+    QTest.mouseClick(developers, Qt.MouseButton.LeftButton)
     assert told == ["robot", "new", tmp_path / "Quiz.nepb", "developer"]
 
 
@@ -162,3 +163,25 @@ def test_rows_follow_the_blocks_and_stand_inside_others() -> None:
 @pytest.mark.parametrize("workspace", [{}, {"blocks": 3}, {"blocks": {"blocks": [1, None]}}])
 def test_a_workspace_without_blocks_has_no_rows(workspace: dict[str, object]) -> None:
     assert rows(workspace) == ()
+
+
+def test_a_row_of_examples_and_all_of_them_when_asked(qtbot, theme: Theme) -> None:
+    shipped = read_examples(resources.path("examples"))
+    page = StartPage(theme, shipped)
+    qtbot.addWidget(page)
+    page.resize(1440, 820)
+    page.show()
+    assert len(shipped) == 8
+    shown = lambda: [card.text() for card in page.example_cards if card.isVisible()]  # noqa: E731
+    assert shown() == ["Greeting", "Reaction to touch", "Tour guide", "A quiz"]
+    (link,) = [each for each in page.findChildren(LinkButton) if "examples" in each.text()]
+    assert link.text() == "All eight examples"
+    QTest.keyClick(link, Qt.Key.Key_Space)
+    assert len(shown()) == 8
+    assert link.text() == "Fewer examples"
+    QTest.mouseClick(link, Qt.MouseButton.LeftButton)
+    assert len(shown()) == 4
+
+
+def test_few_examples_need_no_link(page: StartPage) -> None:
+    assert not [each for each in page.findChildren(LinkButton) if each.isVisible() and "All" in each.text()]
