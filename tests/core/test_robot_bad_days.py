@@ -1,0 +1,263 @@
+"""Robots that die, hang, lie and flood: the block says so within seconds, Stop tells the truth, all recover.
+
+The robots, the programs and the master are real processes and threads; only the window is missing.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.robot_link import Invocation, RobotLink
+from app.core.session import Session
+from app.core.settings import Settings
+from app.robots.description import td_for
+from app.robots.turtle import ROBOT
+from nep.masters import Master
+from tests.blocks.samples import block, number, started, workspace
+from tests.core.waiting import tick_until
+
+ROOT = Path(__file__).parents[2]
+FOUND_S = 20.0
+SAID_S = 8.0  # silence is noticed after 2 s; the rest is for a machine with much to do
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes are frozen by signals of POSIX")
+
+
+@pytest.fixture
+def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+    monkeypatch.setenv("NEP_MASTER", master.address)
+    made = Session(
+        Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
+    )
+    made.start()
+    yield made
+    made.close()
+
+
+class Turtles:
+    """Turtles as processes."""
+
+    def __init__(self, address: str) -> None:
+        self._environment = {**os.environ, "NEP_MASTER": address, "PYTHONPATH": str(ROOT)}
+        self._processes: list[subprocess.Popen[bytes]] = []
+
+    def start(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle"]
+        made = subprocess.Popen(command, cwd=ROOT, env=self._environment, stderr=subprocess.DEVNULL)
+        self._processes.append(made)
+        return made
+
+    def close(self) -> None:
+        for process in self._processes:
+            process.kill()
+            process.wait(5)
+
+
+@pytest.fixture
+def turtles(master: Master) -> Iterator[Turtles]:
+    made = Turtles(master.address)
+    yield made
+    made.close()
+
+
+def there(session: Session) -> RobotLink:
+    def link() -> RobotLink | None:
+        found = session.fleet.link("Turtle")
+        ready = found is not None and found.connected and found.publisher is not None
+        return found if ready and session.stopper is not None and session.stopper.robots else None
+
+    tick_until(session, link, FOUND_S)
+    found = link()
+    assert found is not None
+    return found
+
+
+def turns_for_long(session: Session) -> None:
+    turn = block("robot_diffdrive_do_turn", "x", ROBOT="Turtle", ANGLE=number(360))
+    again = block("robot_diffdrive_do_turn", "y", ROBOT="Turtle", ANGLE=number(-360))
+    session.document.edited(workspace(started(turn, again)))
+
+
+def runs(session: Session) -> None:
+    turns_for_long(session)
+    session.runs.run()
+    tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
+    moving = lambda: "turns 360" in session.runs.view().detail  # noqa: E731
+    tick_until(session, moving)
+
+
+def says_so_at_the_block(session: Session) -> None:
+    tick_until(session, lambda: session.runs.block_errors, SAID_S)
+    assert session.runs.block_errors == {
+        "x": "Turtle has stopped answering. Check that it is on and in the same Wi-Fi."
+    }
+
+
+def well_again(session: Session) -> None:
+    """A person says that it stands still; then it can be used as before."""
+    there(session)
+    session.runs.confirm_still()
+    runs(session)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "proven")
+    assert session.runs.view().result_ok
+
+
+def test_a_robot_that_is_killed_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
+    process = turtles.start()
+    there(session)
+    runs(session)
+    process.kill()
+    says_so_at_the_block(session)
+    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+    assert session.runs.view().title == "Turtle did not answer"
+    assert "Switch Turtle off by hand." in session.runs.view().detail
+    tick_until(session, lambda: not session.fleet.connected, FOUND_S)
+    turtles.start()
+    well_again(session)
+
+
+def test_a_robot_that_hangs_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
+    process = turtles.start()
+    link = there(session)
+    runs(session)
+    process.send_signal(signal.SIGSTOP)
+    says_so_at_the_block(session)
+    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+    tried = session.fleet.invoke("Turtle", "light", {})  # the panel says it too
+    tick_until(session, lambda: not tried.running, SAID_S)
+    told = ("does not answer", "has gone", "can't be reached")  # as soon as the master knows, it is away
+    assert any(words in (tried.error or "") for words in told)
+    if link.connected:
+        assert link.chip == "virtual, does not answer"
+    process.send_signal(signal.SIGCONT)
+    tick_until(session, lambda: there(session).state == "ready", FOUND_S)
+    with session.fleet.look_at("Turtle"):  # what it was doing does not go on: it was told to stop
+        tick_until(session, lambda: link.drawing is not None and not link.drawing["moving"])
+    well_again(session)
+
+
+# ---- a robot that lies -----------------------------------------------------------------------------
+
+
+class Liar:
+    """Announces itself as a Turtle and answers as a test says."""
+
+    def __init__(self, address: str) -> None:
+        self.node = nep.node("liar", master=address)
+        self.answers = self.node.new_pub("/Turtle/answer", "robot/answer")
+        self._description = self.node.new_pub("/Turtle/description", "robot/description", latched=True)
+        self._description.publish(td_for(ROBOT.thing_model, "Turtle"))
+        self.commands: list[Mapping[str, object]] = []
+        self.node.new_sub("/Turtle/command", "robot/command", sink=self._take)
+
+    def _take(self, messages: Sequence[nep.Message]) -> None:
+        for message in messages:
+            command = message.payload
+            assert isinstance(command, dict)
+            if command["op"] in ("invoke", "cancel"):
+                self.commands.append(command)
+
+    def say(self, made: Invocation, state: object, **more: object) -> None:
+        told = {"id": made.id, "op": "invoke", "action": made.action, "state": state, "output": {}}
+        self.answers.publish({**told, "feedback": {}, "error": None, **more})
+
+
+@pytest.fixture
+def liar(master: Master) -> Iterator[Liar]:
+    made = Liar(master.address)
+    yield made
+    made.node.close()
+
+
+@pytest.fixture
+def tried(session: Session, liar: Liar) -> Invocation:
+    """A move that the liar has got."""
+    there(session)
+    made = session.fleet.invoke("Turtle", "move", {"distance": 0.5})
+    tick_until(session, lambda: liar.commands)
+    return made
+
+
+def test_it_answers_twice_and_for_others(session: Session, liar: Liar, tried: Invocation) -> None:
+    for other in ("somebody else's", "", None, 7):
+        liar.answers.publish({"id": other, "op": "invoke", "state": "succeeded", "output": {}})
+    for state in ("dancing", None, 7, ["succeeded"]):
+        liar.say(tried, state)
+    liar.say(tried, "running")
+    tick_until(session, lambda: tried.state == "running")
+    liar.say(tried, "succeeded", output={"moved": 0.5})
+    liar.say(tried, "failed", error="no, it did not")
+    liar.say(tried, "running")
+    tick_until(session, lambda: not tried.running)
+    again = session.fleet.invoke("Turtle", "light", {})
+    liar.say(again, "succeeded")
+    tick_until(session, lambda: again.state == "succeeded")  # so the second answer has been read
+    assert (tried.state, tried.error, tried.output) == ("succeeded", None, {"moved": 0.5})
+
+
+def test_it_sends_what_is_no_json(session: Session, liar: Liar, tried: Invocation) -> None:
+    for junk in (b"{not json", b"\xff\xfe", b"", b"[" * 5000):
+        liar.answers.publish_bytes(junk)
+    for odd in (None, 7, "text", [1, 2], {"id": tried.id}):
+        liar.answers.publish(odd)
+    liar.say(tried, "succeeded")
+    tick_until(session, lambda: tried.state == "succeeded")
+
+
+def test_it_floods_its_feedback(session: Session, liar: Liar, tried: Invocation) -> None:
+    liar.say(tried, "running")
+    tick_until(session, lambda: tried.state == "running")
+    ended = threading.Event()
+
+    def flood() -> None:
+        number = 0
+        while not ended.is_set():
+            for _ in range(200):
+                number += 1
+                liar.say(tried, "running", feedback={"moved": number, "to_go": "x" * 1000})
+            ended.wait(0.01)
+
+    thread = threading.Thread(target=flood)
+    thread.start()
+    try:
+        longest = 0.0
+        for _ in range(60):
+            tick_until(session, lambda: True)
+            longest = max(longest, session.tick_ms)
+            ended.wait(0.02)
+        assert tried.running
+        assert tried.feedback
+    finally:
+        ended.set()
+        thread.join()
+    assert longest < 250  # a tick takes a fraction of it; the rest is for a machine with much to do
+    liar.say(tried, "succeeded")
+    tick_until(session, lambda: not tried.running)
+
+
+def test_it_says_nothing_at_all(session: Session, liar: Liar, tried: Invocation) -> None:
+    tick_until(session, lambda: not tried.running, SAID_S)
+    assert tried.error == "Turtle does not answer. Check that it is on."
+    assert session.fleet.link("Turtle").state == "silent"  # type: ignore[union-attr]
+    tick_until(session, lambda: liar.commands[-1]["op"] == "cancel")
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+    assert session.runs.view().title == "Turtle did not answer"
+
+
+def test_it_falls_silent_in_the_middle(session: Session, liar: Liar, tried: Invocation) -> None:
+    liar.say(tried, "running")
+    tick_until(session, lambda: tried.state == "running")
+    tick_until(session, lambda: not tried.running, SAID_S)
+    assert tried.error is not None
+    assert "has stopped answering" in tried.error
