@@ -180,7 +180,7 @@ class LineDelegate(QStyledItemDelegate):
         level = WORDS.get(record.level, record.level)
         paint.words(painter, rect, level, font, theme.colour(role))
         # one column for every level, as wide as the widest
-        rect.setLeft(rect.left() + max(paint.width_of(font, word) for word in ("debug", "error")) + 16)
+        rect.setLeft(rect.left() + max(paint.width_of(font, word) for word in ("debug", "error")) + 10)
         for words, colour, most in self._parts(record):
             part = QRectF(rect)
             part.setWidth(min(paint.width_of(font, words) + 1, rect.width() * most))

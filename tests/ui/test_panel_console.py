@@ -201,3 +201,17 @@ def test_a_traceback_takes_one_row_and_says_how_long_it_is() -> None:
     assert first_line("it broke\nTraceback\nValueError") == "it broke (and 2 more lines)"
     assert first_line("one\ntwo") == "one (and 1 more line)"
     assert first_line("one") == "one"
+
+
+def test_larger_text_makes_rows_and_the_way_back_grow(qtbot, panel, window) -> None:
+    for number in range(50):
+        logged(window, text=f"line {number}")
+    panel.refresh()
+    bar = panel.list.verticalScrollBar()
+    qtbot.waitUntil(lambda: bar.maximum() > 500)
+    bar.setValue(300)
+    before = (panel.list.visualRect(panel.model.index(5, 0)).height(), panel.newer.width())
+    window.theme.set_text_percent(200)
+    after = (panel.list.visualRect(panel.model.index(5, 0)).height(), panel.newer.width())
+    assert after[0] == 2 * before[0]
+    assert after[1] >= panel.newer.sizeHint().width() > before[1]

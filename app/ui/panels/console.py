@@ -20,7 +20,7 @@ from app.ui.console_list import (
     Wanted,
     line_of,
 )
-from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
 from app.ui.words import grouped
@@ -256,9 +256,10 @@ class ConsolePanel(PanelWidget):
 
     # ---- how it looks, and what is kept
 
-    def set_density(self, density: Density) -> None:
-        super().set_density(density)
-        self.list.doItemsLayout()
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self.list.doItemsLayout()  # rows grow with the text
+        self._say_newer()
 
     def save_state(self) -> dict[str, object]:
         return {"level": self.level}
