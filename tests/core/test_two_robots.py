@@ -1,0 +1,144 @@
+"""Two robots in one behaviour; and no way past the question before a real one moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.moving import MayNotMoveError
+from app.core.session import Session
+from app.core.settings import Settings
+from app.robots import simulated, turtle
+from app.robots.driver import Driver
+from nep.masters import Master
+from tests.blocks.samples import block, number, say, started, text, workspace, write
+from tests.core.waiting import tick_until
+
+FOUND_S = 20.0
+
+
+@pytest.fixture
+def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+    monkeypatch.setenv("NEP_MASTER", master.address)
+    made = Session(
+        Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
+    )
+    made.start()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("robots", master=master.address) as made:
+        yield made
+
+
+def there(session: Session, *names: str) -> None:
+    def all_of_them() -> bool:
+        links = [session.fleet.link(name) for name in names]
+        ready = all(link is not None and link.connected and link.publisher is not None for link in links)
+        return bool(ready and session.stopper is not None and set(names) <= set(session.stopper.robots))
+
+    tick_until(session, all_of_them, FOUND_S)
+
+
+def turn(angle: float, id: str | None = None) -> dict[str, object]:
+    return block("robot_diffdrive_do_turn", id, ROBOT="Turtle", ANGLE=number(angle))
+
+
+def printed(session: Session) -> list[str]:
+    return [record.text for record in session.console.records]
+
+
+def test_pepper_and_turtle_work_in_one_behaviour(session: Session, node: nep.Node) -> None:
+    with Driver(simulated.ROBOT, "Pepper", node), Driver(turtle.ROBOT, "Turtle", node):
+        there(session, "Pepper", "Turtle")
+        light = block("robot_diffdrive_do_light", ROBOT="Turtle", COLOUR="#ff0000")
+        session.document.edited(workspace(started(say("Go"), turn(20), light, write(text("both")))))
+        assert not [p for p in session.document.problems() if p.severity == "error"]
+        session.runs.run()
+        tick_until(session, lambda: "both" in printed(session), FOUND_S)
+        assert {"Pepper says “Go”", "Turtle turns 20 °"} <= set(printed(session))
+        tick_until(session, lambda: session.runs.view().state == "proven")
+        assert session.runs.view().result_ok
+        with session.fleet.look_at("Turtle"):
+            link = session.fleet.link("Turtle")
+            assert link is not None
+            tick_until(session, lambda: link.drawing is not None)
+            assert link.drawing is not None
+            assert (link.drawing["figure"], link.drawing["eyes"]) == ("turtle", "#ff0000")
+
+
+def test_which_robot_the_panels_show(session: Session, node: nep.Node) -> None:
+    with Driver(simulated.ROBOT, "Pepper", node):
+        there(session, "Pepper")
+        with Driver(turtle.ROBOT, "Turtle", node):
+            there(session, "Turtle")
+            shown = session.fleet.shown
+            assert shown is not None
+            assert shown.name == "Pepper"
+            session.fleet.choose("Turtle")
+            assert session.fleet.shown is session.fleet.link("Turtle")
+        tick_until(session, lambda: len(session.fleet.connected) == 1, FOUND_S)
+        assert session.fleet.shown is session.fleet.link("Pepper")  # the chosen one has gone
+
+
+REAL = replace(turtle.ROBOT, virtual=False)
+
+
+def test_nothing_moves_a_real_robot_before_the_answer(session: Session, node: nep.Node) -> None:
+    with Driver(REAL, "Turtle", node) as driver:
+        there(session, "Turtle")
+        wheels = driver.body.wheels  # type: ignore[attr-defined]
+        session.document.edited(workspace(started(turn(180, "x"))))
+        moving = session.fleet.moving
+        with pytest.raises(MayNotMoveError):
+            session.fleet.invoke("Turtle", "move", {"distance": 0.5})
+        assert moving.question is not None
+        for press in (session.runs.run, session.runs.step, session.runs.run):  # F5, F10, the palette
+            press()
+            assert session.runs.view().state == "ready"
+            assert moving.question.title == "Let Turtle move?"
+        lit = session.fleet.invoke("Turtle", "light", {})  # that moves nothing
+        tick_until(session, lambda: lit.state == "succeeded")
+        assert wheels.still()
+        session.runs.stop()  # Stop asks nobody, and takes the question away
+        assert moving.question is None
+        tick_until(session, lambda: session.runs.view().state == "proven")
+        assert session.runs.view().result_ok
+
+
+def test_let_it_move_runs_what_was_wanted_and_asks_no_more(session: Session, node: nep.Node) -> None:
+    with Driver(REAL, "Turtle", node) as driver:
+        there(session, "Turtle")
+        wheels = driver.body.wheels  # type: ignore[attr-defined]
+        session.document.edited(workspace(started(turn(180, "x"))))
+        session.runs.run()
+        session.fleet.moving.answer(let=True)
+        tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
+        tick_until(session, lambda: not wheels.still())
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "proven")
+        assert wheels.still()
+        tried = session.fleet.invoke("Turtle", "move", {"distance": -0.1})
+        tick_until(session, lambda: tried.state == "succeeded", FOUND_S)
+
+
+def test_a_try_goes_on_after_the_answer(session: Session, node: nep.Node) -> None:
+    with Driver(REAL, "Turtle", node):
+        there(session, "Turtle")
+        with pytest.raises(MayNotMoveError, match="Turtle may not move yet"):
+            session.fleet.invoke("Turtle", "move", {"distance": -0.1})
+        session.fleet.moving.answer(let=False)
+        link = session.fleet.link("Turtle")
+        assert link is not None
+        assert not link.invocations
+        with pytest.raises(MayNotMoveError):
+            session.fleet.invoke("Turtle", "move", {"distance": -0.1})
+        session.fleet.moving.answer(let=True)
+        tick_until(session, lambda: link.invocations["move"].state == "succeeded", FOUND_S)
