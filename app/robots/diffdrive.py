@@ -282,10 +282,17 @@ def _left(amount: float, done: float) -> float:
     return round(max(0.0, amount - done), 2)
 
 
+class Pattern(DiffDrive):
+    """The description without a base: a driver puts its own class in this one's place."""
+
+    def __init__(self, link: Link) -> None:
+        raise Failed(f"{link.name} has no wheels; its driver must bring them, as app.robots.turtle does")
+
+
 DIFFDRIVE = Kind(
     model="diffdrive",
     title="Differential-drive robot with a camera",
-    body=DiffDrive,
+    body=Pattern,
     kinds=("mobile",),
     driver="python",
     description="Two wheels, a camera, a distance sensor and a bumper.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QRectF, Qt
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.core.moving import Moving
 from app.errors import SettingsError
@@ -103,14 +103,15 @@ class MoveQuestion(QWidget):
         self.setAccessibleName(question.title)
         self.setAccessibleDescription(question.sentence)
         if not self.isVisible():
-            self._before = self.window().focusWidget()
+            self._before = QApplication.focusWidget()
         self._place()
         self.show()
         self.raise_()
         self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _put_away(self) -> None:
-        had_focus = self.isAncestorOf(self.window().focusWidget() or self.window())
+        focus = QApplication.focusWidget()
+        had_focus = focus is not None and self.isAncestorOf(focus)
         self.hide()
         if had_focus and self._before is not None:
             self._before.setFocus(Qt.FocusReason.PopupFocusReason)
