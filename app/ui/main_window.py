@@ -80,6 +80,7 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(self.bar)
         self.run_bar, self.tool_bar = RunBar(theme), ToolBar(theme)
         self.use_robot = Button(theme, "Use the virtual robot", "bot", size="small")
+        self.use_robot.let_shrink()
         self.tool_bar.add_tool(self.use_robot)
         self.banner = BannerPlace(theme)
         self.start = StartPage(theme, examples)

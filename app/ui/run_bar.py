@@ -15,6 +15,7 @@ from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, labe
 from app.ui.widgets.menus import Menu, drop_below
 
 ROOM_PX = 960  # what the bar needs at 100 % text
+LEAST_ROOM_PX = 600  # below that even Run is an icon, so that nothing of a stop's result is cut
 
 
 class RunBar(Bar):
@@ -42,6 +43,7 @@ class RunBar(Bar):
         self.result = Result(theme)
         self.confirm = Button(theme, "", size="large")
         self.confirm.hide()
+        self.confirm.let_shrink(96)
         self.stop = StopButton(theme)
         self._build(theme)
         self.run.clicked.connect(self.run_pressed)
@@ -79,8 +81,9 @@ class RunBar(Bar):
         self._fit()
 
     def _fit(self) -> None:
-        """Large text in a narrow window: Pause and Step are icons, in every state."""
+        """Large text in a narrow window: Pause and Step are icons in every state, then Run, too."""
         bare = self.width() < self._theme.scaled(ROOM_PX)
+        self.run.set_bare(self.width() < self._theme.scaled(LEAST_ROOM_PX))
         self.pause.set_bare(bare)
         self.step.set_bare(bare)
 
@@ -117,6 +120,7 @@ class ToolBar(Bar):
         self.result = Result(theme, compact=True)
         self.confirm = Button(theme, "", size="small")
         self.confirm.hide()
+        self.confirm.let_shrink(96)
         self.run = Button(theme, "Run", "play", kind="run", size="small")
         self.run.fill_icon = True
         self.pause = IconButton(theme, "pause", "Pause", "F8")

@@ -16,7 +16,9 @@ from app.ui.main_window import MainWindow
 from app.ui.overlay import Overlay
 from app.ui.panels.base import PanelContext
 from app.ui.start_page import read_examples
+from app.ui.status_bar import StatusBar
 from app.ui.theme import Theme
+from app.ui.widgets import StatusItem
 from tests.ui.clipping import clipped, lengthen
 from tests.ui.fakes import Session as FakeSession
 from tests.ui.shell_parts import PANELS, Answers
@@ -73,12 +75,18 @@ def settle(qtbot, root, *, longer: bool) -> None:
         qtbot.wait(SETTLE_MS)
 
 
-@pytest.mark.parametrize("longer", [False, True], ids=["ours", "longer"])
-@pytest.mark.parametrize("percent", [100, 150, 200])
-@pytest.mark.parametrize("full", [True, False], ids=["full", "empty"])
+@pytest.mark.parametrize(
+    ("full", "percent", "longer"),
+    [
+        (True, 100, False),
+        (True, 150, True),
+        (True, 200, False),
+        (True, 200, True),
+        (False, 150, True),
+        (False, 200, True),
+    ],
+)
 def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, longer: bool) -> None:
-    if (percent, longer) == (100, True):
-        pytest.skip("what fits at 150 per cent and longer fits here")
     theme.set_text_percent(percent)
     faults = []
     for name, (panel, width, height, density) in SIZES.items():
@@ -117,9 +125,16 @@ def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tup
     window.close()
 
 
-@pytest.mark.parametrize("longer", [False, True], ids=["ours", "longer"])
-@pytest.mark.parametrize("percent", [100, 150, 200])
-@pytest.mark.parametrize("size", [(1440, 900), (1100, 700)], ids=["1440", "1100"])
+@pytest.mark.parametrize(
+    ("size", "percent", "longer"),
+    [
+        ((1440, 900), 100, False),
+        ((1440, 900), 200, True),
+        ((1100, 700), 150, True),
+        ((1100, 700), 200, False),
+        ((1100, 700), 200, True),
+    ],
+)
 def test_the_window_cuts_no_words(
     qtbot,
     whole: tuple[MainWindow, Commands],
@@ -150,6 +165,7 @@ def test_the_window_cuts_no_words(
         for view in VIEWS:
             bar.show_view(view)
             look(f"{layout}, {view.state}")
+    assert window.centralWidget().minimumSizeHint().width() <= window.width()
     for name in OVER:
         commands.run(name)
         shown = [each for each in window.findChildren(Overlay) if each.isVisible()]
@@ -157,3 +173,23 @@ def test_the_window_cuts_no_words(
         look(name, shown[0])
         shown[0].shut()
     assert faults == []
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_the_status_bar_shortens_what_has_no_room(qtbot, theme: Theme, percent: int) -> None:
+    theme.set_text_percent(percent)
+    bar = StatusBar(theme)
+    qtbot.addWidget(bar)
+    bar.show()
+    master = ("circle-check", "Master 127.0.0.1:7780", "ok")
+    traffic = ("", "17 nodes, 113 topics, 1269 messages/s", None)
+    lost = ("triangle-alert", "1200 lost in 30 s", "warn")
+    bar.show_facts(
+        (master, ("lock", "This computer only", None), traffic, lost), (("", "Window 13 ms", None),)
+    )
+    qtbot.wait(SETTLE_MS)
+    bar.resize(1100, bar.sizeHint().height())
+    qtbot.wait(SETTLE_MS)
+    assert bar.width() == 1100
+    assert clipped(bar) == []
+    assert all(item.width() >= 40 for item in bar.findChildren(StatusItem) if item.isVisible())

@@ -22,8 +22,8 @@ from app.ui.widgets.small import Elided as Elided
 from app.ui.widgets.small import Line as Line
 from app.ui.widgets.small import SearchField as SearchField
 from app.ui.widgets.small import Sparkline as Sparkline
-from app.ui.widgets.small import StatusItem as StatusItem
 from app.ui.widgets.small import Switch as Switch
 from app.ui.widgets.small import label as label
 from app.ui.widgets.small import paint_sparkline as paint_sparkline
 from app.ui.widgets.small import set_role as set_role
+from app.ui.widgets.status_item import StatusItem as StatusItem
