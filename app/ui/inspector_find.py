@@ -6,13 +6,13 @@ from collections.abc import Callable
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.ui.theme import Theme
 from app.ui.tree_values import search
-from app.ui.widgets import IconButton, SearchField, label
+from app.ui.widgets import IconButton, SearchField, paint
 
 if TYPE_CHECKING:
     from app.core.lazy_json import JsonIndex
@@ -40,6 +40,30 @@ class FindField(SearchField):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, "Find a key or value")
+        self._count = ""
+
+    @property
+    def count(self) -> str:
+        """What stands at its right end: ``2 of 111``."""
+        return self._count
+
+    def show_count(self, words: str) -> None:
+        """Say how many there are, inside the field."""
+        if words != self._count:
+            self._count = words
+            room = round(paint.width_of(self._theme.font("small"), words)) + 6 if words else 0
+            self.setTextMargins(20, 0, room, 0)
+            self.setAccessibleDescription(words)
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if self._count:
+            painter = QPainter(self)
+            room = QRectF(self.rect()).adjusted(0, 0, -8, 0)
+            ink = self._theme.colour("textTertiary")
+            paint.words(painter, room, self._count, self._theme.font("small"), ink, paint.RIGHT)
+            painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         back = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
@@ -73,18 +97,17 @@ class FindBar(QWidget):
         self.field = FindField(theme)
         self.field.textChanged.connect(self.look)
         self.field.step_wanted.connect(self.step)
-        self.count = label("", "small", role="textTertiary")
-        self.before = IconButton(theme, "chevron-up", "Previous one", "Shift+Return", size=24)
-        self.after = IconButton(theme, "chevron-down", "Next one", "Return", size=24)
+        self.before = IconButton(theme, "chevron-up", "Previous one", "Shift+Return", size=22)
+        self.after = IconButton(theme, "chevron-down", "Next one", "Return", size=22)
         self.before.clicked.connect(lambda: self.step(-1))
         self.after.clicked.connect(lambda: self.step(1))
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(3)
+        row.setSpacing(1)
         row.addWidget(self.field, 1)
-        for widget in (self.count, self.before, self.after):
-            row.addWidget(widget)
-            widget.hide()
+        for button in (self.before, self.after):
+            row.addWidget(button)
+            button.hide()
         self.setFocusProxy(self.field)
 
     @property
@@ -96,8 +119,8 @@ class FindBar(QWidget):
         """Look for these words and go to the first place."""
         self._place = -1
         self._search(words)
-        for widget in (self.count, self.before, self.after):
-            widget.setVisible(bool(words))
+        for button in (self.before, self.after):
+            button.setVisible(bool(words))
         self._say(wrong=bool(words) and not self.matches)
         if self.matches:
             self.step(1)
@@ -137,7 +160,8 @@ class FindBar(QWidget):
 
     def _say(self, *, wrong: bool) -> None:
         total = f"{len(self.matches)}{'+' if self._more else ''}"
-        self.count.setText(f"{self._place + 1} of {total}" if self.matches else "none")
+        words = f"{self._place + 1} of {total}" if self.matches else "none"
+        self.field.show_count(words if self.field.text() else "")
         self.field.setProperty("wrong", "true" if wrong else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

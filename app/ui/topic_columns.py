@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from app.ui.table import Cell, Column
-from app.ui.words import age_words, bandwidth_words, plural, rate_words
+from app.ui.words import age_words, bandwidth_words, grouped, plural, rate_words
 
 if TYPE_CHECKING:
     from app.core.topics import Topic
@@ -93,12 +93,26 @@ def _curve_tip(topic: Topic) -> str:
     return f"Rate lately: {rate_words(min(topic.rates))} to {rate_words(max(topic.rates))} /s"
 
 
+def _shown_tip(topic: Topic) -> str:
+    """What reached the panels, where it is not everything."""
+    if not (topic.dropped or topic.missed):
+        return ""
+    shown, sent = topic.shown_of
+    return f"Shown {grouped(shown)} of {grouped(sent)} sent"
+
+
+def _rate_tip(topic: Topic) -> str:
+    return _shown_tip(topic) or "Messages a second, as the publishers tell"
+
+
 def _loss_tip(topic: Topic) -> str:
-    return (
+    shown = _shown_tip(topic)
+    lost = (
         f"{plural(topic.lost, 'message')} lost"
         if topic.lost is not None
         else "No subscriber tells what is lost"
     )
+    return f"{lost}. {shown}" if shown else lost
 
 
 COLUMNS: tuple[Column[Topic], ...] = (
@@ -119,7 +133,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
     ),
     Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
     Column("curve", "", 64, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
-    Column("rate", "Rate /s", 54, rate_cell, lambda t: t.rate_hz, figures=True),
+    Column("rate", "Rate /s", 54, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
     Column("bandwidth", "Bandwidth", 74, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
     Column("age", "Age", 63, age_cell, lambda t: t.age_s, figures=True, yields=2),
     Column("loss", "Loss", 70, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),

@@ -48,8 +48,14 @@ class Topic:
     newest: Message | None = None
     previous: Message | None = None
     received: int = 0
+    dropped: int = 0
+    missed: int = 0
     decode_error: str | None = None
     watched: bool = False
+
+    @property
+    def shown_of(self) -> tuple[int, int]:
+        return self.received - self.dropped, self.received + self.missed
 
 
 class Topics:

@@ -158,7 +158,7 @@ def test_a_large_json_message_is_read_elsewhere_and_shown_when_it_is_there(qtbot
     choose(panel, "rows", 39_999, "name")
     assert panel.foot.path.text() == "rows[39999].name"
     QTest.keyClicks(panel.finder.field, "n3999")
-    assert panel.finder.count.text() == "1 of 11"
+    assert panel.finder.field.count == "1 of 11"
     assert panel.foot.path.text() == "rows[3999].name"
 
 
@@ -303,23 +303,23 @@ def test_finding_counts_and_goes_both_ways_also_when_the_next_message_came(panel
     panel.refresh()
     field = panel.finder.field
     QTest.keyClicks(field, "x")
-    assert (panel.finder.count.text(), panel.foot.path.text()) == ("1 of 3", "a")
+    assert (panel.finder.field.count, panel.foot.path.text()) == ("1 of 3", "a")
     QTest.keyClick(field, Qt.Key.Key_Return)
     QTest.keyClick(field, Qt.Key.Key_Return)
-    assert (panel.finder.count.text(), panel.foot.path.text()) == ("3 of 3", "c")
+    assert (panel.finder.field.count, panel.foot.path.text()) == ("3 of 3", "c")
     QTest.keyClick(field, Qt.Key.Key_Return, Qt.KeyboardModifier.ShiftModifier)
     assert panel.foot.path.text() == "b"
     window.session.send("/blackboard", {"a": "x1", "b": "y", "c": "x3", "d": "x4", "e": "x5"})
     panel.refresh()
     press(panel.finder.after)
-    assert (panel.finder.count.text(), panel.foot.path.text()) == ("3 of 4", "d")
+    assert (panel.finder.field.count, panel.foot.path.text()) == ("3 of 4", "d")
     press(panel.finder.before)
     assert panel.foot.path.text() == "c"
     field.clear()
-    assert panel.finder.count.isHidden()
+    assert panel.finder.before.isHidden()
     assert panel.focus_filter()
     field.setText("nowhere")
-    assert panel.finder.count.text() == "none"
+    assert panel.finder.field.count == "none"
 
 
 def test_the_message_before_is_compared_and_only_changes_can_be_shown(panel, window) -> None:

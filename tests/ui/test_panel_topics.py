@@ -226,3 +226,12 @@ def test_columns_are_chosen_in_a_menu_and_come_back_with_the_layout(qtbot, panel
 def test_who_publishes_can_be_a_column() -> None:
     topic = Topic("/x", publisher_nodes=("camera", "lidar"), subscribers=2)
     assert nodes_cell(topic).text == "camera, lidar"
+
+
+def test_what_did_not_reach_the_panels_is_said_with_its_numbers(panel, window) -> None:
+    rate, loss = (panel.table.columns[place_of(panel, name)] for name in ("rate", "loss"))
+    topic = window.session.topics["/odom"]
+    assert rate.tip(topic) == "Messages a second, as the publishers tell"
+    topic.received, topic.dropped, topic.missed = 1200, 970, 3800
+    assert rate.tip(topic) == "Shown 230 of 5\u2009000 sent"
+    assert loss.tip(topic) == "0 messages lost. Shown 230 of 5\u2009000 sent"
