@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from nep.collecting import collecting_later
 from nep.errors import WireError
 from nep.packing import pack, unpack
 from nep.plain import read, write
@@ -65,6 +66,8 @@ _ANSWERS: Mapping[str, type[Reply | Push]] = {
 _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
 _ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
 
+_LARGE_BYTES = 50_000
+
 
 class Asked(NamedTuple):
     """A request as it came in: the number to repeat, and the request or the sentence why it is none."""
@@ -101,6 +104,13 @@ def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
 
 def decode_answer(body: bytes) -> tuple[int, Reply | Push]:
     """(call, answer) in a body; call is 0 for a push. Raises `WireError`."""
+    if len(body) < _LARGE_BYTES:
+        return _decode_answer(body)
+    with collecting_later():
+        return _decode_answer(body)
+
+
+def _decode_answer(body: bytes) -> tuple[int, Reply | Push]:
     envelope = _envelope(body)
     name, call = envelope.get("is"), envelope.get("re", 0)
     kind = _ANSWERS.get(name) if isinstance(name, str) else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from nep.rates import Meter
@@ -18,6 +18,9 @@ from nep.views import Alert
 
 __all__ = ["Census", "Member", "Publisher", "Subscriber"]
 
+FADES_S = 12.0
+"""So long after its last message a publisher's rate may still sink."""
+
 
 @dataclass
 class Publisher:
@@ -29,6 +32,7 @@ class Publisher:
     bytes: int = 0
     last_seq: int = 0
     last_stamp_ns: int | None = None
+    changed_at: float = 0.0
 
 
 @dataclass
@@ -52,6 +56,9 @@ class Member:
     subscribers: dict[int, Subscriber] = field(default_factory=dict)
     hung: set[str] = field(default_factory=set)
     cpu_ratio: float | None = None
+    heard: dict[int, Publisher] = field(default_factory=dict)
+    """Whom its subscribers can connect to, as of the revision `heard_at`. See `Census.heard_by`."""
+    heard_at: int = -1
 
 
 class Census:
@@ -60,6 +67,10 @@ class Census:
     def __init__(self) -> None:
         self.members: dict[str, Member] = {}
         self.revision = 1
+        self.publishers_revision = 0
+        """The revision at which the publishers of some topic changed last."""
+        self.touched: set[str] = set()
+        """Topics of which something has changed, also a count, since whoever looks emptied this."""
         self._topic_revisions: dict[str, int] = {}
         self._publishing: dict[str, dict[int, Member]] = {}
         self._subscribing: dict[str, dict[int, Member]] = {}
@@ -83,13 +94,13 @@ class Census:
 
     def publishing(self, topic: str) -> list[tuple[Member, Publisher]]:
         """All publishers of a topic, also those that cannot be connected to, each with its node."""
-        found = self._publishing.get(topic, {})
-        return [(member, member.publishers[known]) for known, member in found.items()]
+        found = self._publishing.get(topic)
+        return [(member, member.publishers[known]) for known, member in found.items()] if found else []
 
-    def subscribers_of(self, topic: str) -> Iterator[tuple[Member, Subscriber]]:
+    def subscribers_of(self, topic: str) -> list[tuple[Member, Subscriber]]:
         """The subscribers of a topic, each with its node."""
-        for known, member in list(self._subscribing.get(topic, {}).items()):
-            yield member, member.subscribers[known]
+        found = self._subscribing.get(topic)
+        return [(member, member.subscribers[known]) for known, member in found.items()] if found else []
 
     def remote(self, member: Member, record: PublisherRecord) -> RemotePublisher:
         """A publisher as subscribers have to know it."""
@@ -99,14 +110,22 @@ class Census:
         """The revision at which the publishers of this topic changed last."""
         return self._topic_revisions.get(topic, 0)
 
-    def last_seqs(self, topics: Iterable[str]) -> dict[int, int]:
-        """Publisher id → newest message, for everybody who can be connected to on these topics."""
-        return {
-            known: member.publishers[known].last_seq
-            for topic in topics
-            for known, member in self._publishing.get(topic, {}).items()
-            if member.publishers[known].record.endpoints
-        }
+    def heard_by(self, member: Member) -> dict[int, Publisher]:
+        """Everybody who can be connected to on the topics that this node subscribes to."""
+        if member.heard_at != self.revision:
+            member.heard_at = self.revision
+            topics = {subscriber.record.topic for subscriber in member.subscribers.values()}
+            member.heard = {
+                known: other.publishers[known]
+                for topic in topics
+                for known, other in self._publishing.get(topic, {}).items()
+                if other.publishers[known].record.endpoints
+            }
+        return member.heard
+
+    def last_seqs(self, member: Member) -> dict[int, int]:
+        """Publisher id → newest message, for everybody who can be connected to on this node's topics."""
+        return {known: publisher.last_seq for known, publisher in self.heard_by(member).items()}
 
     # ---- changing
 
@@ -141,6 +160,7 @@ class Census:
         if record.id not in member.subscribers:
             member.subscribers[record.id] = Subscriber(record)
             self._subscribing.setdefault(record.topic, {})[record.id] = member
+            self.touched.add(record.topic)
             self.revision += 1
 
     def remove_publisher(self, node_id: str, publisher: int) -> PublisherRecord | None:
@@ -159,6 +179,7 @@ class Census:
         gone = member.subscribers.pop(subscriber, None) if member else None
         if gone is not None:
             _take_out(self._subscribing, gone.record.topic, subscriber)
+            self.touched.add(gone.record.topic)
             self.revision += 1
 
     def forget(self, node_id: str) -> None:
@@ -185,13 +206,25 @@ class Census:
         member.hung.clear()
         for count in publishers:
             publisher = member.publishers[count.id]
-            publisher.count, publisher.bytes = count.count, count.bytes
+            self.counted(publisher, count.count, count.bytes, now)
             publisher.last_seq, publisher.last_stamp_ns = count.last_seq, count.last_stamp_ns
-            publisher.meter.add(now, count.count, count.bytes)
         for seen in subscribers:
-            subscriber = member.subscribers[seen.id]
-            subscriber.received, subscriber.lost = seen.received, seen.lost
-            subscriber.problem = seen.problem
+            self.seen(member.subscribers[seen.id], seen.received, seen.lost, seen.problem)
+
+    def counted(self, publisher: Publisher, count: int, size_bytes: int, now: float) -> None:
+        """A publisher has sent so much until now."""
+        if count != publisher.count:
+            publisher.changed_at = now
+        if now - publisher.changed_at < FADES_S:
+            self.touched.add(publisher.record.topic)
+        publisher.count, publisher.bytes = count, size_bytes
+        publisher.meter.add(now, count, size_bytes)
+
+    def seen(self, subscriber: Subscriber, received: int | None, lost: int | None, problem: str) -> None:
+        """A subscriber has received so much until now."""
+        if (received, lost, problem) != (subscriber.received, subscriber.lost, subscriber.problem):
+            self.touched.add(subscriber.record.topic)
+            subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
 
     def report_missing(self, node_id: str, publisher: int, subscribers: Iterable[int]) -> None:
         """These subscribers did not answer that publisher; forgotten at their next renewal."""
@@ -216,8 +249,9 @@ class Census:
         return tuple(alert for alerts in self._reported.values() for alert in alerts)
 
     def _changed(self, topic: str) -> None:
+        self.touched.add(topic)
         self.revision += 1
-        self._topic_revisions[topic] = self.revision
+        self.publishers_revision = self._topic_revisions[topic] = self.revision
 
 
 def _take_out(table: dict[str, dict[int, Member]], topic: str, known: int) -> None:

@@ -12,12 +12,13 @@ seconds of any clock that does not jump.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from nep.census import Census, Member
 from nep.errors import WireError
 from nep.outgoing import Outgoing
 from nep.records import Expected, NodeRecord, PublisherRecord, SubscriberRecord
+from nep.renewals import RenewalSaid, same_ids, take_over
 from nep.requests import (
     Added,
     AddPublisher,
@@ -45,7 +46,7 @@ from nep.requests import (
     Seen,
     TopicPublishers,
 )
-from nep.viewing import view_of
+from nep.viewing import Viewer
 from nep.views import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 from nep.wire import check_topic
 
@@ -73,6 +74,7 @@ class Graph:
     def __init__(self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S) -> None:
         self.epoch = epoch
         self._census = Census()
+        self._viewer = Viewer(self._census)
         self._lease_s = lease_s
         self._learnt_at = now + learn_s
         self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str]] = []
@@ -83,6 +85,11 @@ class Graph:
     def revision(self) -> int:
         """Grows with every change of who is there."""
         return self._census.revision
+
+    @property
+    def members(self) -> Collection[str]:
+        """The ids of all nodes that are registered now."""
+        return self._census.members.keys()
 
     @property
     def nodes(self) -> tuple[NodeRecord, ...]:
@@ -141,7 +148,18 @@ class Graph:
 
     def view(self) -> GraphView:
         """The whole graph as a value."""
-        return view_of(self._census, self.epoch)
+        return self._viewer.view(self.epoch)
+
+    def renew_quickly(self, said: RenewalSaid, now: float) -> dict[int, int] | None:
+        """Take over a usual renewal; the newest messages of those that the node hears.
+
+        None when it has to be applied as a request; it may have been taken over in part.
+        """
+        member = self._census.members.get(said.node_id)
+        if member is None or said.epoch != self.epoch or said.revision < self._census.publishers_revision:
+            return None
+        is_usual = take_over(self._census, member, said, now)
+        return self._census.last_seqs(member) if is_usual else None
 
     # ---- requests
 
@@ -221,18 +239,20 @@ class Graph:
 
     def _renew(self, request: Renew, now: float) -> Reply:
         member = self._census.members.get(request.node_id)
-        if member is None or request.epoch != self.epoch or not _same_ids(member, request):
+        if member is None or request.epoch != self.epoch or not same_ids(member, request):
             if member is not None:
                 member.renewed_at = now
             return Renewed(self.epoch, self.revision, again=True)
         self._census.renew(member, request.publishers, request.subscribers, now, request.cpu_ratio)
-        topics = sorted({subscriber.record.topic for subscriber in member.subscribers.values()})
+        topics: Iterable[str] = ()
+        if self._census.publishers_revision > request.revision:
+            topics = sorted({subscriber.record.topic for subscriber in member.subscribers.values()})
         changed = tuple(
             TopicPublishers(topic, self._census.publishers_of(topic))
             for topic in topics
             if self._census.topic_revision(topic) > request.revision
         )
-        return Renewed(self.epoch, self.revision, False, changed, self._census.last_seqs(topics))
+        return Renewed(self.epoch, self.revision, False, changed, self._census.last_seqs(member))
 
     def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
         record = self._census.remove_publisher(request.node_id, request.id)
@@ -276,9 +296,3 @@ def _check(record: PublisherRecord | SubscriberRecord) -> None:
         check_topic(record.topic)
     except ValueError as error:
         raise WireError(str(error)) from error
-
-
-def _same_ids(member: Member, request: Renew) -> bool:
-    return {each.id for each in request.publishers} == set(member.publishers) and {
-        each.id for each in request.subscribers
-    } == set(member.subscribers)

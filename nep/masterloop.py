@@ -13,30 +13,28 @@ from dataclasses import replace
 import zmq
 
 from nep.addresses import endpoint_of
-from nep.bodies import Asked, decode_request, encode_answer
+from nep.bodies import Asked, decode_request
+from nep.collecting import collecting_later
 from nep.errors import AddressInUseError, ClosedError, NepError, WaitTimeoutError
 from nep.graph import Graph, GraphView
 from nep.listening import Listening
 from nep.outgoing import Outgoing, with_hosts, without
-from nep.requests import Done, Join, Listen, Refused, Reply, ReportAlerts, Request, node_of
+from nep.renewals import read_renewal, renewed_body
+from nep.requests import Done, Join, Listen, Look, Refused, Reply, ReportAlerts, Request, node_of
 from nep.starting import Owner
+from nep.submission import Submission
+from nep.viewpacking import ViewPacker
 from nep.waker import Waker
 
 __all__ = ["MasterLoop"]
 
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
+_REST_MS = 10
+_NODES_PER_MS = 50
+"""How long renewals may gather: not at all with fewer nodes than these, then 1 ms longer for so many each."""
 _FOLLOW_S = 2.0
 """How often the addresses of this computer are looked at while other computers are served."""
-
-
-class _Submission:
-    """A request from inside the process, and the reply to it."""
-
-    def __init__(self, request: Request) -> None:
-        self.request = request
-        self.done = threading.Event()
-        self.reply: Reply | None = None
 
 
 class MasterLoop:
@@ -58,9 +56,11 @@ class MasterLoop:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._router = self._context.socket(zmq.ROUTER)
         self._waker = Waker()
-        self._submitted: deque[_Submission] = deque()
-        self._pending: dict[int, _Submission] = {}
+        self._submitted: deque[Submission] = deque()
+        self._pending: dict[int, Submission] = {}
         self._calls = 0
+        self._views = ViewPacker()
+        self._only_renewals, self._tell_at = False, 0.0
         self._is_open = False
         self._closing = False
         self._told_revision = graph.revision
@@ -99,7 +99,7 @@ class MasterLoop:
 
     def submit(self, request: Request, timeout_s: float) -> Reply:
         """Carry out a request of this process. See `Master.submit`."""
-        submission = _Submission(request)
+        submission = Submission(request)
         self._submitted.append(submission)
         self._waker.wake()
         if not submission.done.wait(timeout_s):
@@ -111,39 +111,44 @@ class MasterLoop:
     # ---- in the master's thread
 
     def _run(self) -> None:
-        poller = zmq.Poller()
-        poller.register(self._waker.fd, zmq.POLLIN)
+        waker = (self._waker.fd, int(zmq.POLLIN))
+        polled: list[tuple[int | zmq.Socket[bytes], int]] = [waker]
         tick_at = time.monotonic()
-        listening = False
         try:
             while not self._closing:
-                if self._is_open and not listening:
-                    poller.register(self._router, zmq.POLLIN)
-                    listening = True
-                poller.poll(self._until(tick_at))
+                if self._is_open and len(polled) == 1:
+                    polled.append((self._router, int(zmq.POLLIN)))
+                self._rest_from_renewals(waker)
+                zmq.zmq_poll(polled, self._until(tick_at))
                 self._waker.clear()
                 self._serve_submissions()
-                if listening:
+                if len(polled) > 1:
+                    self._only_renewals = True
                     self._serve_router()
                 now = time.monotonic()
-                if now >= tick_at or self._is_due(now):
+                due = self._graph.learning_end
+                if now >= tick_at or (due is not None and now >= due):
                     tick_at = now + _TICK_S
                     self._tick(now)
-                self._tell_listeners()
+                self._tell_listeners(now)
         finally:
             self.ended.set()
             self._release()
             for submission in (*self._submitted, *self._pending.values()):
                 submission.done.set()
 
+    def _rest_from_renewals(self, waker: tuple[int, int]) -> None:
+        """With hundreds of nodes, let renewals gather: waking up costs more than answering one."""
+        pause_ms = min(_REST_MS, len(self._graph.members) // _NODES_PER_MS)
+        if self._only_renewals and pause_ms:
+            zmq.zmq_poll([waker], pause_ms)
+
     def _until(self, tick_at: float) -> int:
         due = self._graph.learning_end
         at = tick_at if due is None else min(tick_at, due)
+        if self._listeners and self._graph.revision != self._told_revision:
+            at = min(at, self._tell_at)
         return max(0, int((at - time.monotonic()) * 1000) + 1)
-
-    def _is_due(self, now: float) -> bool:
-        due = self._graph.learning_end
-        return due is not None and now >= due
 
     def _tick(self, now: float) -> None:
         self._send(self._graph.tick(now))
@@ -187,7 +192,23 @@ class MasterLoop:
         frames = self._router.recv_multipart(zmq.DONTWAIT, copy=False)
         return [frame.bytes for frame in frames], frames[0].get("Peer-Address") == "127.0.0.1"
 
+    def _renew_quickly(self, sender: bytes, body: bytes) -> bool:
+        """Answer a usual renewal; False when it is something else."""
+        said = read_renewal(body)
+        is_own = said is not None and said.node_id.encode("utf-8", "surrogateescape") == sender
+        last_seqs = self._graph.renew_quickly(said, time.monotonic()) if said and is_own else None
+        if said is None or last_seqs is None:
+            return False
+        hosts = self._listening.hosts
+        answer = renewed_body(said.call, self._graph.epoch, self._graph.revision, last_seqs, hosts)
+        if not self._deliver_body(sender, answer):
+            self._send(self._graph.drop((said.node_id,)))
+        return True
+
     def _serve(self, sender: bytes, body: list[bytes], is_near: bool) -> None:
+        if len(body) == 1 and self._renew_quickly(sender, body[0]):
+            return
+        self._only_renewals = False
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         request = asked.request
         if not isinstance(request, str):
@@ -208,6 +229,9 @@ class MasterLoop:
                 self._send((Outgoing(sender, refused, asked.call),))
             elif isinstance(asked.request, Listen):
                 self._send((Outgoing(sender, self._listen(asked.request), asked.call),))
+            elif isinstance(asked.request, Look):
+                with collecting_later():
+                    self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
             else:
                 self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
         except Exception:  # one request must never end the master
@@ -244,17 +268,21 @@ class MasterLoop:
     def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
         """Send one answer; False when its node has no connection any more."""
         answer = with_hosts(without(each.answer, dead), self._listening.hosts)
-        body = encode_answer(answer, each.call or 0)
+        body = self._views.body(answer, each.call or 0)
+        return self._deliver_body(each.to.encode("utf-8", "surrogateescape"), body)
+
+    def _deliver_body(self, to: bytes, body: bytes) -> bool:
         try:
-            self._router.send_multipart((each.to.encode("utf-8", "surrogateescape"), body), zmq.DONTWAIT)
+            self._router.send_multipart((to, body), zmq.DONTWAIT)
         except zmq.Again:
             pass  # it does not read; its next renewal tells it what it missed
         except zmq.ZMQError as error:
             return error.errno != zmq.EHOSTUNREACH
         return True
 
-    def _tell_listeners(self) -> None:
-        if self._listeners and self._graph.revision != self._told_revision:
+    def _tell_listeners(self, now: float) -> None:
+        """With many nodes that come at once, not after each: telling shall not take most of the time."""
+        if self._listeners and self._graph.revision != self._told_revision and now >= self._tell_at:
             self._told_revision = self._graph.revision
             view = replace(self._graph.view(), listens=self._listening.hosts)
             for changed in self._listeners:
@@ -262,6 +290,8 @@ class MasterLoop:
                     changed(view)
                 except Exception:  # the master outlives what is attached to it
                     _logger.exception("something attached to the master failed")
+            ended = time.monotonic()
+            self._tell_at = ended + 3.0 * (ended - now)
 
     def _release(self) -> None:
         self._router.close()

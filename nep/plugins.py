@@ -28,7 +28,7 @@ T = TypeVar("T", bound=Named)
 
 
 def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """As `discover`, without entry points: these are looked for in all that is installed, which takes long."""
+    """As `discover`, without entry points: to find these, all that is installed is looked through."""
     found: dict[str, T] = {}
     home = importlib.import_module(package)
     for info in pkgutil.iter_modules(home.__path__, f"{package}."):

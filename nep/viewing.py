@@ -5,16 +5,45 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from nep.census import Census, Member, Publisher, Subscriber
+from nep.plain import made
 from nep.views import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
-__all__ = ["view_of"]
+__all__ = ["Viewer"]
 
 
-def view_of(census: Census, epoch: int) -> GraphView:
-    """Everything that the census knows now."""
-    nodes = {each.node.id: _node_info(each) for each in census.members.values()}
-    topics = {name: _topic_info(census, name) for name in census.topics}
-    return GraphView(epoch, census.revision, nodes, topics, tuple(_alerts(census)))
+class Viewer:
+    """Looks at `census` again and again. What has not changed is the very value of the last view."""
+
+    def __init__(self, census: Census) -> None:
+        self._census = census
+        self._topics: dict[str, TopicInfo] = {}
+        self._alerts: dict[str, tuple[Alert, ...]] = {}
+
+    def view(self, epoch: int) -> GraphView:
+        """Everything that the census knows now."""
+        census, touched = self._census, self._census.touched
+        names = census.topics
+        for name in touched:
+            self._topics.pop(name, None)
+            self._alerts.pop(name, None)
+        touched.clear()
+        known = self._topics
+        for name in names:
+            if name not in known:
+                publishing, subscribing = census.publishing(name), census.subscribers_of(name)
+                known[name] = _look_at(name, publishing, subscribing)
+                if len(publishing) > 1 or any(each.problem for _member, each in subscribing):
+                    self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
+        nodes = {each.node.id: _node_info(each) for each in census.members.values()}
+        topics = {name: known[name] for name in names}
+        return GraphView(epoch, census.revision, nodes, topics, tuple(self._all_alerts()))
+
+    def _all_alerts(self) -> Iterator[Alert]:
+        yield from self._census.reported_alerts
+        yield from _name_alerts(self._census)
+        for name in sorted(self._alerts):
+            yield from self._alerts[name]
+        yield from _missing_alerts(self._census)
 
 
 def _node_info(member: Member) -> NodeInfo:
@@ -31,66 +60,81 @@ def _node_info(member: Member) -> NodeInfo:
     )
 
 
-def _topic_info(census: Census, name: str) -> TopicInfo:
-    publishers = census.publishing(name)
-    subscribers = list(census.subscribers_of(name))
-    first = publishers[0][1].record if publishers else None
-    counted = _counted(publishers)
-    rates = [rates for each in counted if (rates := each.meter.rates()) is not None]
-    stamps = [each.last_stamp_ns for each in counted if each.last_stamp_ns is not None]
-    lost, loss_ratio = _losses(each for _member, each in subscribers)
-    return TopicInfo(
-        name,
-        first.msg_type if first else subscribers[0][1].record.msg_type,
-        first.codec if first else "",
-        tuple(_publisher_info(member, each) for member, each in publishers),
-        tuple(
-            SubscriberInfo(each.record.id, member.node.id, each.received, each.lost)
-            for member, each in subscribers
-        ),
-        sum(rate for rate, _ in rates) if rates else None,
-        sum(size for _, size in rates) if rates else None,
-        max(stamps) if stamps else None,
-        lost,
-        loss_ratio,
-    )
+def _look_at(
+    name: str, publishing: list[tuple[Member, Publisher]], subscribing: list[tuple[Member, Subscriber]]
+) -> TopicInfo:
+    """A topic as it is now. Plain loops: with thousands of topics this is what a look waits for."""
+    first = publishing[0][1].record if publishing else None
+    rate = bandwidth = None
+    stamp_ns: int | None = None
+    is_alone = len(publishing) < 2
+    counted = publishing if is_alone else _counted(publishing)
+    publishers, subscribers = [], []
+    for entry in publishing:
+        member, publisher = entry
+        rates = publisher.meter.rates()
+        publishers.append(_publisher_info(member, publisher, rates))
+        if is_alone or entry in counted:
+            if rates is not None:
+                rate, bandwidth = (rate or 0.0) + rates[0], (bandwidth or 0.0) + rates[1]
+            if publisher.last_stamp_ns is not None:
+                stamp_ns = max(stamp_ns or 0, publisher.last_stamp_ns)
+    lost: int | None = None
+    received = 0
+    for member, subscriber in subscribing:
+        subscribers.append(_subscriber_info(member, subscriber))
+        if subscriber.lost is not None:
+            lost = (lost or 0) + subscriber.lost
+            received += subscriber.received or 0
+    every_field = {
+        "name": name,
+        "msg_type": first.msg_type if first else subscribing[0][1].record.msg_type,
+        "codec": first.codec if first else "",
+        "publishers": tuple(publishers),
+        "subscribers": tuple(subscribers),
+        "rate_hz": rate,
+        "bandwidth_Bps": bandwidth,
+        "last_stamp_ns": stamp_ns,
+        "lost": lost,
+        "loss_ratio": None if lost is None else lost / (lost + received) if lost else 0.0,
+    }
+    return made(TopicInfo, every_field)
 
 
-def _counted(publishers: Iterable[tuple[Member, Publisher]]) -> list[Publisher]:
+def _counted(publishing: list[tuple[Member, Publisher]]) -> list[tuple[Member, Publisher]]:
     """Those whose messages are counted: the gateway's own publishers repeat what the originals sent."""
-    known = list(publishers)
-    has_originals = any(member.node.generation not in {"native", "gateway"} for member, _ in known)
-    return [each for member, each in known if not (has_originals and member.node.generation == "gateway")]
+    has_originals = any(member.node.generation not in {"native", "gateway"} for member, _ in publishing)
+    return [each for each in publishing if not (has_originals and each[0].node.generation == "gateway")]
 
 
-def _losses(subscribers: Iterable[Subscriber]) -> tuple[int | None, float | None]:
-    """(lost messages, their share); None where nobody counts."""
-    counts = [(each.received or 0, each.lost) for each in subscribers if each.lost is not None]
-    if not counts:
-        return None, None
-    lost = sum(lost for _, lost in counts)
-    total = lost + sum(received for received, _ in counts)
-    return lost, lost / total if total else 0.0
+def _publisher_info(member: Member, publisher: Publisher, rates: tuple[float, float] | None) -> PublisherInfo:
+    record = publisher.record
+    every_field = {
+        "id": record.id,
+        "node_id": member.node.id,
+        "endpoints": record.endpoints,
+        "latched": record.latched,
+        "count": publisher.count,
+        "bytes": publisher.bytes,
+        "last_seq": publisher.last_seq,
+        "last_stamp_ns": publisher.last_stamp_ns,
+        "rate_hz": None if rates is None else rates[0],
+        "bandwidth_Bps": None if rates is None else rates[1],
+    }
+    return made(PublisherInfo, every_field)
 
 
-def _publisher_info(member: Member, publisher: Publisher) -> PublisherInfo:
-    rates = publisher.meter.rates()
-    return PublisherInfo(
-        publisher.record.id,
-        member.node.id,
-        publisher.record.endpoints,
-        publisher.record.latched,
-        publisher.count,
-        publisher.bytes,
-        publisher.last_seq,
-        publisher.last_stamp_ns,
-        None if rates is None else rates[0],
-        None if rates is None else rates[1],
-    )
+def _subscriber_info(member: Member, subscriber: Subscriber) -> SubscriberInfo:
+    every_field = {
+        "id": subscriber.record.id,
+        "node_id": member.node.id,
+        "received": subscriber.received,
+        "lost": subscriber.lost,
+    }
+    return made(SubscriberInfo, every_field)
 
 
-def _alerts(census: Census) -> Iterator[Alert]:
-    yield from census.reported_alerts
+def _name_alerts(census: Census) -> Iterator[Alert]:
     by_name: dict[str, int] = {}
     for member in census.members.values():
         by_name[member.node.name] = by_name.get(member.node.name, 0) + 1
@@ -101,9 +145,9 @@ def _alerts(census: Census) -> Iterator[Alert]:
                 f"{count} programs call themselves “{name}”",
                 "Give each program a name of its own; all of them go on working.",
             )
-    for topic in census.topics:
-        yield from _type_alert(census, topic)
-        yield from _message_alert(census, topic)
+
+
+def _missing_alerts(census: Census) -> Iterator[Alert]:
     for member in census.members.values():
         if member.hung:
             yield Alert(
@@ -113,9 +157,11 @@ def _alerts(census: Census) -> Iterator[Alert]:
             )
 
 
-def _type_alert(census: Census, topic: str) -> Iterator[Alert]:
+def _topic_alerts(
+    topic: str, publishing: list[tuple[Member, Publisher]], subscribing: list[tuple[Member, Subscriber]]
+) -> Iterator[Alert]:
     types: dict[str, list[str]] = {}
-    for member, publisher in census.publishing(topic):
+    for member, publisher in publishing:
         if member.node.generation != "gateway":
             types.setdefault(publisher.record.msg_type, []).append(member.node.name)
     if len(types) > 1:
@@ -125,10 +171,7 @@ def _type_alert(census: Census, topic: str) -> Iterator[Alert]:
             f"The topic “{topic}” has {len(types)} types: it is published by {said}",
             "Use the same type in all programs, or give one of the topics another name.",
         )
-
-
-def _message_alert(census: Census, topic: str) -> Iterator[Alert]:
-    for member, subscriber in census.subscribers_of(topic):
+    for member, subscriber in subscribing:
         if subscriber.problem:
             yield Alert(
                 f"message:{topic}",

@@ -1,0 +1,71 @@
+"""ViewPacker: the form of graphs on the wire, made from what is the same as in the one before."""
+
+from __future__ import annotations
+
+import msgpack  # type: ignore[import-untyped]
+
+from nep.bodies import encode_answer
+from nep.packing import pack
+from nep.plain import write
+from nep.requests import Push, Reply, Seen
+from nep.views import NodeInfo, TopicInfo
+
+__all__ = ["ViewPacker"]
+
+
+class ViewPacker:
+    """Keeps the bytes of each node and topic as long as its value is the same."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
+
+    def body(self, answer: Reply | Push, call: int) -> bytes:
+        """The body of `answer`: means the same as that of `nep.bodies.encode_answer`."""
+        return self._seen(answer, call) if isinstance(answer, Seen) else encode_answer(answer, call)
+
+    def _seen(self, answer: Seen, call: int) -> bytes:
+        view = answer.view
+        header = msgpack.Packer().pack_map_header
+        rest = {
+            "epoch": view.epoch,
+            "revision": view.revision,
+            "alerts": write(view.alerts),
+            "listens": view.listens,
+        }
+        nodes = [self._part(f"n{key}", key, node) for key, node in view.nodes.items()]
+        topics = [self._part(f"t{key}", key, topic) for key, topic in view.topics.items()]
+        if len(self._parts) > 2 * (len(nodes) + len(topics)) + 100:
+            self._parts.clear()  # many have gone
+        return b"".join(
+            (
+                header(3),
+                *map(pack, ("is", "seen", "re", call, "what")),
+                header(3),
+                *map(pack, ("epoch", answer.epoch, "revision", answer.revision, "view")),
+                header(len(rest) + 2),
+                *(pack(key) + pack(item) for key, item in rest.items()),
+                pack("nodes"),
+                header(len(nodes)),
+                *nodes,
+                pack("topics"),
+                header(len(topics)),
+                *topics,
+            )
+        )
+
+    def _part(self, name: str, key: str, value: NodeInfo | TopicInfo) -> bytes:
+        kept = self._parts.get(name)
+        if kept is not None and (kept[0] is value or kept[0] == value):
+            return kept[1]
+        packed = pack(key) + pack(_plain(value))
+        self._parts[name] = (value, packed)
+        return packed
+
+
+def _plain(value: NodeInfo | TopicInfo) -> dict[str, object]:
+    """The fields as they are, also those that have their default: to look for these takes longer."""
+    plain = dict(vars(value))
+    if isinstance(value, TopicInfo):
+        plain["publishers"] = [vars(each) for each in value.publishers]
+        plain["subscribers"] = [vars(each) for each in value.subscribers]
+    return plain

@@ -1,0 +1,189 @@
+"""The short ways of a master with many nodes: they say what the long ones say, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nep import bodies
+from nep.graph import Graph
+from nep.masters import Master
+from nep.packing import pack
+from nep.plain import write
+from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.renewals import read_renewal, renewed_body
+from nep.requests import Join, Leave, Look, Ping, RemovePublisher, Renew, Renewed, ReportAlerts, Seen
+from nep.viewing import Viewer
+from nep.viewpacking import ViewPacker
+from nep.views import Alert, GraphView
+from tests.nep.programs import eventually
+
+EPOCH = 5
+
+
+def graph_of(nodes: int) -> Graph:
+    """Each node publishes one topic and hears the next one's."""
+    graph = Graph(EPOCH, 0.0, learn_s=0.0)
+    for n in range(nodes):
+        graph.apply(joining(n, nodes), 1, 0.0, f"n{n}")
+    return graph
+
+
+def joining(n: int, nodes: int, msg_type: str = "json") -> Join:
+    other = (n + 1) % nodes
+    return Join(
+        NodeRecord(f"n{n}", f"Node {n}", "host", 1),
+        0,
+        (PublisherRecord(100 + n, f"t{n}", msg_type, "json", (f"tcp://x:{n}",)),),
+        (SubscriberRecord(200 + n, f"t{other}", "json"),),
+    )
+
+
+def renewal(n: int, graph: Graph, count: int = 10, problem: str = "", **more: Any) -> Renew:
+    return Renew(
+        f"n{n}",
+        EPOCH,
+        graph.revision,
+        (PublisherCount(100 + n, count, 5 * count, count, 1_700_000_000_000_000_000),),
+        (SubscriberCount(200 + n, count, 2, problem),),
+        **more,
+    )
+
+
+def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
+    """The quick way, as the master's loop goes it."""
+    said = read_renewal(bodies.encode_request(request, 7))
+    if said is None:
+        return None
+    last_seqs = graph.renew_quickly(said, now)
+    return None if last_seqs is None else renewed_body(said.call, EPOCH, graph.revision, last_seqs, ())
+
+
+def view(graph: Graph) -> GraphView:
+    """What somebody sees who looks for the first time."""
+    return Viewer(graph._census).view(EPOCH)
+
+
+def test_a_quick_renewal_says_and_does_what_the_long_way_does() -> None:
+    quick, long = graph_of(5), graph_of(5)
+    for now in (1.0, 2.0, 3.0):
+        for n in range(5):
+            request = renewal(n, quick, int(now) * 7 + n, "bad" if n == 2 else "", cpu_ratio=0.25)
+            body = renew(quick, request, now)
+            assert body is not None
+            (answer,) = long.apply(request, 7, now, f"n{n}")
+            assert bodies.decode_answer(body) == (7, answer.answer)
+            assert isinstance(answer.answer, Renewed)
+            assert set(answer.answer.last_seqs) == {100 + (n + 1) % 5}
+    assert view(quick) == view(long)
+    assert view(quick).topics["t0"].rate_hz is not None
+
+
+def test_a_lease_begins_anew() -> None:
+    graph = graph_of(2)
+    assert renew(graph, renewal(0, graph), 2.9) is not None
+    graph.tick(3.0)
+    assert list(graph.members) == ["n0"]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"epoch": EPOCH + 1},
+        {"revision": 0},
+        {"publishers": ()},
+        {"publishers": [{"id": 999, "count": 1, "bytes": 1, "last_seq": 1}]},
+        {"publishers": [{"id": 100, "count": "1", "bytes": 1, "last_seq": 1}]},
+        {"publishers": [{"id": 100, "count": True, "bytes": 1, "last_seq": 1}]},
+        {"publishers": [{"id": 100, "count": 1, "bytes": 1, "last_seq": 1, "last_stamp_ns": "x"}]},
+        {"publishers": [{"id": 100}]},
+        {"publishers": [[100]]},
+        {"publishers": ["x"]},
+        {"publishers": {"id": 100}},
+        {"subscribers": [{"id": 200, "received": 1.5, "lost": 0}]},
+        {"subscribers": [{"id": 200, "received": 1, "lost": 0, "problem": 5}]},
+        {"subscribers": [{"id": [], "received": 1, "lost": 0}]},
+        {"node_id": "n9"},
+        {"node_id": 5},
+        {"cpu_ratio": "much"},
+    ],
+)
+def test_an_unusual_renewal_goes_the_long_way(change: dict[str, object]) -> None:
+    graph = graph_of(2)
+    what = write(renewal(0, graph))
+    assert isinstance(what, dict)
+    said = read_renewal(pack({"do": "renew", "call": 7, "what": what | change}))
+    assert said is None or graph.renew_quickly(said, 1.0) is None
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.binary(max_size=60) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(write))
+def test_what_is_no_renewal_is_none(junk: object) -> None:
+    bodies_of_junk = [junk] if isinstance(junk, bytes) else []
+    begins = bodies.encode_request(Renew("n0", 1, 1), 7)
+    bodies_of_junk += [begins[:14] + (junk if isinstance(junk, bytes) else b""), begins[:-1], begins + b"x"]
+    for body in bodies_of_junk:
+        assert read_renewal(body) is None
+    assert read_renewal(bodies.encode_request(Ping(), 7)) is None
+    assert read_renewal(begins) is not None
+
+
+KINDS = st.sampled_from(["join", "leave", "renew", "remove", "alert", "retype"])
+CHANGES = st.lists(st.tuples(KINDS, st.integers(0, 4)))
+
+
+@settings(deadline=None, max_examples=60)
+@given(CHANGES)
+def test_a_view_of_what_changed_is_the_view_of_everything(changes: list[tuple[str, int]]) -> None:
+    graph, packer = graph_of(3), ViewPacker()
+    for now, (what, n) in enumerate(changes):
+        if what == "join":
+            graph.apply(joining(n, 5), 1, float(now), f"n{n}")
+        elif what == "retype":
+            graph.apply(joining(n, 5, "string"), 1, float(now), f"n{n}")
+        elif what == "leave":
+            graph.apply(Leave(f"n{n}"), 1, float(now), f"n{n}")
+        elif what == "renew":
+            renew(graph, renewal(n, graph, now, "bad" if n == 1 else ""), float(now))
+        elif what == "remove":
+            graph.apply(RemovePublisher(f"n{n}", 100 + n, 3), 1, float(now), f"n{n}")
+        else:
+            graph.apply(ReportAlerts("test", (Alert(f"a{n}", "It hurts"),)), 1, float(now), "")
+        (answer,) = graph.apply(Look(), 3, float(now), "somebody")
+        assert isinstance(answer.answer, Seen)
+        assert answer.answer.view == view(graph)
+        assert bodies.decode_answer(packer.body(answer.answer, 3)) == (3, answer.answer)
+
+
+def test_what_has_not_changed_is_the_same_value() -> None:
+    graph = graph_of(3)
+    before = graph.view()
+    renew(graph, renewal(0, graph), 1.0)
+    after = graph.view()
+    assert after.topics["t2"] is before.topics["t2"]
+    assert after.topics["t0"] != before.topics["t0"]
+
+
+def test_listeners_hear_of_the_last_change_though_not_of_each() -> None:
+    class Slow:
+        def __init__(self) -> None:
+            self.views: list[GraphView] = []
+
+        def start(self, master: Master) -> None:
+            pass
+
+        def changed(self, view: GraphView) -> None:
+            self.views.append(view)
+
+        def close(self) -> None:
+            pass
+
+    slow = Slow()
+    with Master("127.0.0.1:0", attachments=[slow], learn_s=0.0) as master:
+        for n in range(50):
+            master.submit(replace(joining(n, 50), managed=True))
+        eventually(lambda: bool(slow.views) and len(slow.views[-1].nodes) == 50)
