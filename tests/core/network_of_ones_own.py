@@ -1,0 +1,34 @@
+"""A network of one's own for bad days: nothing there but the loopback, up or down (Linux)."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+def alone(
+    *arguments: str, up: bool, timeout_s: float, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run this Python with the arguments there. Skips when this computer does not permit that."""
+    unshare = shutil.which("unshare")
+    if unshare is None or shutil.which("ip") is None:
+        pytest.skip("a network of one's own needs Linux with unshare and ip")
+    if subprocess.run([unshare, "-rn", "true"], check=False, capture_output=True).returncode:
+        pytest.skip("this computer does not permit networks of one's own (unshare -rn)")
+    first = "ip link set lo up; " if up else ""
+    return subprocess.run(
+        [unshare, "-rn", "sh", "-c", f'{first}exec "$@"', "sh", sys.executable, *arguments],
+        cwd=REPOSITORY,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "NEP_MASTER": "127.0.0.1:7780", **environment},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=timeout_s,
+        check=False,
+    )

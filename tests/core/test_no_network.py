@@ -1,0 +1,65 @@
+"""Studio without any network: with the loopback it does its whole job, without it it says what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.core.network_of_ones_own import alone
+
+LOOK = """
+import sys, threading, time
+from pathlib import Path
+from app.core.session import Session
+from app.core.settings import Settings
+
+session = Session(Settings(Path(sys.argv[1])), journal_folder=Path(sys.argv[1]) / "journal")
+session.start()
+end = time.monotonic() + 20
+while not session.alerts.has("companion:master") and time.monotonic() < end:
+    session.tick()
+    threading.Event().wait(0.03)
+for alert in session.alerts.active:
+    print(alert.id, alert.title, alert.detail, alert.action)
+for _ in range(100):
+    session.tick()
+    threading.Event().wait(0.03)
+print(len(session.console.records), "line")
+session.close()
+"""
+
+
+def test_with_the_loopback_down_studio_says_so_once_with_the_next_step(tmp_path: Path) -> None:
+    done = alone("-c", LOOK, str(tmp_path), up=False, timeout_s=40)
+    assert "Traceback" not in done.stderr
+    alert, lines = done.stdout.splitlines()
+    assert alert == (
+        "companion:master The master can't be started. Programs of this computer cannot reach each other:"
+        " network is unreachable. Switch the loopback interface on; a firewall or a sandbox may have"
+        " switched it off. help.doctor"
+    )
+    assert lines == "1 line"
+
+
+@pytest.mark.e2e
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+def test_with_the_loopback_alone_studio_its_master_and_its_robot_do_the_whole_job(tmp_path: Path) -> None:
+    done = alone(
+        "-m",
+        "app",
+        "--self-drive",
+        str(tmp_path / "pictures"),
+        up=True,
+        timeout_s=170,
+        QT_QPA_PLATFORM="offscreen",
+        QT_QUICK_BACKEND="software",
+        QTWEBENGINE_DISABLE_SANDBOX="1",
+        NEP_STUDIO_HOME=str(tmp_path / "home"),
+        NEP_STATE_DIR=str(tmp_path / "state"),
+    )
+    assert "the main job was done" in done.stdout, done.stderr
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    assert len(list((tmp_path / "pictures").glob("*.png"))) >= 5
