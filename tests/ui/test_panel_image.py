@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -391,3 +392,22 @@ def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:
     next(each for each in panel.empty._buttons).click()
     assert window.commands == ["inspect:/cam"]
     assert panel.fit.isHidden()
+
+
+def test_the_camera_panel_shows_the_robot_that_was_chosen(qtbot, qapp) -> None:
+    window = Window(Session())
+    window.session.images.source = lambda _topic: picture()
+    for name in ("Pepper", "Nao"):
+        described = replace(pepper(), name=name)
+        sensors = [
+            replace(each, topic=f"/{name}/camera") if each.is_image else each for each in described.sensors
+        ]
+        window.session.fleet.join(RobotLink(name, replace(described, sensors=tuple(sensors))))
+    panel = window.make(CAMERA)
+    qtbot.addWidget(panel)
+    qtbot.addWidget(panel.header_widgets()[0])
+    assert panel.subtitle() == "/Pepper/camera"
+    window.session.fleet.choose("Nao")
+    panel.refresh()
+    assert panel.subtitle() == "/Nao/camera"
+    panel.shut()

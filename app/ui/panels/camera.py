@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class CameraPanel(PanelWidget):
-    """The camera of the first robot that has one."""
+    """The camera of the robot that was chosen, or of the first one that has a camera."""
 
     shows_pictures = True
 
@@ -53,7 +54,7 @@ class CameraPanel(PanelWidget):
         fleet = self.session.fleet
         if fleet.revision != self._revision:
             self._revision = fleet.revision
-            self._choose(next((link for link in fleet.connected if camera_of(link) is not None), None))
+            self._choose(next((link for link in self._robots() if camera_of(link) is not None), None))
         link = fleet.link(self._robot) if self._robot else None
         if self._stream is None or link is None:
             return
@@ -63,6 +64,12 @@ class CameraPanel(PanelWidget):
         self.rate.setText("" if silent is not None and silent > 2 else sentence)
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
+
+    def _robots(self) -> Sequence[RobotLink]:
+        """Those that are there, the one that a person chose to see first."""
+        fleet = self.session.fleet
+        shown = fleet.shown
+        return [shown, *fleet.connected] if shown is not None and shown.connected else fleet.connected
 
     def _choose(self, link: RobotLink | None) -> None:
         camera = camera_of(link) if link is not None else None
