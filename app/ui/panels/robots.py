@@ -138,15 +138,17 @@ class RobotsPanel(PanelWidget):
         self.pages.setCurrentIndex(1 if links else 0)
         self.list.show_links(links)
         if links and self._robot not in {link.name for link in links}:
-            first = next((link for link in links if link.state != "away"), links[0])
-            self.choose(first.name)
+            self._show_robot((self.session.fleet.shown or links[0]).name)
         elif self._robot:
             self._make_forms()
 
     def choose(self, name: str) -> None:
-        """Show the actions of another robot."""
-        self.shut()
+        """A person chose another robot: its actions show here, and the panels of one robot show it too."""
         self.session.fleet.choose(name)
+        self._show_robot(name)
+
+    def _show_robot(self, name: str) -> None:
+        self.shut()
         self._robot, self._revision = name, self.session.fleet.revision
         self._watch = self.session.fleet.look_at(name)
         self._seen.pop("cards", None)
