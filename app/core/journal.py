@@ -6,6 +6,7 @@ that a second Studio does not offer what the first one still holds.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 import uuid
@@ -67,8 +68,12 @@ class Journal:
         write_atomically(self._file, data, durable=False)
 
     def discard(self) -> None:
-        """The work is saved or given up: nothing is offered at the next start."""
-        self._file.unlink(missing_ok=True)
+        """The work is saved or given up: nothing is offered at the next start.
+
+        A folder that takes no files has kept none, or keeps one that the next start offers once more.
+        """
+        with contextlib.suppress(OSError):
+            self._file.unlink(missing_ok=True)
 
 
 def left_behind(folder: Path | None = None) -> list[Unsaved]:

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from app.core.journal import Journal, left_behind
 
 WORKSPACE: dict[str, object] = {"blocks": {"blocks": [{"type": "events_started", "id": "é\ud800"}]}}
@@ -63,3 +65,12 @@ def test_a_damaged_journal_is_skipped_and_kept(tmp_path: Path) -> None:
 
 def test_no_folder_is_no_work(tmp_path: Path) -> None:
     assert left_behind(tmp_path / "none") == []
+
+
+def test_a_folder_that_takes_no_files_ends_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    journal = Journal(tmp_path / "file" / "journal")
+    with pytest.raises(OSError, match=r"[Nn]ot a directory|cannot find|exists"):
+        journal.write("a", None, {}, {})
+    journal.discard()
+    assert left_behind(tmp_path / "file" / "journal") == []
