@@ -19,10 +19,17 @@ _COLUMNS = (
     Column("wire"),
     Column("pid", "right"),
     Column("since", "right"),
+    Column("cpu", "right"),
     Column("publishes", style="green"),
     Column("subscribes", style="cyan"),
 )
-_WIRES = {"native": "native", "A": "NEP ≤ 0.5.4.5", "B": "NEP 0.5.4.8"}
+_WIRES = {
+    "native": "native",
+    "A": "NEP ≤ 0.5.4.5",
+    "B": "NEP 0.5.4.8",
+    "0.5.4.6": "0.5.4.6, not served",
+    "0.5.4.7": "0.5.4.7, not served",
+}
 
 
 @app.command("list")
@@ -48,6 +55,7 @@ def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
         _WIRES.get(node.generation, node.generation),
         str(node.pid) if node.pid is not None else UNKNOWN,
         duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
+        UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",
         "\n".join(topics["publishes"]) or UNKNOWN,
         "\n".join(topics["subscribes"]) or UNKNOWN,
     )
