@@ -30,6 +30,7 @@ class InspectorBody(QWidget):
     def __init__(self, theme: Theme, looked_through: Callable[[], tuple[object, JsonIndex | None]]) -> None:
         """``looked_through`` gives what the find bar looks through."""
         super().__init__()
+        self._waiting = ""
         self.model = TreeModel()
         self.tree = TreeView(theme, self.model)
         self.tree.setAccessibleName("Newest message")
@@ -89,11 +90,20 @@ class InspectorBody(QWidget):
         if page in {TREE, RAW}:
             self.mode.set_value("tree" if page == TREE else "raw")
 
+    def say_waiting(self, topic: str, published: bool) -> None:
+        """There is no message of this topic yet, and perhaps nobody publishes it."""
+        words = f"The next message on {topic} appears here."
+        words = words if published else f"Nobody publishes it now. {words}"
+        if words != self._waiting:
+            self._waiting = words
+            self.empty.say("No message yet", words)
+            self.empty.set_actions([])
+
     def say_nothing(self, topic: str, choose: Callable[[], object]) -> None:
         """There is no message: of which topic, or that none is chosen."""
+        self._waiting = ""
         if topic:
-            self.empty.say("No message yet", f"The next message on {topic} appears here.")
-            self.empty.set_actions([])
+            self.say_waiting(topic, published=True)
         else:
             self.empty.say("Nothing chosen", "Click a topic to see its newest message.")
             self.empty.set_actions([EmptyAction("Choose a topic", choose, "list")])

@@ -405,3 +405,12 @@ def test_of_a_change_deep_inside_only_the_value_counts() -> None:
     assert (counts["changed"], whole) == (0, False)
     assert changes_words(counts, whole) == "no difference at the start of long lists"
     assert changes_words(*count_changes([1, *long[1:]], long)) == "at least 1 changed"
+
+
+def test_a_topic_that_nobody_publishes_says_so_while_it_waits(panel, window) -> None:
+    panel.show_topic("/odom")
+    panel.refresh()
+    assert panel.body.empty._text.text() == "The next message on /odom appears here."
+    window.session.topics["/odom"].publishers = 0
+    panel.refresh()
+    assert panel.body.empty._text.text().startswith("Nobody publishes it now.")

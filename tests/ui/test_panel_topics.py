@@ -235,3 +235,16 @@ def test_what_did_not_reach_the_panels_is_said_with_its_numbers(panel, window) -
     topic.received, topic.dropped, topic.missed = 1200, 970, 3800
     assert rate.tip(topic) == "Shown 230 of 5\u2009000 sent"
     assert loss.tip(topic) == "0 messages lost. Shown 230 of 5\u2009000 sent"
+
+
+def test_an_empty_panel_leads_to_the_connection_doctor(qtbot, panel, window) -> None:
+    assert panel.doctor.isHidden()
+    panel.filter.setText("nothing like this")
+    assert panel.doctor.isHidden()  # the filter is the reason
+    empty = Window(Session())
+    bare = empty.make(PANEL)
+    qtbot.addWidget(bare)
+    assert isinstance(bare, TopicsPanel)
+    assert bare.doctor.isVisible()
+    press(bare.doctor.button)
+    assert empty.commands == ["help.doctor"]

@@ -115,6 +115,8 @@ class InspectorPanel(PanelWidget):
         newest = topic.newest if topic is not None and topic.gone_s is None else None
         if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
             self._take(topic, newest)
+        if self.body.page == NOTHING:
+            self.body.say_waiting(self._topic, topic is not None and topic.publishers > 0)
         done = self.reader.take()
         if done is not None and not self._raw_wanted:
             self._show_read(done)

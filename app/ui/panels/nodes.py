@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core.source import NODE_NAME
+from app.ui.doctor_line import DoctorLine
 from app.ui.filter_field import FilterField
 from app.ui.node_rows import NodeRow, columns, facts_of, limits_of, rows_of
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
@@ -47,6 +48,7 @@ class NodesPanel(PanelWidget):
         self.foot.setContentsMargins(12, 5, 12, 6)
         self.foot.setMinimumWidth(0)
         self.empty = EmptyState(theme, "network", "", "")
+        self.doctor = DoctorLine(theme, context.run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self.table)
         self._stack.addWidget(self.empty)
@@ -56,7 +58,7 @@ class NodesPanel(PanelWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget, stretch in ((self._stack, 1), (self._line, 0), (self._about, 0)):
+        for widget, stretch in ((self._stack, 1), (self._line, 0), (self._about, 0), (self.doctor, 0)):
             column.addWidget(widget, stretch)
         self._opened: set[str] = set()
         self._seen: tuple[object, ...] = ()
@@ -97,6 +99,7 @@ class NodesPanel(PanelWidget):
 
     def _show_empty(self, any_rows: bool, filtered: bool) -> None:
         self._stack.setCurrentIndex(0 if any_rows else 1)
+        self.doctor.setVisible(not any_rows and not filtered)
         if any_rows:
             return
         if filtered:

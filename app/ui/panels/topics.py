@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core.source import NODE_NAME
+from app.ui.doctor_line import DoctorLine
 from app.ui.filter_field import FilterField
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.table import TableModel
@@ -48,6 +49,7 @@ class TopicsPanel(PanelWidget):
         self.foot.setContentsMargins(12, 5, 12, 6)
         self.foot.setMinimumWidth(0)
         self.empty = EmptyState(theme, "radio-tower", "", "")
+        self.doctor = DoctorLine(theme, context.run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self.table)
         self._stack.addWidget(self.empty)
@@ -59,6 +61,7 @@ class TopicsPanel(PanelWidget):
         self._line = Line(theme)
         column.addWidget(self._line)
         column.addWidget(self.foot)
+        column.addWidget(self.doctor)
         self._seen = (-1, -1, "")
         self._ours: tuple[str, ...] = ()
         self._ticks = 0
@@ -102,6 +105,7 @@ class TopicsPanel(PanelWidget):
         self._stack.setCurrentIndex(0 if any_rows else 1)
         self.foot.setVisible(any_rows)
         self._line.setVisible(any_rows)
+        self.doctor.setVisible(not any_rows and not filtered)
         if any_rows:
             return
         kind = self.session.master.kind
