@@ -1,0 +1,29 @@
+"""The gateway where its file cannot be written: originals are served all the same, and an alert says so."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from nep.gateway.gateway import Gateway
+from nep.gateway.processes import SystemProcesses
+
+pytestmark = [
+    pytest.mark.ports,
+    pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way"),
+]
+
+
+def test_a_folder_that_takes_no_files_is_an_alert_and_originals_are_served(
+    fixed_ports, native, original, tmp_path
+):
+    (tmp_path / "file").touch()
+    gateway = Gateway(native, SystemProcesses(), tmp_path / "file" / "map.json")
+    try:
+        assert gateway.start()
+        assert original.ask("t")["state"] == "success"
+        native.wait(lambda: "gateway:file" in native.alerts)
+    finally:
+        gateway.close()
+    assert "cannot be kept" in native.alerts["gateway:file"]
