@@ -107,6 +107,7 @@ class Files:
 
     def ask_open(self) -> None:
         """Let a person choose a file and open it."""
+        self._session.alerts.cure("strange")
         path = self._session.document.path
         self._asks.open(str(path.parent if path is not None else Path.home()), self.open)
 
@@ -124,6 +125,7 @@ class Files:
 
         Those that are no behaviours become one alert, the others open.
         """
+        self._session.alerts.cure("strange")
         strange = [path for path in paths if path.suffix.lower() != SUFFIX]
         for path in paths:
             if path not in strange:

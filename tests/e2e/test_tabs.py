@@ -1,0 +1,72 @@
+"""Several behaviours as tabs: undo across them, a second start, and the tabs at the next start."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.behaviours import say, started, write
+from tests.e2e.studio import ROOT, Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(170)
+SHOWN = "document.querySelector('.nepTab:not([hidden])')"
+
+
+def shown(studio: Studio) -> set[str]:
+    """The blocks of the tab that shows."""
+    ids = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklyDraggable')].map(e => e.dataset.id)"
+    return set(studio.page(ids) or [])
+
+
+def tabs(studio: Studio) -> list[str]:
+    found = sorted(studio.all(kind="BehaviourTab"), key=lambda each: each["rect"][0])
+    return [str(each["name"]) for each in found]
+
+
+def start_once_more(studio: Studio, path: Path) -> int:
+    """What a double click on a file does while Studio runs."""
+    environ = {
+        **os.environ, "NEP_STUDIO_HOME": str(studio.home), "NEP_MASTER": studio.master,
+        "QT_QPA_PLATFORM": "offscreen", "NEP_GATEWAY": "0",
+    }  # fmt: skip
+    done = subprocess.run([sys.executable, "-m", "app", path], cwd=ROOT, env=environ, timeout=60, check=False)
+    return done.returncode
+
+
+def test_tabs_from_the_first_start_to_the_next(start: Callable[..., Studio], tmp_path: Path) -> None:
+    files = [write(tmp_path / f"{name}.nepb", started(say(name))) for name in ("One", "Two", "Three")]
+    studio = start(str(files[0]), str(files[1]))
+    until(lambda: tabs(studio) == ["One", "Two"], "both files are open", 30)
+    until(lambda: "say Two" in shown(studio), "the second shows", 30)
+    studio.point(".nepTab:not([hidden]) [data-id=started] > .blocklyPath", dy=30)
+    studio.screen.key("Delete")
+    until(lambda: tabs(studio) == ["One", "Two, not saved"], "its dot says so")
+    assert shown(studio) == set()
+
+    studio.screen.key("Tab", ["Ctrl"])
+    until(lambda: "say One" in shown(studio), "the next tab shows")
+    studio.screen.key("Tab", ["Ctrl", "Shift"])
+    until(lambda: shown(studio) == set(), "the tab before shows as it was left")
+    studio.screen.key("z", ["Ctrl"])
+    until(lambda: "say Two" in shown(studio), "its undo is still there")
+
+    assert start_once_more(studio, files[2]) == 0
+    until(lambda: tabs(studio) == ["One", "Two, not saved", "Three"], "a second start opens it here")
+    until(lambda: "say Three" in shown(studio), "and shows it")
+    studio.screen.key("w", ["Ctrl"])
+    until(lambda: tabs(studio) == ["One", "Two, not saved"], "it is closed")
+    studio.screen.key("t", ["Ctrl", "Shift"])
+    until(lambda: tabs(studio) == ["One", "Two, not saved", "Three"], "it is open again")
+    assert studio.quit() == 0
+
+    again = start()
+    again.choose("View", "Behaviour layout")
+    until(lambda: tabs(again) == ["One", "Two, not saved", "Three"], "the tabs are there again", 30)
+    assert not again.all("Put it back"), "nothing is asked after an end in order"
+    until(lambda: "say Three" in shown(again), "the one that showed", 30)
