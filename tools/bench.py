@@ -14,7 +14,15 @@ import sys
 from pathlib import Path
 
 BENCH = Path(__file__).resolve().parent.parent / "bench"
-NAMES = ("nep_roundtrip", "nep_rate", "studio_load", "studio_images", "studio_topics", "studio_start")
+NAMES = (
+    "nep_roundtrip",
+    "nep_rate",
+    "nep_logs",
+    "studio_load",
+    "studio_images",
+    "studio_topics",
+    "studio_start",
+)
 
 
 def main() -> int:

@@ -1,0 +1,115 @@
+"""What logging costs: a record that is published, one that a flood leaves out, and Studio's console.
+
+python bench/nep_logs.py
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from app.core.console import Console
+from nep.logs import LOG_TOPIC, LOG_TYPE, LogHandler
+from nep.message import Message
+
+ROUNDS = 5
+COUNT = 10_000
+BUSY = 0.05
+
+
+class Nowhere:
+    """A publisher that sends nothing."""
+
+    def publish(self, payload: object) -> None:
+        """Forget it."""
+
+
+def plain() -> float:
+    """Seconds for a record into a handler that does nothing: what Python's logging itself takes."""
+    logger = logging.getLogger("plain")
+    logger.setLevel(logging.INFO)
+    logger.propagate = False
+    logger.addHandler(logging.NullHandler())
+    return timed(lambda: logger.info("record %d", 7))
+
+
+def published() -> float:
+    """Seconds for a record that is published, without the publishing, which is in another thread."""
+    handler = LogHandler("bench", Nowhere, rate_hz=1e9, burst=COUNT * ROUNDS)
+    handler.logger.propagate = False
+    taken = timed(lambda: handler.logger.info("record %d", 7), 500)
+    handler.close()
+    return taken
+
+
+def left_out() -> float:
+    """Seconds for a record of a flood, which is counted and dropped."""
+    handler = LogHandler("bench", Nowhere, rate_hz=0.0, burst=0)
+    handler.logger.propagate = False
+    taken = timed(lambda: handler.logger.info("record %d", 7))
+    handler.close()
+    return taken
+
+
+def unread() -> float:
+    """Seconds for a record that reaches Studio while nobody looks at the Console."""
+    console, messages = Console(), records()
+    return timed(lambda: console.take(messages), COUNT // len(messages)) / len(messages)
+
+
+def read() -> float:
+    """Seconds for a record that reaches Studio and is decoded for the Console."""
+    console = Console()
+
+    def take() -> None:
+        console.take(records())
+        assert console.records
+
+    return timed(take, COUNT // 100) / 100
+
+
+def records() -> list[Message]:
+    """A hundred records as they come from the bus."""
+    data = (
+        b'{"level":"info","text":"record 7","name":"driver","node":"Pepper","stamp_ns":1795164093412000000}'
+    )
+    return [Message(LOG_TOPIC, data, "json", LOG_TYPE) for _ in range(100)]
+
+
+def timed(work: Callable[[], object], count: int = COUNT) -> float:
+    """Seconds of one call: the best of the rounds, the least disturbed one."""
+    rounds = []
+    for _ in range(ROUNDS):
+        began = time.perf_counter()
+        for _ in range(count):
+            work()
+        rounds.append((time.perf_counter() - began) / count)
+    return min(rounds)
+
+
+def main() -> int:
+    """Print a table; 1 when plain against itself differs by more than 5 %: then the run does not count."""
+    base, again = plain(), plain()
+    print(f"{'what':<44}{'us a record':>12}{'/ plain':>9}")
+    for name, taken in (
+        ("plain: Python's logging into nothing", base),
+        ("plain again", again),
+        ("logged and published", published()),
+        ("logged in a flood, counted and left out", left_out()),
+        ("into Studio's console, nobody looks", unread()),
+        ("into Studio's console, decoded", read()),
+    ):
+        print(f"{name:<44}{taken * 1e6:>12.2f}{taken / base:>9.2f}")
+    if abs(again / base - 1) <= BUSY:
+        return 0
+    print("this run does not count: the computer was busy")
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
