@@ -18,6 +18,7 @@ from app.ui.widgets.small import label
 
 LEAST_HEIGHT = 52
 ICON = 20
+STEP_ICONS = {"help.doctor": "stethoscope", "robots.virtual": "bot", "file.open": "folder-open"}
 LEAST_WORDS = 360  # px at 100 % that a sentence has beside its buttons
 BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 
@@ -93,9 +94,12 @@ class Banner(QWidget):
         detail: str,
         button: str | None,
         others: int = 0,
+        *,
         second: str | None = None,
+        icon: str | None = None,
     ) -> None:
         """Say what is wrong; ``others`` counts the alerts that wait behind this one."""
+        self.button.icon_name = icon
         self._status = status
         self._words = (title, detail)
         self._write()
@@ -196,7 +200,8 @@ class BannerPlace(QWidget):
             self.hide()
             return
         others = len(alerts) - 1
-        self.banner.show_words(first.severity, first.title, first.detail, first.button, others)
+        icon = STEP_ICONS.get(first.action or "")
+        self.banner.show_words(first.severity, first.title, first.detail, first.button, others, icon=icon)
         self.show()
 
     def _answer(self, which: int) -> None:

@@ -131,7 +131,7 @@ class EntryDelegate(QStyledItemDelegate):
             area = QRectF(right - width, rect.top(), width, rect.height())
             paint.words(painter, area, words, font, theme.colour(quiet))
             return right - width
-        if chosen:
+        if chosen and not entry.reason:
             side = theme.scaled(15)
             square = QRectF(right - side, middle - side / 2, side, side)
             paint_icon(painter, square, "corner-down-left", theme.colour("selectedText"))

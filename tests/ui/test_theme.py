@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QLabel
 from app.ui import fonts
 from app.ui.theme import Theme, qt_colour
 from app.ui.widgets import label
+from tests.ui.test_tokens import RAW, contrast
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 UI = Path(__file__).parents[2] / "app" / "ui"
@@ -157,7 +158,11 @@ def test_the_sheet_names_no_object_and_has_no_holes(theme: Theme) -> None:
 
 def test_colours_are_written_nowhere_but_in_the_tokens() -> None:
     # A robot's drawing, its lamps and boxes on a picture have colours that no theme changes.
-    own = {path.name for path in UI.glob("robot_*.py")} | {"choices.py", "controls.py", "picture_view.py"}
+    own = {path.name for path in UI.glob("robot_*.py")} | {
+        "choices.py",
+        "picture_boxes.py",
+        "control_colour.py",
+    }
     written = [
         f"{path.relative_to(UI)}: {found}"
         for path in [*UI.glob("*.py"), *UI.glob("widgets/*.py"), *UI.glob("panels/*.py")]
@@ -165,3 +170,47 @@ def test_colours_are_written_nowhere_but_in_the_tokens() -> None:
         for found in re.findall(r"[\"']#[0-9a-fA-F]{6}\b", path.read_text("utf-8"))
     ]
     assert written == []
+
+
+def test_in_high_contrast_every_pair_and_every_edge_can_be_seen(theme: Theme) -> None:
+    pairs = RAW["contrast"]["pairs"]
+    for mode in ("light", "dark"):
+        theme.set_mode(mode)
+        theme.set_contrast("on")
+        for ink, ground, least in pairs:
+            assert contrast(theme.hex(ink), theme.hex(ground)) >= least, (mode, ink, ground)
+        for edge in ("border", "borderStrong", "controlBorder", "errorBorder", "warnBorder", "okBorder"):
+            for ground in ("panel", "window"):
+                assert contrast(theme.hex(edge), theme.hex(ground)) >= 3, (mode, edge, ground)
+        page = theme.blockly_tokens()["colour"]
+        assert page["border"] == theme.hex("controlBorder")
+        theme.set_contrast("off")
+        assert theme.hex("border") != theme.hex("controlBorder")
+
+
+def test_wishes_follow_the_system_only_when_they_say_so() -> None:
+    class Asked(QObject):
+        contrastPreferenceChanged = Signal()  # noqa: N815  Qt's name
+        wish = Qt.ContrastPreference.NoPreference
+
+        def contrastPreference(self) -> Qt.ContrastPreference:
+            return self.wish
+
+    class WithContrast(Hints):
+        def __init__(self) -> None:
+            super().__init__()
+            self.asked = Asked()
+
+        def accessibility(self) -> Asked:
+            return self.asked
+
+    hints = WithContrast()
+    theme = Theme("light", hints=hints)  # type: ignore[arg-type]
+    theme.set_contrast("system")
+    assert not theme.high_contrast
+    hints.asked.wish = Qt.ContrastPreference.HighContrast
+    hints.asked.contrastPreferenceChanged.emit()
+    assert theme.high_contrast
+    theme.set_contrast("off")
+    hints.asked.contrastPreferenceChanged.emit()
+    assert not theme.high_contrast
