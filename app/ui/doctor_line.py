@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui.theme import Theme
-from app.ui.widgets import Button, Line, label
+from app.ui.widgets import Button, Elided, Line
 
 COMMAND = "help.doctor"
 
@@ -19,8 +18,8 @@ class DoctorLine(QWidget):
     def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
         """``run`` does a command of the window by its name."""
         super().__init__()
-        words = label("Expected to see something?", "small", role="textSecondary", wrap=True)
-        words.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        words = Elided("small", "textSecondary")
+        words.setText("Expected to see something?")
         self.button = Button(theme, "Open the connection doctor", kind="ghost", size="small")
         self.button.let_shrink()
         self.button.clicked.connect(lambda: run(COMMAND))
@@ -28,8 +27,8 @@ class DoctorLine(QWidget):
         row.setContentsMargins(12, 3, 12, 3)
         row.setSpacing(2)
         row.addStretch(1)
-        row.addWidget(words, 4)
-        row.addWidget(self.button, 4)
+        row.addWidget(words)
+        row.addWidget(self.button)
         row.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)

@@ -117,7 +117,7 @@ def _loss_tip(topic: Topic) -> str:
 
 COLUMNS: tuple[Column[Topic], ...] = (
     Column("topic", "Topic", 140, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
-    Column("type", "Type", 80, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
+    Column("type", "Type", 71, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
     Column(
         "publishers",
         "Publishers",
@@ -132,11 +132,11 @@ COLUMNS: tuple[Column[Topic], ...] = (
         "subscribers", "Subscribers", 80, subscribers_cell, lambda t: t.subscribers, figures=True, off=True
     ),
     Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
-    Column("curve", "", 64, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
-    Column("rate", "Rate /s", 54, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
-    Column("bandwidth", "Bandwidth", 74, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
-    Column("age", "Age", 63, age_cell, lambda t: t.age_s, figures=True, yields=2),
-    Column("loss", "Loss", 70, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
+    Column("curve", "", 62, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
+    Column("rate", "Rate /s", 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
+    Column("bandwidth", "Bandwidth", 76, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
+    Column("age", "Age", 67, age_cell, lambda t: t.age_s, figures=True, yields=2),
+    Column("loss", "Loss", 75, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
 )
 
 

@@ -411,3 +411,13 @@ def test_the_camera_panel_shows_the_robot_that_was_chosen(qtbot, qapp) -> None:
     panel.refresh()
     assert panel.subtitle() == "/Nao/camera"
     panel.shut()
+
+
+def test_a_narrow_title_keeps_its_name_and_the_menu_has_everything(qtbot, qapp) -> None:
+    panel = made(qtbot, Window(Session.full()))
+    assert not panel.fit.isHidden()
+    panel.resize(220, 220)
+    assert (panel.fit.isHidden(), panel.keep.isHidden(), panel.freeze.isHidden()) == (True, True, False)
+    assert len([action for action in panel.more_actions() if action.text()]) == len(ROWS) + 1
+    empty = made(qtbot, Window(Session()))
+    assert (empty.fit.isHidden(), empty.freeze.isHidden()) == (True, True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt, QUrl
-from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage
+from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core import snapshots
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from nep.message import Message
 
 CODEC = "image"
+ROOMY = 320
 
 
 class ImagePanel(PanelWidget):
@@ -39,6 +40,7 @@ class ImagePanel(PanelWidget):
         self._watch: Watch | None = None
         self._watched_robot = ""
         self._revision = -1
+        self._there: bool | None = None
         self.choose = IconButton(self.theme, "chevron-down", "Choose a picture topic", size=26)
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
@@ -133,13 +135,22 @@ class ImagePanel(PanelWidget):
         self._page(there=False)
 
     def _page(self, *, there: bool) -> None:
-        wanted = self.view if there else self.empty
-        if self.pages.currentWidget() is wanted and self.fit.isHidden() is not there:
+        if self._there is there:
             return
-        self.pages.setCurrentWidget(wanted)
+        self._there = there
+        self.pages.setCurrentWidget(self.view if there else self.empty)
         self.actions_of.set_enabled(there)
-        for button in (self.fit, self.freeze, self.keep):
-            button.setVisible(there)
+        self._fit_title()
+
+    def _fit_title(self) -> None:
+        """A narrow title keeps its name: what is left out is in "more"."""
+        self.freeze.setVisible(self._there is True)
+        for button in (self.fit, self.keep):
+            button.setVisible(self._there is True and self.width() >= self.theme.scaled(ROOMY))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_title()
 
     # -- what a person does -------------------------------------------------------------------------------
 
