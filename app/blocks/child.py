@@ -114,21 +114,35 @@ class Run:
         self._master = None if order.get("master") is None else str(order["master"])
         self._out = out
         self._runtime = Runtime(out.print, labels=self._program.labels, readings=self._program.readings)
+        self._network: Network | None = None
         self._began = time.monotonic()
         self._stop_answer_s = STOP_ANSWER_S
         self.set_pace(order)
-        if order.get("paused") is True:
+        self._begins_paused = order.get("paused") is True
+        if self._begins_paused:
             self._runtime.scheduler.pause()
 
     def orders(self) -> dict[str, Callable[[], None]]:
         """What can be asked of it while it runs."""
         scheduler = self._runtime.scheduler
         return {
-            "pause": scheduler.pause,
-            "go": scheduler.go_on,
+            "pause": self.pause,
+            "go": self.go_on,
             "step": scheduler.step_once,
             "stop": self.stop,
         }
+
+    def pause(self) -> None:
+        """Hold the scripts, what they wait for, and what robots were left doing."""
+        self._runtime.scheduler.pause()
+        if self._network is not None:
+            self._network.rest()
+
+    def go_on(self) -> None:
+        """Go on with all of it."""
+        if self._network is not None:
+            self._network.go_on()
+        self._runtime.scheduler.go_on()
 
     def set_pace(self, order: Mapping[str, object]) -> None:
         """Slow motion, or none."""
@@ -168,6 +182,9 @@ class Run:
             publishes=self._program.publishes,
             listens=self._program.listens,
         )
+        self._network = network
+        if self._begins_paused:
+            network.rest()
         try:
             self._begin(network)
             self._watch()

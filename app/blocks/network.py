@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
-import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol
 
+from app.blocks.going import Going
 from app.blocks.link import LAST_STATES, STATES, Call
+from app.blocks.wire import Node, Publisher, new_id, payload_of, value_of
 from app.robots import rize
 from app.robots.description import Robot
 from nep.errors import NepError
@@ -17,28 +17,6 @@ from nep.message import Message
 ALIVE_S = 0.2
 
 Told = Callable[[object], None]
-
-
-class Publisher(Protocol):
-    """What is needed of NEP's publisher."""
-
-    def publish(self, payload: object) -> None:
-        """Send one message."""
-        ...
-
-
-class Node(Protocol):
-    """What is needed of NEP's node."""
-
-    def new_pub(self, topic: str, msg_type: str = "json") -> Publisher:
-        """A publisher."""
-        ...
-
-    def new_sub(
-        self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
-    ) -> object:
-        """A subscriber whose messages go to `sink`, in the node's thread."""
-        ...
 
 
 class Network:
@@ -74,6 +52,7 @@ class Network:
         self._arrived = threading.Condition()
         self._closed = threading.Event()
         self._ending = False
+        self._going = Going(self._rest, self.invoke)
         for robot in robots:
             self._meet(robot)
         for name, sensor in (*sensors, *events):
@@ -108,9 +87,10 @@ class Network:
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> Call:
         """Send a command; the call changes as answers arrive."""
         described = self._robots[robot]
-        call = Call(_id("cmd"), robot, action)
+        call = Call(new_id("cmd"), robot, action)
         with self._lock:
             self._calls[call.id] = call
+        self._going.asked(call, described, input)
         if described.dialect == "rize":
             self._send(described, rize.to_command(described, action, input, call.id))
         else:
@@ -128,13 +108,13 @@ class Network:
         topic = self._topic(robot, name)
         self._subscribe(topic)
         message = self._newest.get(topic)
-        return None if message is None else _value(_payload(message))
+        return None if message is None else value_of(payload_of(message))
 
     def newest(self, topic: str) -> object:
         """The newest message, decoded only now."""
         self._subscribe(topic)
         message = self._newest.get(topic)
-        return None if message is None else _payload(message)
+        return None if message is None else payload_of(message)
 
     def publish(self, topic: str, payload: object) -> None:
         """Send a message as JSON."""
@@ -142,7 +122,7 @@ class Network:
 
     def on_sensor(self, robot: str, name: str, told: Told) -> None:
         """Tell each value of a sensor."""
-        self.on_message(self._topic(robot, name), lambda payload: told(_value(payload)))
+        self.on_message(self._topic(robot, name), lambda payload: told(value_of(payload)))
 
     def on_event(self, robot: str, name: str, told: Told) -> None:
         """Tell the data of each event."""
@@ -156,16 +136,33 @@ class Network:
 
     # ---- stopping
 
+    def rest(self) -> None:
+        """The program is paused: robots that it left in motion (a speed) stand still until `go_on`."""
+        self._going.rest()
+
+    def go_on(self) -> None:
+        """The pause is over: what was in motion is asked for again."""
+        self._going.go_on()
+
+    def _rest(self, robot: Robot) -> None:
+        """Stop one robot; what else it does ends as if the pause had taken it back."""
+        for call in list(self._calls.values()):
+            call.held = call.held or call.robot == robot.name
+        self._tell_stop(robot)
+
+    def _tell_stop(self, robot: Robot) -> None:
+        id = new_id("stop")
+        with self._arrived:
+            self._stops[id] = robot.name
+        self._send(robot, self._command(id, "stop", robot.safe_stop.action))
+
     def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
         """Tell every robot to stop and wait; the names of those that did not answer (RIZE's can't)."""
         self._ending = True
         for robot in self._robots.values():
             if robot.dialect == "rize":
                 continue
-            id = _id("stop")
-            with self._arrived:
-                self._stops[id] = robot.name
-            self._send(robot, self._command(id, "stop", robot.safe_stop.action))
+            self._tell_stop(robot)
         with self._arrived:
             self._arrived.wait_for(lambda: not self._stops, timeout_s)
         return tuple(self._stops.values())
@@ -196,14 +193,14 @@ class Network:
         for message in messages:
             self._newest[message.topic] = message
             for told in self._told.get(message.topic, ()):
-                payload = _payload(message)
+                payload = payload_of(message)
                 if payload is not None:
                     told(payload)
         self._poke()
 
     def _answers(self, messages: Sequence[Message]) -> None:
         for message in messages:
-            payload = _payload(message)
+            payload = payload_of(message)
             if isinstance(payload, Mapping):
                 self._answer(message.topic, payload)
         self._poke()
@@ -234,6 +231,7 @@ class Network:
         call.state = state
         if call.state in LAST_STATES:
             self._calls.pop(call.id, None)
+            self._going.ended(call)
 
     def _hear(self, topic: str) -> None:
         """A robot has said something: whoever waits for it knows that it lives."""
@@ -269,27 +267,9 @@ class Network:
                 if robot.dialect == "rize":
                     continue
                 try:
-                    self._send(robot, self._command(_id("alive"), "alive"))
+                    self._send(robot, self._command(new_id("alive"), "alive"))
                 except NepError:
                     return
-
-
-def _payload(message: Message) -> object:
-    """What a message says; None for one that can't be decoded, which is as good as none."""
-    try:
-        return message.payload
-    except NepError:
-        return None
-
-
-def _value(payload: object) -> object:
-    if isinstance(payload, Mapping) and set(payload) == {"value"}:
-        return payload["value"]
-    return payload
-
-
-def _id(kind: str) -> str:
-    return f"{kind}-{uuid.uuid4().hex[:12]}"
 
 
 def _nothing() -> None:

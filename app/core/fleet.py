@@ -246,6 +246,8 @@ class Fleet:
             link.watch.close()
             link.watch = None
         link.mute = False
+        if self.moving.question is not None and link.name in self.moving.question.moves:
+            self.moving.withdraw()
         self._tries.end_all(link, "failed", f"{link.name} has gone; check that it is on")
         self.revision += 1
 

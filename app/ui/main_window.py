@@ -97,7 +97,7 @@ class MainWindow(QMainWindow):
         column.addWidget(self.status)
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
-        self.question = MoveQuestion(theme, self, self.session.fleet.moving)
+        self.question = MoveQuestion(theme, self, self.session.fleet.moving, self.complain)
 
     # -- what shows -------------------------------------------------------------------------------
 

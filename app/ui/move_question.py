@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QEvent, QObject, QRectF, Qt
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QApplication, QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
@@ -40,12 +42,15 @@ class MoveQuestion(QWidget):
     The keyboard is on "Not now" first: an Enter that was meant for something else moves nothing.
     """
 
-    def __init__(self, theme: Theme, window: QWidget, moving: Moving) -> None:
+    def __init__(
+        self, theme: Theme, window: QWidget, moving: Moving, complain: Callable[[str], object]
+    ) -> None:
+        """``complain`` is told when an "always" can't be kept."""
         super().__init__(window)
         self._theme, self._moving = theme, moving
         self._seen = moving.revision
         self._before: QWidget | None = None
-        self.complaint = ""
+        self._complain = complain
         self.title = label("", "heading", wrap=True)
         self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.always = Switch(theme, "")
@@ -121,7 +126,7 @@ class MoveQuestion(QWidget):
         try:
             self._moving.answer(let=let, always=let and self.always.isChecked())
         except SettingsError as error:
-            self.complaint = error.sentence
+            self._complain(error.sentence)
         self.refresh()
 
     def _place(self) -> None:

@@ -142,3 +142,43 @@ def test_a_try_goes_on_after_the_answer(session: Session, node: nep.Node) -> Non
             session.fleet.invoke("Turtle", "move", {"distance": -0.1})
         session.fleet.moving.answer(let=True)
         tick_until(session, lambda: link.invocations["move"].state == "succeeded", FOUND_S)
+
+
+def test_a_pause_holds_a_robot_that_drives_and_go_on_lets_it_drive_again(
+    session: Session, node: nep.Node
+) -> None:
+    with Driver(turtle.ROBOT, "Turtle", node) as driver:
+        there(session, "Turtle")
+        wheels = driver.body.wheels  # type: ignore[attr-defined]
+        drive = block("robot_diffdrive_do_drive", "d", ROBOT="Turtle", SPEED=number(0), TURN=number(60))
+        wait = block("control_wait", "w", SECONDS=number(30))
+        session.document.edited(workspace(started(drive, wait)))
+        assert not [p for p in session.document.problems() if p.severity == "error"]
+        session.runs.run()
+        tick_until(session, lambda: session.runs.running_blocks == ("w",), FOUND_S)
+        tick_until(session, lambda: not wheels.still())
+        session.runs.pause()
+        tick_until(session, lambda: session.runs.view().state == "paused" and wheels.still())
+        session.runs.go_on()
+        tick_until(session, lambda: not wheels.still())
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "proven")
+        assert wheels.still()
+
+
+def test_a_step_does_not_leave_a_robot_driving(session: Session, node: nep.Node) -> None:
+    with Driver(turtle.ROBOT, "Turtle", node) as driver:
+        there(session, "Turtle")
+        wheels = driver.body.wheels  # type: ignore[attr-defined]
+        drive = block("robot_diffdrive_do_drive", "d", ROBOT="Turtle", SPEED=number(0), TURN=number(60))
+        wait = block("control_wait", "w", SECONDS=number(30))
+        session.document.edited(workspace(started(drive, wait)))
+        session.runs.step()
+        tick_until(session, lambda: session.runs.stopped_blocks == ("d",), FOUND_S)
+        session.runs.step()
+        tick_until(session, lambda: session.runs.stopped_blocks == ("w",), FOUND_S)
+        tick_until(session, wheels.still)
+        session.runs.go_on()
+        tick_until(session, lambda: not wheels.still())
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "proven")

@@ -29,7 +29,8 @@ class Window(QWidget):
         column = QVBoxLayout(self)
         column.addWidget(self.field)
         self.moving = Moving(Settings(folder))
-        self.question = MoveQuestion(Theme("light"), self, self.moving)
+        self.complaints: list[str] = []
+        self.question = MoveQuestion(Theme("light"), self, self.moving, self.complaints.append)
         self.done: list[str] = []
 
     def ask(self, *actions: str) -> None:
@@ -95,6 +96,15 @@ def test_always_is_kept(window, tmp_path) -> None:
     assert window.question.always.isChecked()
     QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
     assert Moving(Settings(tmp_path)).allowed(ROVER)
+
+
+def test_an_always_that_can_not_be_kept_is_told_and_it_moves_all_the_same(window, tmp_path) -> None:
+    (tmp_path / "settings.json").mkdir()
+    window.ask("move")
+    window.question.always.setChecked(True)
+    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    assert "settings can't be kept" in window.complaints[0]
+    assert window.done == ["moved"]
 
 
 def test_a_stop_takes_the_question_away(window) -> None:
