@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
-from PySide6.QtCore import QEventLoop, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QEventLoop, Qt, QTimer
 
 from app.core.session import Session
 from app.core.settings import Settings
@@ -71,6 +71,10 @@ def network() -> Iterator[str]:
     try:
         yield address
     finally:
+        application = QCoreApplication.instance()
+        assert application is not None
+        QTimer.singleShot(0, application.quit)
+        application.exec()  # tells pages of the web engine that the end is near
         master.kill()
         master.wait()
 

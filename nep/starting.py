@@ -14,9 +14,10 @@ import zmq
 from nep.addresses import endpoint_of, master_address
 from nep.bodies import decode_answer, encode_request
 from nep.errors import MasterUnreachable, RequestRefusedError, WireError
-from nep.requests import Done, Listen, Ping, Refused, Reply, Request
+from nep.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
+from nep.views import GraphView
 
-__all__ = ["Owner", "is_running", "listen", "start_process"]
+__all__ = ["Owner", "is_running", "listen", "look", "start_process"]
 
 
 class Owner:
@@ -42,6 +43,12 @@ class Owner:
 def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
     """Whether a master answers at `address` (default: see `master_address`) within `timeout_s` seconds."""
     return isinstance(_ask(Ping(), master_address(address), timeout_s), Done)
+
+
+def look(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
+    """Who is there now, asked without a node of one's own; None when no master answers in time."""
+    reply = _ask(Look(), master_address(address), timeout_s)
+    return reply.view if isinstance(reply, Seen) else None
 
 
 def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 2.0) -> None:

@@ -1,6 +1,6 @@
 """The benchmarks, one after the other.
 
-    python tools/bench.py                       all of them
+    python tools/bench.py                       all of them but the soak
     python tools/bench.py nep_rate -- ARGS      one; what comes after -- goes to it
 
 Exit code 1 when a run does not count because the computer was busy. See `bench/README.md`.
@@ -18,11 +18,16 @@ NAMES = (
     "nep_roundtrip",
     "nep_rate",
     "nep_logs",
+    "nep_join",
+    "nep_master",
+    "stop",
     "studio_load",
     "studio_images",
     "studio_topics",
     "studio_start",
 )
+LONG = ("soak",)
+"""Those that take a quarter of an hour run only when they are asked for."""
 
 
 def main() -> int:
@@ -31,7 +36,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("names", nargs="*", choices=[*NAMES, []], help="which; all when none is given")
+    parser.add_argument("names", nargs="*", choices=[*NAMES, *LONG, []], help="which; all when none is given")
     names = parser.parse_args(own.split() if dashes else None).names or NAMES
     codes = []
     for name in names:

@@ -9,14 +9,15 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from typing import Protocol
 
 import nep
 from nep.errors import NepError
-from nep.masters import is_running
 from nep.message import Message
 from nep.nodes import Node
 from nep.pubsub import Subscriber
+from nep.starting import look
 from nep.views import GraphView
 
 POLL_S = 0.4
@@ -180,11 +181,12 @@ class LiveSource:
                 self._node.close()
 
     def _join(self) -> bool:
-        if not is_running(self.address, timeout_s=0.5):
+        view = look(self.address, timeout_s=0.5)
+        if view is None:
             self._lost(f"no master answers at {self.address}")
             return False
         try:
-            self._node = nep.node(NODE_NAME, master=self.address)
+            self._node = nep.node(_free_name(view), master=self.address)
         except NepError as error:
             self._lost(str(error))
             return False
@@ -272,6 +274,13 @@ class LiveSource:
     def _deliver(self, topic: str, messages: Sequence[Message]) -> None:
         for sink in self._sinks:
             sink(topic, messages)
+
+
+def _free_name(view: GraphView) -> str:
+    """The node's name; a second Studio on this network has its number behind it."""
+    taken = {node.name for node in view.nodes.values()}
+    others = (f"{NODE_NAME} {number}" for number in count(2))
+    return NODE_NAME if NODE_NAME not in taken else next(name for name in others if name not in taken)
 
 
 def _nothing(_node: Node) -> None:

@@ -1,0 +1,214 @@
+"""The window for a long time, with everything on: memory stays flat, and handles are given back.
+
+    python bench/soak.py [--minutes 15] [--csv build/soak.csv]
+
+The real window with a virtual robot whose camera shows, a behaviour that moves it for ever, and a person's
+restless hands: layouts, panels and topics change every two seconds, the program is stopped and run again.
+Sampled are the memory (of each process what it does not share), handles and threads of this process and all
+that it started. After a warm-up of a third a line is fitted: what it rises until the end must stay within
+6 % of the memory, or 12 MB, and handles and threads must not rise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import astuple, dataclass, fields
+from itertools import cycle
+from pathlib import Path
+
+import psutil
+from studio_window import Studio, network, percentile, run_for, studio, until
+
+ROOT = Path(__file__).resolve().parents[1]
+EVERY_S, STEP_S = 2.5, 2.0
+RISE_SHARE, RISE_MB, MORE = 0.06, 12.0, 8
+BARS = "▁▂▃▄▅▆▇█"
+PANELS = ("image", "console", "alerts", "nodes", "sensors", "robots")
+PEPPER = json.loads((ROOT / "resources/examples/1-greeting.nepb").read_text("utf-8"))["robots"]
+
+
+def shadow(kind: str, field: str, value: object) -> dict[str, object]:
+    """A block in a hole."""
+    return {"shadow": {"type": kind, "id": f"{kind} {value}", "fields": {field: value}}}
+
+
+def behaviour() -> dict[str, object]:
+    """Turns, and says so, for ever."""
+    pepper: dict[str, object] = {"ROBOT": "Pepper"}
+    say = {
+        "type": "robot_pepper_do_say",
+        "id": "say",
+        "fields": pepper,
+        "inputs": {"TEXT": shadow("values_text", "TEXT", "Round and round")},
+    }
+    turn = {
+        "type": "robot_pepper_do_turn",
+        "id": "turn",
+        "fields": {**pepper, "DIRECTION": "left"},
+        "inputs": {"ANGLE": shadow("values_number", "NUMBER", 45)},
+        "next": {"block": say},
+    }
+    loop = {"type": "control_forever", "id": "forever", "inputs": {"BODY": {"block": turn}}}
+    start = {"type": "events_started", "id": "started", "x": 56, "y": 56, "next": {"block": loop}}
+    return {
+        "format": "nep-behaviour",
+        "version": 1,
+        "name": "Soak",
+        "workspace": {"blocks": {"languageVersion": 0, "blocks": [start]}},
+        "robots": PEPPER,
+    }
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One moment: seconds since the beginning, memory in MB, and how many of the rest."""
+
+    at_s: float
+    studio_mb: float
+    others_mb: float
+    processes: int
+    handles: int
+    threads: int
+    window_ms: float
+
+
+def take(began: float, opened: Studio) -> Sample:
+    """Look at this process and all that it started."""
+    own = psutil.Process()
+    others_mb, processes = 0.0, 0
+    for other in own.children(recursive=True):
+        try:
+            others_mb += other.memory_full_info().uss / 1e6
+            processes += 1
+        except psutil.Error:
+            continue  # it has just ended
+    return Sample(
+        round(time.monotonic() - began, 1),
+        round(own.memory_full_info().uss / 1e6, 1),
+        round(others_mb, 1),
+        processes,
+        own.num_fds() if hasattr(own, "num_fds") else own.num_handles(),
+        own.num_threads(),
+        round(opened.session.tick_ms, 2),
+    )
+
+
+def hands(opened: Studio) -> Iterator[Callable[[], object]]:
+    """What a restless person does, one thing after the other, for ever."""
+    commands, session = opened.commands, opened.session
+    panels, topics = cycle(PANELS), cycle(range(7))
+
+    def inspect() -> object:
+        live = sorted(topic.name for topic in session.topics.live())
+        return commands.run(f"inspect:{live[next(topics) * 5 % len(live)]}") if live else None
+
+    def toggle() -> object:
+        name, bench = next(panels), opened.window.bench
+        if bench is None or name not in opened.window.panels:
+            return None
+        return bench.docks[name].close() if name in bench.open_names() else bench.open(name)
+
+    def run() -> object:
+        return None if session.runs.active else session.runs.run()
+
+    while True:
+        yield lambda: commands.run("layout.developer")
+        yield inspect
+        yield toggle
+        yield inspect
+        yield lambda: commands.run("layout.behaviour")
+        yield toggle
+        yield run
+        yield toggle
+        yield lambda: commands.run("theme.dark")
+        yield inspect
+        yield lambda: commands.run("theme.light")
+        yield session.runs.stop
+        yield lambda: commands.run("layout.behaviour")
+        yield run
+
+
+def soak(opened: Studio, seconds: float) -> list[Sample]:
+    """Live so long; the samples."""
+    began, doing, samples = time.monotonic(), hands(opened), []
+    next_step = next_sample = began
+    while (now := time.monotonic()) < began + seconds:
+        if now >= next_step:
+            next_step = now + STEP_S
+            next(doing)()
+        if now >= next_sample:
+            next_sample = now + EVERY_S
+            samples.append(take(began, opened))
+        run_for(0.1)
+    return samples
+
+
+def rise(samples: Sequence[Sample], values: Sequence[float]) -> float:
+    """How much a fitted line rises from the first of these samples to the last."""
+    slope = statistics.linear_regression([sample.at_s for sample in samples], values).slope
+    return slope * (samples[-1].at_s - samples[0].at_s)
+
+
+def chart(values: Sequence[float], width: int = 60) -> str:
+    """The values as a line of bars, from the least to the most."""
+    least, most = min(values), max(values)
+    chosen = [values[n * (len(values) - 1) // max(1, width - 1)] for n in range(min(width, len(values)))]
+    return "".join(BARS[round((value - least) / ((most - least) or 1) * 7)] for value in chosen)
+
+
+def judge(samples: Sequence[Sample]) -> bool:
+    """Print the table; whether everything stayed flat after the warm-up."""
+    warm = samples[len(samples) // 3 :]
+    flat = True
+    print(f"{'':>10} {'first':>8} {'warm':>8} {'last':>8} {'most':>8} {'rise':>8} {'may':>7}")
+    for name in ("studio_mb", "others_mb", "handles", "threads"):
+        values = [float(getattr(sample, name)) for sample in warm]
+        risen = rise(warm, values)
+        may = max(RISE_MB, RISE_SHARE * values[0]) if name.endswith("mb") else float(MORE)
+        well = risen <= may
+        flat &= well
+        first = float(getattr(samples[0], name))
+        print(
+            f"{name:>10} {first:>8.1f} {values[0]:>8.1f} {values[-1]:>8.1f} {max(values):>8.1f} "
+            f"{risen:>+8.1f} {may:>7.1f}  {'flat' if well else 'RISES'}"
+        )
+        print(f"{'':>11}{chart([float(getattr(sample, name)) for sample in samples])}")
+    window = [sample.window_ms for sample in warm]
+    print(f"session's tick: median {statistics.median(window):.2f} ms, p95 {percentile(window, 95):.2f} ms")
+    return flat
+
+
+def main() -> int:
+    """Live, print a table and write the samples; 0 when everything stayed flat."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--minutes", type=float, default=15.0)
+    parser.add_argument("--csv", type=Path, default=ROOT / "build" / "soak.csv")
+    arguments = parser.parse_args()
+    with network() as address, studio(address, "behaviour") as opened:
+        session = opened.session
+        file = session.settings.path.parent / "Soak.nepb"
+        file.write_text(json.dumps(behaviour()), encoding="utf-8")
+        opened.commands.files.open(file)
+        session.companions.start_virtual_robot("Pepper")
+        until(lambda: session.fleet.connected, "the virtual robot is there", 60.0)
+        session.runs.run()
+        until(lambda: session.runs.running_blocks, "the behaviour runs", 30.0)
+        samples = soak(opened, arguments.minutes * 60)
+    arguments.csv.parent.mkdir(parents=True, exist_ok=True)
+    with arguments.csv.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow([field.name for field in fields(Sample)])
+        writer.writerows(astuple(sample) for sample in samples)
+    flat = judge(samples)
+    print(f"{len(samples)} samples in {arguments.csv}; {'flat' if flat else 'NOT flat'}")
+    return 0 if flat else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""The live source: its node's name, what it missed, and how often it asks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import nep
+from app.core.source import GraphSeen, LiveSource, MasterFound, MasterLost
+from nep.logs import LOG_TOPIC, LOG_TYPE
+from nep.masters import Master
+from nep.starting import look
+from tests.e2e.waiting import until
+
+
+@pytest.fixture
+def events() -> list[object]:
+    return []
+
+
+@pytest.fixture
+def sources(master: Master, events: list[object]) -> Iterator[list[LiveSource]]:
+    made: list[LiveSource] = []
+
+    yield made
+    for source in made:
+        source.close()
+
+
+def begin(address: str, events: list[object], made: list[LiveSource]) -> LiveSource:
+    source = LiveSource(address, [], events.append, always={LOG_TOPIC: LOG_TYPE})
+    made.append(source)
+    source.start()
+    return source
+
+
+def names(address: str) -> list[str]:
+    view = look(address)
+    return sorted(node.name for node in view.nodes.values()) if view is not None else []
+
+
+def test_a_second_studio_has_a_name_of_its_own(
+    master: Master, events: list[object], sources: list[LiveSource]
+) -> None:
+    for wanted in (["studio"], ["studio", "studio 2"], ["studio", "studio 2", "studio 3"]):
+        begin(master.address, events, sources)
+        until(lambda wanted=wanted: names(master.address) == wanted, f"{wanted} are there")
+    assert not master.view().alerts
+    sources[1].close()
+    until(lambda: names(master.address) == ["studio", "studio 3"], "the second has left")
+    begin(master.address, events, sources)
+    until(lambda: names(master.address) == ["studio", "studio 2", "studio 3"], "its name is used again")
+
+
+def test_it_tells_that_there_is_no_master_once(events: list[object]) -> None:
+    source = LiveSource("127.0.0.1:1", [], events.append)
+    source.start()
+    try:
+        until(lambda: events, "it is told")
+    finally:
+        source.close()
+    assert [type(event) for event in events] == [MasterLost]
+
+
+def test_what_did_not_arrive_is_counted_from_the_watch_on(
+    master: Master, events: list[object], sources: list[LiveSource]
+) -> None:
+    source = begin(master.address, events, sources)
+    with nep.node("talker") as node:
+        publisher = node.new_pub("/a", "json")
+        source.watch("/a")
+        until(lambda: publisher.subscribers == 1, "it listens")
+        publisher.publish(1)
+        until(lambda: source.missed().get("/a") == 0, "nothing was lost")
+        _, subscriber = source._subscribers["/a"]
+        subscriber._inlet._readable.sources.lost += 5  # as libzmq does when nobody reads for long
+        assert source.missed()["/a"] == 5
+        source.watch("/a")  # somebody looks anew
+        assert source.missed()["/a"] == 0
+        source.unwatch("/a")
+        until(lambda: "/a" not in source.missed(), "nobody looks")
+    assert {type(event) for event in events} == {MasterFound, GraphSeen}

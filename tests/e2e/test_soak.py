@@ -1,0 +1,37 @@
+"""A minute of everything at once: memory, handles and threads stay flat."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.x11 import Screen
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+def test_a_minute_of_everything_leaves_memory_and_handles_flat(screen: Screen, tmp_path: Path) -> None:
+    samples = tmp_path / "soak.csv"
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "bench" / "soak.py"), "--minutes", "1", "--csv", str(samples)],
+        cwd=ROOT,
+        env={
+            **os.environ,
+            "DISPLAY": screen.display,
+            "QT_QPA_PLATFORM": "xcb",
+            "QT_QUICK_BACKEND": "software",
+            "PYTHONPATH": str(ROOT),
+        },
+        capture_output=True,
+        text=True,
+        timeout=170,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr[-3000:]
+    assert len(samples.read_text().splitlines()) > 5
