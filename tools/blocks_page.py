@@ -14,6 +14,7 @@ sys.path.insert(0, str(ROOT))
 
 from app.blocks.block import Block  # noqa: E402
 from app.blocks.catalogue import categories  # noqa: E402
+from app.blocks.examples import EXAMPLES  # noqa: E402
 
 PAGE = ROOT / "docs" / "blocks.md"
 BEGIN, END = "<!-- blocks: made by tools/blocks_page.py -->", "<!-- end of blocks -->"
@@ -40,7 +41,7 @@ def page(text: str) -> str:
 
 def _row(block: Block) -> str:
     told = " ".join(_HOLE.sub(lambda hole: f"({hole[1].lower()})", block.text).split())
-    does = " ".join(part for part in (block.tooltip, block.help) if part)
+    does = " ".join(part for part in (block.tooltip, block.help, EXAMPLES[block.type]) if part)
     return f"| {told} | {does} | {_python(block)} |"
 
 

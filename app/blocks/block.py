@@ -62,6 +62,7 @@ class Block:
     calls: bool = False  # runs blocks of another place
     undefined: str = ""  # why it can't run: nobody defined what it calls
     in_toolbox: bool = True
+    about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> its name, more about it
     help: str = ""  # for people who ask: more than the tooltip, with an example
     words: tuple[str, ...] = ()  # other words that people look for it by
 

@@ -28,6 +28,9 @@ class Calls:
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._mine = threading.local()
+
+    def begin(self) -> None:
+        """Let Python go as deep as functions may; for the whole process, which is the program's."""
         sys.setrecursionlimit(max(sys.getrecursionlimit(), _FRAMES))
 
     def run(self, block: str, name: str, call: Callable[[], object]) -> object:

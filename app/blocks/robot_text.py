@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from app.blocks.fields import Argument, ChoiceField, ColourField, Field, NumberField, TextField, ValueInput
 from app.robots.description import Parameter
+from app.robots.inputs import pretty_number, pretty_unit
 
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 _RESERVED = ("ROBOT", "LIVE", "FIELD", "SENSOR", "SIDE", "LIMIT", "X_NAME", "X_INPUT", "X_FIELD", "ICON")
@@ -85,6 +86,20 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
         number = default if isinstance(default, (int, float)) else 0
         return NumberField(name, number, parameter.minimum, parameter.maximum)
     return TextField(name, default if isinstance(default, str) else "hello")
+
+
+def about(parameter: Parameter) -> str:
+    """More about a parameter than its kind: its limits, its unit."""
+    unit = f" {pretty_unit(parameter.unit)}" if parameter.unit else ""
+    low = None if parameter.minimum is None else pretty_number(parameter.minimum)
+    high = None if parameter.maximum is None else pretty_number(parameter.maximum)
+    if low is not None and high is not None:
+        return f"from {low} to {high}{unit}"
+    if low is not None:
+        return f"at least {low}{unit}"
+    if high is not None:
+        return f"at most {high}{unit}"
+    return f"in{unit}" if unit else ""
 
 
 def _yes_no(title: str) -> tuple[str, str]:

@@ -68,6 +68,7 @@ class Runtime:
         """Begin all scripts; the program's text has run, so its hats are known."""
         self._link = link
         self._robots = {robot.name: robot for robot in robots}
+        self._calls.begin()
         link.listen(self.scheduler.poke, self._stopped_outside)
         for subscribe in self._subscriptions:
             subscribe(link)

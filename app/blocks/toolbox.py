@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from app.blocks.catalogue import Catalogue, categories
 from app.blocks.category import Category, Entry, Group
+from app.blocks.helping import help_of
 from app.robots.description import Robot
 
 STYLES = ("events", "control", "values", "variables", "functions", "messages", "robot", "sensors")
@@ -16,13 +17,15 @@ def editor_definitions(
 ) -> dict[str, object]:
     """Definitions for the editor.
 
-    ``blocks`` are Blockly's JSON definitions of all categories and of all robots, connected or `absent`;
+    ``blocks`` are Blockly's JSON definitions of all categories and of all robots, connected or `absent`,
+    ``help`` what people are told about them (`app.blocks.helping`);
     ``toolbox`` is a category toolbox; ``styles`` are the names of the styles; ``robots`` and ``topics`` are
     what the drop-downs offer.
     """
     catalogue = Catalogue(robots, absent)
     return {
         "blocks": [block.to_blockly() for block in catalogue.blocks.values()],
+        "help": {block.type: help_of(block) for block in catalogue.blocks.values()},
         "toolbox": _toolbox(catalogue),
         "styles": list(STYLES),
         "robots": {

@@ -24,6 +24,7 @@ class BlocklyBridge(QObject):
     block_chosen = Signal(str)
     answered = Signal(int, str)  # token of a flush, workspace as JSON
     went_wrong = Signal(str)
+    block_focused = Signal(bool)  # whether the keys go to a block
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -57,6 +58,10 @@ class BlocklyBridge(QObject):
     @Slot(int, str)
     def flushed(self, token: int, workspace: str) -> None:
         self.answered.emit(token, workspace)
+
+    @Slot(bool)
+    def on_block(self, has: bool) -> None:
+        self.block_focused.emit(has)
 
     @Slot(str)
     def failed(self, sentence: str) -> None:

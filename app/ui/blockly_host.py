@@ -42,6 +42,8 @@ class BlocklyHost(QWidget):
         self._up_since = 0.0
         self._bridge = BlocklyBridge(self._beginning, self)
         self._bridge.came_up.connect(self._came_up)
+        self._on_block = False
+        self._bridge.block_focused.connect(self._block_focused)
         self._bridge.went_wrong.connect(lambda sentence: _log.error("block editor: %s", sentence))
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
@@ -94,11 +96,18 @@ class BlocklyHost(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
             self._watch_keys()
+        overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
+        if overrides and _is_help(cast("QKeyEvent", event)):
+            event.accept()  # on a block, F1 is for the block: the window's own F1 does not get it then
+            return True
         if event.type() == QEvent.Type.KeyPress:
             key = cast("QKeyEvent", event)
             # A shortcut of the window has had its turn before a key press arrives here.
             if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
-                self.key_pressed.emit(QKeySequence(key.key()).toString())
+                if self._on_block and _is_help(key):
+                    self._tell("help", None)
+                else:
+                    self.key_pressed.emit(QKeySequence(key.key()).toString())
                 return True
         return super().eventFilter(watched, event)
 
@@ -130,9 +139,15 @@ class BlocklyHost(QWidget):
     def _watch_keys(self) -> None:
         """The widget that gets the keys is made by the web engine, and made again with a new process."""
         keyboard = self._web.keyboard() if self._web is not None else None
+        if self._web is not None:
+            self._web.view.setAcceptDrops(False)
         if keyboard is not None:
+            if isinstance(keyboard, QWidget):
+                keyboard.setAcceptDrops(False)  # files that are dropped here are the window's
             keyboard.removeEventFilter(self)
             keyboard.installEventFilter(self)
+            if isinstance(keyboard, QWidget):
+                keyboard.setAcceptDrops(False)  # a dropped file is for the window, which opens it
 
     def _beginning(self) -> Json:
         if not self._theme:
@@ -146,6 +161,9 @@ class BlocklyHost(QWidget):
         mode = colours.get("dark" if self._theme["dark"] else "light", colours)
         return QColor(str(cast("Mapping[str, object]", mode)["workspace"]))
 
+    def _block_focused(self, has: bool) -> None:
+        self._on_block = has
+
     def _came_up(self) -> None:
         self._up = True
         self._up_since = time.monotonic()
@@ -158,7 +176,7 @@ class BlocklyHost(QWidget):
 
     def _died(self, _status: QWebEnginePage.RenderProcessTerminationStatus, code: int) -> None:
         _log.warning("the web process of the block editor ended (code %d); it is started again", code)
-        self._up = False
+        self._up = self._on_block = False
         self._had_died = True
         self._page_went()
         if time.monotonic() - self._up_since > _STABLE_S:
@@ -167,3 +185,7 @@ class BlocklyHost(QWidget):
         self._deaths += 1
         if self._web is not None:
             QTimer.singleShot(delay, self._web.page, self._web.start)
+
+
+def _is_help(key: QKeyEvent) -> bool:
+    return key.key() == Qt.Key.Key_F1 and key.modifiers() == Qt.KeyboardModifier.NoModifier

@@ -80,6 +80,11 @@ class BlocklyView(BlocklyHost):
         self._tabs.shown.in_page = False
         self._send_tab()
 
+    def change(self, workspace: Mapping[str, object]) -> None:
+        """Change the shown tab's program as one edit, which undo takes back; `changed` does not tell it."""
+        self._tabs.shown.workspace = dict(workspace)
+        self._tell("change", self._tabs.shown.workspace)
+
     def flush(self, done: Callable[[Json], None]) -> None:
         """Ask for the newest program of the shown tab now.
 
@@ -148,6 +153,18 @@ class BlocklyView(BlocklyHost):
     def zoom_to_fit(self) -> None:
         """Show the whole program."""
         self._tell("fit", None)
+
+    def open_find(self) -> None:
+        """Open the bar that finds blocks in the shown program."""
+        self._tell("find", None)
+
+    def open_search(self) -> None:
+        """Let the keys go to the field that finds blocks in the toolbox."""
+        self._tell("search", None)
+
+    def show_help(self) -> None:
+        """Show the help of the block that the keys go to, if there is one."""
+        self._tell("help", None)
 
     def show_block(self, id: str) -> None:
         """Bring the block to the middle and select it."""

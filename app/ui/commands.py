@@ -47,6 +47,14 @@ class ShowsBlocks(Protocol):
         """Scroll to a block by its id."""
 
 
+@runtime_checkable
+class FindsBlocks(Protocol):
+    """A panel that finds blocks by words."""
+
+    def find_blocks(self, *, to_add: bool) -> None:
+        """Ask for the words: of blocks in the behaviour, or of blocks to add."""
+
+
 class Commands:
     """Gives a window its menus, shortcuts and named commands."""
 
@@ -89,6 +97,8 @@ class Commands:
             "file.quit": window.close,
             "edit.undo": lambda: self._edit("undo"),
             "edit.redo": lambda: self._edit("redo"),
+            "blocks.find": self._find_in_blocks,
+            "blocks.search": lambda: self._find_in_blocks(to_add=True),
             "run.run": self._run_or_go_on,
             "run.pause": session.runs.pause,
             "run.step": lambda: files.with_newest(session.runs.step),
@@ -186,6 +196,12 @@ class Commands:
         editor = self._editor()
         if isinstance(editor, Undoes):
             (editor.undo if what == "undo" else editor.redo)()
+
+    def _find_in_blocks(self, *, to_add: bool = False) -> None:
+        self._show("behaviour")
+        editor = self._editor()
+        if isinstance(editor, FindsBlocks):
+            editor.find_blocks(to_add=to_add)
 
     def _run_or_go_on(self) -> None:
         runs = self._session.runs

@@ -166,9 +166,11 @@ def test_a_closed_tab_is_forgotten(qtbot, view, two) -> None:
 
 @pytest.mark.web
 def test_the_keys_go_to_the_tab_that_is_shown(qtbot, view, two) -> None:
-    two.click(PATH, dy=30)
+    with qtbot.waitSignal(view.block_selected, timeout=WAIT_MS, check_params_cb=lambda id: id == "start"):
+        two.click(PATH, dy=30)
     two.press(Qt.Key_C, Qt.ControlModifier)
     turn_to(two, "b")
+    two.wait_for(f"{SHOWN}.contains(document.activeElement)")
     two.press(Qt.Key_V, Qt.ControlModifier)
     qtbot.waitUntil(lambda: [top["type"] for top in two.tops()] == ["control_wait", "events_started"],
                     timeout=WAIT_MS)  # fmt: skip

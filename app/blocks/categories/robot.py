@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from app.blocks.block import Block, RobotUse
 from app.blocks.category import Category, Entry, Group
 from app.blocks.fields import ChoiceField, LiveField, NumberField, robot_field
-from app.blocks.robot_text import TextParts, field_of, input_of, type_of
+from app.blocks.robot_text import TextParts, about, field_of, input_of, type_of
 from app.robots.description import Action, Event, Robot, Sensor
 
 _ICONS = {
@@ -89,6 +89,8 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         constants={"X_NAME": action.name} | ({} if returns is None else {"X_FIELD": returns}),
         keywords={"X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)},
         robot=RobotUse("action", action.name, action.title, robot.model),
+        about={argument.name: (parameter.title, about(parameter)) for parameter, argument in inputs},
+        words=(action.category, action.name),
     )
 
 

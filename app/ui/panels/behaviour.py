@@ -234,6 +234,13 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.redo()
 
+    def find_blocks(self, *, to_add: bool) -> None:
+        """Let the keys go to the field that finds blocks in the behaviour, or blocks to add."""
+        self.set_mode("blocks")
+        if self.editor is not None:
+            self.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            (self.editor.open_search if to_add else self.editor.open_find)()
+
     def show_block(self, block: str) -> None:
         """Show the blocks, and this one in the middle."""
         self.set_mode("blocks")

@@ -31,6 +31,11 @@ export class FieldIcon extends Blockly.FieldImage {
     this.value_ = value;
   }
 
+  /** A picture says nothing that the block's words do not. */
+  override computeAriaLabel(): string {
+    return '';
+  }
+
   static override fromJson(config: Blockly.FieldConfig): FieldIcon {
     const {icon, name, size, alt} = config as IconConfig;
     return new FieldIcon(icon ?? name ?? '', size ?? 20, alt ?? '');
@@ -97,7 +102,17 @@ const PALETTE: readonly [string, string][] = [
   ['green', '#34c759'], ['cyan', '#3db8ff'], ['blue', '#0a5cff'], ['purple', '#af52de'],
   ['pink', '#ff5fa2'], ['off', '#000000'],
 ];
+const COLUMNS = 5;
 const CHIP = {width: 39, height: 23};
+
+/** The name of the palette's colour that is most like this one. */
+function nearest(colour: string): string {
+  const parts = (hex: string) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+  const wanted = parts(colour);
+  const far = ([, hex]: readonly [string, string]) =>
+    parts(hex).reduce((sum, value, at) => sum + (value - (wanted[at] ?? 0)) ** 2, 0);
+  return PALETTE.reduce((one, other) => (far(other) < far(one) ? other : one))[0];
+}
 
 /** A colour "#rrggbb" as a chip; clicking it opens a small palette with a field for any other. */
 export class FieldColourChip extends Blockly.Field {
@@ -121,6 +136,16 @@ export class FieldColourChip extends Blockly.Field {
     }
     this.fieldGroup_?.append(this.chip);
     this.clickTarget_ = this.fieldGroup_;
+    this.recomputeAriaContext();
+  }
+
+  override getAriaTypeName(): string {
+    return 'colour';
+  }
+
+  override getAriaValue(): string {
+    const words = this.getText();
+    return words.startsWith('#') ? `like ${nearest(words)}` : words;
   }
 
   protected override updateSize_(): void {
@@ -130,6 +155,7 @@ export class FieldColourChip extends Blockly.Field {
   protected override render_(): void {
     this.updateSize_();
     this.chip?.setAttribute('style', `fill:${this.value_ ?? ''}`);
+    this.recomputeAriaContext();
   }
 
   /** Where the palette points to; without this it would be the whole block. */
@@ -169,15 +195,28 @@ export class FieldColourChip extends Blockly.Field {
     other.setAttribute('aria-label', 'other colour, # and six digits');
     other.oninput = () => other.classList.toggle('wrong', this.doClassValidation_(other.value) === null);
     other.onkeydown = (event) => {
-      event.stopPropagation();
       if (event.key === 'Enter' && this.doClassValidation_(other.value) !== null) this.choose(other.value);
-      if (event.key === 'Escape') Blockly.DropDownDiv.hideIfOwner(this, true);
     };
     box.append(other);
+    box.onkeydown = (event) => this.onPaletteKey(event, box);
     content.append(box);
     Blockly.DropDownDiv.setColour('var(--nep-raised)', 'var(--nep-borderStrong)');
     Blockly.DropDownDiv.showPositionedByField(this);
     (box.querySelector('[aria-pressed=true]') as HTMLElement | null ?? other).focus();
+  }
+
+  /** Arrows go from colour to colour, Tab to the field below and back, Esc leaves all as it was. */
+  private onPaletteKey(event: KeyboardEvent, box: HTMLElement): void {
+    event.stopPropagation();
+    const swatches = [...box.querySelectorAll('button')];
+    const other = box.querySelector('input');
+    const at = swatches.indexOf(document.activeElement as HTMLButtonElement);
+    const by = {ArrowRight: 1, ArrowLeft: -1, ArrowDown: COLUMNS, ArrowUp: -COLUMNS}[event.key];
+    if (event.key === 'Escape') Blockly.DropDownDiv.hideIfOwner(this, true);
+    else if (event.key === 'Tab') (at < 0 ? swatches[0] : other)?.focus();
+    else if (by !== undefined && at >= 0) swatches[(at + by + swatches.length) % swatches.length]?.focus();
+    else return;
+    event.preventDefault();
   }
 
   private choose(value: string): void {

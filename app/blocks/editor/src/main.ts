@@ -2,8 +2,10 @@
 import * as Blockly from 'blockly/core';
 import './fields';
 import './shapes';
+import {HelpCard, focusedBlock, offerHelp} from './help';
 import {iconElement} from './icons';
 import {trimMenu} from './menu';
+import {FindBar} from './search';
 import {type Tab} from './tab';
 import {type Definitions, type Shown, Tabs} from './tabs';
 import {putVariables} from './theme';
@@ -18,6 +20,7 @@ interface Bridge {
   selected(id: string): void;
   flushed(token: number, json: string): void;
   failed(sentence: string): void;
+  on_block(has: boolean): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -25,13 +28,18 @@ declare const qt: {webChannelTransport: unknown};
 
 class Editor {
   private readonly tabs: Tabs;
+  private readonly help = new HelpCard();
+  private readonly find = new FindBar(() => this.shown.workspace);
 
   constructor(private readonly bridge: Bridge) {
     const ofShown = (tab: Tab, tell: () => void) => {
       if (tab === this.tabs?.shown) tell();
     };
     this.tabs = new Tabs(document.getElementById('workspace')!, {
-      changed: (tab, json) => bridge.changed(tab.key, tab.generation, json),
+      changed: (tab, json) => {
+        bridge.changed(tab.key, tab.generation, json);
+        this.find.again();
+      },
       history: (tab, canUndo, canRedo) => ofShown(tab, () => bridge.history(canUndo, canRedo)),
       selected: (tab, id) => ofShown(tab, () => bridge.selected(id)),
     });
@@ -39,6 +47,20 @@ class Editor {
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.shown.program.flush());
     this.makeZoomButtons();
+    offerHelp((block) => this.help.show(block));
+    let told = false;
+    const tellBlock = () => queueMicrotask(() => {
+      const has = focusedBlock() !== null;
+      if (has !== told) bridge.on_block(told = has);
+    });
+    document.addEventListener('focusin', tellBlock);
+    document.addEventListener('focusout', tellBlock);
+    document.addEventListener('keydown', (event) => {
+      if (event.key.toLowerCase() !== 'f' || event.altKey || !(event.ctrlKey || event.metaKey)) return;
+      event.preventDefault();
+      if (event.shiftKey) this.shown.search();
+      else this.find.open();
+    }, true);
   }
 
   receive(name: string, payload: string): void {
@@ -55,7 +77,7 @@ class Editor {
     theme: (it: {tokens: Tokens; dark: boolean}) => this.setTheme(it.tokens, it.dark),
     motion: (it: {reduced: boolean}) => document.documentElement.classList.toggle('reduced', it.reduced),
     definitions: (it: Definitions) => this.tabs.define(it),
-    tab: (it: Shown) => this.tabs.show(it),
+    tab: (it: Shown) => this.showTab(it),
     close: (key: string) => this.tabs.close(key),
     highlight: (ids: string[]) => this.shown.states.highlight(ids),
     stopped: (ids: string[]) => this.shown.states.markStopped(ids),
@@ -63,12 +85,22 @@ class Editor {
     absent: (ids: string[]) => this.shown.states.setAbsent(ids),
     live: (values: Record<string, string>) => this.shown.states.setLive(values),
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
+    change: (state: Record<string, unknown>) => this.shown.change(state),
     undo: () => this.shown.program.undo(false),
     redo: () => this.shown.program.undo(true),
     zoom: (steps: number) => this.shown.workspace.zoomCenter(steps),
     fit: () => this.shown.fit(),
     show: (id: string) => this.shown.reveal(id),
+    help: () => this.help.show(focusedBlock()),
+    find: () => this.find.open(),
+    search: () => this.shown.search(),
   };
+
+  private showTab(it: Shown): void {
+    this.help.close();
+    this.tabs.show(it);
+    this.find.again();
+  }
 
   private setTheme(tokens: Tokens, dark: boolean): void {
     useTokens(tokens, dark);

@@ -61,6 +61,14 @@ export class Tab {
     this.states.forget();
   }
 
+  /** Another program in the place of this one, as an edit that can be undone. */
+  change(state: Record<string, unknown>): void {
+    this.letGo();
+    this.program.change(state);
+    this.functions.refresh();
+    this.states.restore();
+  }
+
   show(): void {
     this.frame.hidden = false;
     Blockly.common.setMainWorkspace(this.workspace);
@@ -139,6 +147,12 @@ export class Tab {
         for (const field of block.getFields()) if (field instanceof FieldChoice) field.refresh();
       }
     }
+  }
+
+  /** The keys go to the field that finds blocks in the toolbox. */
+  search(): void {
+    const toolbox = this.workspace.getToolbox();
+    if (toolbox instanceof Toolbox) toolbox.focusSearch();
   }
 
   /** Whether a block is in the hand here. */

@@ -2,6 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {type BlockDefinition, define, defineSources} from './definitions';
 import {type Option} from './choices';
+import {type BlockHelp, useHelp} from './help';
 import {Tab, type TabListener} from './tab';
 
 const BUSY_MS = 60;
@@ -10,6 +11,7 @@ export interface Definitions {
   blocks?: BlockDefinition[];
   toolbox?: {contents?: unknown[]};
   topics?: string[];
+  help?: Record<string, BlockHelp>;
   sources?: Record<string, Option[]>;
 }
 
@@ -95,6 +97,7 @@ export class Tabs {
     const definitions = this.waiting;
     this.waiting = null;
     if (!definitions) return;
+    useHelp(definitions.help ?? {});
     const {changed, sources} = define(definitions.blocks ?? []);
     const topics = (definitions.topics ?? []).map((each): Option => [each, each]);
     const more = defineSources({topics, ...definitions.sources});

@@ -1,6 +1,7 @@
 // The toolbox of the design: tiles with icons, headings, robots (UI.md §8).
 import * as Blockly from 'blockly/core';
 import {iconElement, iconName} from './icons';
+import {SEARCH, SearchItem} from './search_item';
 
 type Def = Record<string, unknown>;
 
@@ -89,7 +90,8 @@ function withIds(def: Items): Items {
     const dynamic = text(item['dynamic']);
     return {...item, ...(dynamic && {custom: dynamic}), toolboxitemid: text(item['toolboxitemid']) || `category ${section} / ${name}`};
   });
-  return {...def, contents: empty ? [...contents, none] : contents};
+  const search = {kind: SEARCH, toolboxitemid: 'search'};
+  return {...def, contents: [search, ...contents, ...(empty ? [none] : [])]};
 }
 
 export class Toolbox extends Blockly.Toolbox {
@@ -97,6 +99,50 @@ export class Toolbox extends Blockly.Toolbox {
   /** What each category was made of; Blockly writes into the contents it is given. */
   private made = new Map<string, string>();
   private given: Def[] = [];
+
+  /** Every block of every category, each once. */
+  allEntries(): Def[] {
+    const seen = new Set<string>();
+    const offered = this.given.flatMap((item) => {
+      const dynamic = text(item['dynamic']);
+      const made = dynamic && this.workspace_.getToolboxCategoryCallback(dynamic)?.(this.workspace_);
+      return (Array.isArray(made) ? made : item['contents'] ?? []) as Def[];
+    });
+    return offered.filter((each) => {
+      const key = JSON.stringify(each);
+      if (each['kind'] !== 'block' || seen.has(key)) return false;
+      return seen.add(key);
+    });
+  }
+
+  /** Shows these blocks in place of a category; null closes them. */
+  showFound(entries: unknown[] | null): void {
+    this.clearSelection();
+    const flyout = this.getFlyout();
+    if (entries) flyout?.show(entries as Blockly.utils.toolbox.FlyoutItemInfoArray);
+    else flyout?.hide();
+  }
+
+  /** The keys go to the first block that was found; with a key press it is taken at once. */
+  enterFound(event: KeyboardEvent | null): void {
+    const workspace = this.getFlyout()?.getWorkspace();
+    const first = this.getFlyout()?.isVisible() ? workspace?.getTopBlocks(true)[0] : undefined;
+    Blockly.keyboardNavigationController.setIsActive(true);
+    if (!first) {
+      Blockly.getFocusManager().focusTree(this);
+      return;
+    }
+    Blockly.getFocusManager().focusNode(first);
+    if (!event) return;
+    first.performAction(event);
+    this.getFlyout()?.hide();
+    for (const item of this.getToolboxItems()) if (item instanceof SearchItem) item.clear();
+  }
+
+  /** The keys go to the field that finds blocks. */
+  focusSearch(): void {
+    for (const item of this.getToolboxItems()) if (item instanceof SearchItem) item.focus();
+  }
 
   /** What a category holds beside what people made themselves. */
   contentsOf(dynamic: string): unknown[] {

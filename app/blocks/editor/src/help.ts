@@ -1,0 +1,118 @@
+// Help for one block: a card in the page, made of what the window tells about each block.
+import * as Blockly from 'blockly/core';
+import {iconElement, iconName} from './icons';
+import {isKept} from './kept';
+import {definitionOf} from './definitions';
+
+export interface BlockHelp {
+  title: string;
+  does: string;
+  more: string;
+  gaps: [string, string][];
+  example: string;
+  words: string;
+}
+
+let all: Record<string, BlockHelp> = {};
+
+export function useHelp(help: Record<string, BlockHelp>): void {
+  all = help;
+}
+
+export function helpFor(type: string): BlockHelp | null {
+  return Object.hasOwn(all, type) ? all[type] ?? null : null;
+}
+
+/** The block that the keys go to: selected, or in the toolbox, or the one of a field or gap. */
+export function focusedBlock(): Blockly.BlockSvg | null {
+  const node = Blockly.getFocusManager().getFocusedNode();
+  const source = node instanceof Blockly.BlockSvg ? node :
+    node instanceof Blockly.Field || node instanceof Blockly.RenderedConnection ? node.getSourceBlock() : null;
+  let block = source instanceof Blockly.BlockSvg ? source : null;
+  // The grey value in a gap is part of what holds it.
+  while (block?.isShadow() && block.getParent()) block = block.getParent();
+  return block;
+}
+
+export class HelpCard {
+  private card: HTMLElement | null = null;
+  private back: Blockly.IFocusableNode | null = null;
+
+  /** Shows the help of this block; false when there is none. */
+  show(block: Blockly.BlockSvg | null): boolean {
+    const help = block ? isKept(block) ? keptHelp(block) : helpFor(block.type) : null;
+    if (!block || !help) return false;
+    this.close();
+    this.back = Blockly.getFocusManager().getFocusedNode();
+    this.card = this.make(help, block);
+    document.body.append(this.card);
+    this.card.querySelector<HTMLElement>('button')?.focus();
+    return true;
+  }
+
+  close(): void {
+    if (!this.card) return;
+    const hadFocus = this.card.contains(document.activeElement);
+    this.card.remove();
+    this.card = null;
+    if (hadFocus && this.back?.canBeFocused()) Blockly.getFocusManager().focusNode(this.back);
+    this.back = null;
+  }
+
+  private make(help: BlockHelp, block: Blockly.BlockSvg): HTMLElement {
+    const card = element('aside', 'nepHelp');
+    card.setAttribute('role', 'dialog');
+    card.setAttribute('aria-label', `Help: ${help.title}`);
+    const head = element('header', '');
+    const tile = element('span', 'nepTile');
+    tile.style.background = block.getColour();
+    const style = block.getStyleName();
+    const first = definitionOf(block.type)?.['args0'] as {icon?: string}[] | undefined;
+    tile.append(iconElement(iconName(first?.[0]?.icon ?? '', style), 16));
+    const close = document.createElement('button');
+    close.type = 'button';
+    close.title = 'Close (Esc)';
+    close.setAttribute('aria-label', 'Close the help');
+    close.append(iconElement('x', 16));
+    close.onclick = () => this.close();
+    head.append(tile, element('h2', '', help.title), close);
+    card.append(head, element('p', '', help.does));
+    if (help.more) card.append(element('p', '', help.more));
+    if (help.gaps.length) {
+      const list = element('dl', '');
+      for (const [name, words] of help.gaps) list.append(element('dt', '', name), element('dd', '', words));
+      card.append(list);
+    }
+    card.append(element('p', 'nepExample', help.example));
+    card.onkeydown = (event) => {
+      event.stopPropagation();
+      if (event.key === 'Escape') this.close();
+    };
+    return card;
+  }
+}
+
+function keptHelp(block: Blockly.BlockSvg): BlockHelp {
+  return {title: 'A block that is not known here', does: String(block.getTooltip()), more: 'It may belong to a robot ' +
+    'that was never seen here, or to a newer Studio. It stays in the file as it is.', gaps: [],
+    example: 'For example: connect the robot whose block it is.', words: ''};
+}
+
+function element(tag: string, name: string, words = ''): HTMLElement {
+  const made = document.createElement(tag);
+  if (name) made.className = name;
+  if (words) made.textContent = words;
+  return made;
+}
+
+/** “Help” in the context menu of every block that has some. */
+export function offerHelp(show: (block: Blockly.BlockSvg) => void): void {
+  Blockly.ContextMenuRegistry.registry.register({
+    id: 'nepHelp',
+    weight: 7,
+    scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK,
+    displayText: 'Help',
+    preconditionFn: ({block}) => block && (isKept(block) || helpFor(block.type)) ? 'enabled' : 'hidden',
+    callback: ({block}) => block && show(block),
+  });
+}

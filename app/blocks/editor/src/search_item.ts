@@ -1,0 +1,79 @@
+// The field above the toolbox: type, see the blocks that answer, take one with Enter.
+import * as Blockly from 'blockly/core';
+import {iconElement} from './icons';
+import {findEntries} from './search';
+import type {Toolbox} from './toolbox';
+
+export const SEARCH = 'nepSearch';
+
+export class SearchItem extends Blockly.ToolboxItem {
+  private readonly div = document.createElement('div');
+  private readonly field = document.createElement('input');
+
+  override init(): void {
+    this.div.className = 'nepSearch';
+    this.div.setAttribute('role', 'search');
+    this.field.type = 'search';
+    this.field.placeholder = 'Find a block';
+    this.field.spellcheck = false;
+    this.field.setAttribute('aria-label', 'Find a block: type words, Enter takes the first');
+    this.field.oninput = () => this.show();
+    this.field.onkeydown = (event) => this.onKey(event);
+    // Otherwise the toolbox takes it for a click beside its categories and closes the blocks.
+    this.div.onpointerdown = (event) => event.stopPropagation();
+    this.div.append(iconElement('search', 16), this.field);
+  }
+
+  override getDiv(): Element {
+    return this.div;
+  }
+
+  override canBeFocused(): boolean {
+    return false;
+  }
+
+  override dispose(): void {
+    this.div.remove();
+  }
+
+  focus(): void {
+    this.field.focus();
+    this.field.select();
+    if (this.field.value) this.show();
+  }
+
+  clear(): void {
+    this.field.value = '';
+  }
+
+  private get toolbox(): Toolbox {
+    return this.parentToolbox_ as unknown as Toolbox;
+  }
+
+  private show(): void {
+    const words = this.field.value;
+    if (!words.trim()) {
+      this.toolbox.showFound(null);
+      return;
+    }
+    const found = findEntries(this.toolbox.allEntries(), words);
+    const none = [{kind: 'label', text: `No block for “${words.trim()}”`}];
+    this.toolbox.showFound(found.length ? found : none);
+  }
+
+  private onKey(event: KeyboardEvent): void {
+    event.stopPropagation();
+    if (event.key === 'Escape') {
+      this.clear();
+      this.toolbox.showFound(null);
+      Blockly.getFocusManager().focusTree(this.parentToolbox_.getWorkspace());
+    } else if (event.key === 'Enter' || event.key === 'ArrowDown') {
+      this.toolbox.enterFound(event.key === 'Enter' ? event : null);
+    } else {
+      return;
+    }
+    event.preventDefault();
+  }
+}
+
+Blockly.registry.register(Blockly.registry.Type.TOOLBOX_ITEM, SEARCH, SearchItem, true);

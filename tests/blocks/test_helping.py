@@ -1,0 +1,48 @@
+"""What people are told who ask about a block."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.blocks.catalogue import Catalogue, categories
+from app.blocks.examples import EXAMPLES
+from app.blocks.helping import help_of
+from tests.blocks.samples import robot
+
+CATALOGUE = Catalogue([robot()])
+ALL = sorted(CATALOGUE.blocks.values(), key=lambda each: each.type)
+
+
+@pytest.mark.parametrize("described", ALL, ids=lambda each: each.type)
+def test_every_block_has_its_help(described) -> None:
+    told = help_of(described)
+    assert str(told["does"]).endswith(".")
+    assert str(told["example"]).startswith("For example: ")
+    assert str(told["example"]).endswith(".")
+    assert told["title"]
+    for text in (str(told["title"]), str(told["example"]), str(told["more"])):
+        assert "%" not in text
+        assert "…" not in text
+    shown = {argument.name for argument in described.arguments if not argument.silent}
+    assert len(told["gaps"]) >= len(shown)  # type: ignore[arg-type]
+
+
+def test_every_block_of_ours_has_an_example_of_its_own() -> None:
+    ours = {described.type for category in categories() for described in category.blocks}
+    assert set(EXAMPLES) == ours
+
+
+def test_the_help_of_a_robots_block_comes_from_its_description() -> None:
+    told = help_of(CATALOGUE.blocks["robot_pepper_do_turn"])
+    assert told["title"] == "(robot) turn (direction) by (angle) °"
+    assert told["example"] == "For example: Pepper turn left by 90 °."
+    assert ["angle", "a number; 90 unless you change it, from 0 to 360 °"] in told["gaps"]  # type: ignore[operator]
+    assert ["direction", "“left” or “right”"] in told["gaps"]  # type: ignore[operator]
+
+
+def test_gaps_are_named_in_words() -> None:
+    told = help_of(CATALOGUE.blocks["lists_get"])
+    assert told["title"] == "(where) (number) of (list)"
+    assert told["gaps"][1] == [  # type: ignore[index]
+        "number", "a number; 1 unless you change it; it is there for an item by its number",
+    ]  # fmt: skip

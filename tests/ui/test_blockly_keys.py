@@ -1,0 +1,253 @@
+"""A whole behaviour built with keys alone; help and search under the keys."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMainWindow
+
+from app.blocks import editor_definitions
+from app.blocks.compiler import compile_behaviour
+from app.ui.blockly_view import BlocklyView
+from tests.blocks.samples import block, list_of, number, robot, started, workspace
+from tests.ui.blockly_person import WAIT_MS, Person
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+FOUND = (("append", "lists_add"), ("loop", "lists_each"), ("rep fore", "control_forever"))
+PACE_MS = 80
+CARD = "document.querySelector('.nepHelp')?.textContent ?? ''"
+FOCUSED = (
+    "(it => [it.getAttribute('class') ?? '', it.getAttribute('aria-label') ?? '', it.id])"
+    "(document.activeElement)"
+)
+
+
+@pytest.fixture
+def view(qtbot) -> BlocklyView:
+    made = BlocklyView()
+    qtbot.addWidget(made)
+    made.resize(1300, 700)
+    made.set_definitions(editor_definitions([robot()]))
+    return made
+
+
+@pytest.fixture
+def them(qtbot, view, person) -> Person:
+    saved: dict[str, object] = {"type": "control_wait", "id": "w"}
+    saved["inputs"] = {"SECONDS": {"shadow": number(5) | {"id": "n"}}}
+    tops = started(saved) | {"id": "start", "x": 60, "y": 60}
+    made = person(state=workspace(tops))
+    take_the_keys(made)
+    return made
+
+
+def goes_to(them: Person, part: str) -> None:
+    """The keys go to what has this in its class, its label or its id."""
+    them.wait_for(f"{FOCUSED}.some(each => each.includes({part!r}))")
+
+
+def take_the_keys(them: Person) -> None:
+    them.view.setFocus()
+    them.wait_for("document.hasFocus()")
+
+
+def begin_to_search(them: Person) -> None:
+    """The keys are in the field, and what was typed before is marked, so that it goes."""
+    them.view.open_search()
+    goes_to(them, "Find a block")
+    marked = "(it => it.selectionEnd - it.selectionStart == it.value.length)(document.activeElement)"
+    them.wait_for(marked)
+
+
+def press(them: Person, *keys: Qt.Key) -> None:
+    """At the pace of a quick person: the page moves its focus with the next picture, not with the key."""
+    for key in keys:
+        them.press(key)
+        QTest.qWait(PACE_MS)
+
+
+def test_a_behaviour_is_built_with_keys_alone(qtbot, view, person):
+    them = person(state=workspace())
+    take_the_keys(them)
+    press(them, Qt.Key_Tab)
+    goes_to(them, "events")
+    press(them, Qt.Key_Right)
+    goes_to(them, "when started")
+    press(them, Qt.Key_Return)  # takes the block
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    press(them, Qt.Key_Return)  # puts it down
+    qtbot.waitUntil(lambda: [top["type"] for top in them.tops()] == ["events_started"], timeout=WAIT_MS)
+    press(them, Qt.Key_T)
+    goes_to(them, "events")
+    press(them, Qt.Key_Down)
+    goes_to(them, "control")
+    press(them, Qt.Key_Right)
+    goes_to(them, "wait")
+    press(them, Qt.Key_Return)
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    press(them, Qt.Key_Return)  # under the hat, where the keys were
+    qtbot.waitUntil(lambda: "next" in them.tops()[0], timeout=WAIT_MS)
+    them.wait_for("!document.querySelector('.blocklyDragging')")
+    QTest.qWait(PACE_MS)
+    press(them, Qt.Key_Right)
+    goes_to(them, "Edit number: 2")
+    press(them, Qt.Key_Return)
+    them.wait_for("!!document.querySelector('.blocklyHtmlInput')")
+    QTest.keyClicks(them.target, "7")
+    press(them, Qt.Key_Return)
+    goes_to(them, "Edit number: 7")
+    program = compile_behaviour(them.newest(), [])
+    assert "wait(7)" in program.source
+    assert not program.problems
+
+
+def test_a_robots_block_is_found_by_its_words_and_put_in_its_place(qtbot, view, them):
+    press(them, Qt.Key_Tab)
+    press(them, Qt.Key_W)
+    press(them, Qt.Key_Down)
+    goes_to(them, "when started")
+    view.open_search()
+    goes_to(them, "Find a block")
+    QTest.keyClicks(them.target, "say")
+    them.wait_for("document.querySelector('.blocklyFlyout .blocklyBlock')?.textContent.includes('say')")
+    press(them, Qt.Key_Return)
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    press(them, Qt.Key_Return)
+    qtbot.waitUntil(lambda: them.tops()[0]["next"]["block"]["type"] == "robot_pepper_do_say", timeout=WAIT_MS)
+    them.wait_for("!document.querySelector('.blocklyDragging')")
+    QTest.qWait(PACE_MS)
+    assert them.ask("document.querySelector('.nepSearch input').value") == ""
+    press(them, Qt.Key_Right)
+    goes_to(them, "Pepper")
+
+
+def test_synonyms_and_parts_of_words_find_blocks_and_nothing_is_said(view, them):
+    first = "document.querySelector('.blocklyFlyout .blocklyBlock')?.getAttribute('class') ?? ''"
+    labels = "[...document.querySelectorAll('.blocklyFlyoutLabel')]"
+    shown = f"{labels}.map(each => each.textContent.replace(/\\u00a0/g, ' '))"
+    for words, block_type in (
+        ("append", "lists_add"),
+        ("loop", "lists_each"),
+        ("rep fore", "control_forever"),
+    ):
+        view.open_search()
+        goes_to(them, "Find a block")
+        QTest.keyClicks(them.target, words)
+        them.wait_for(f"({first}).includes({block_type!r})")
+    begin_to_search(them)
+    QTest.keyClicks(them.target, "zzz")
+    them.wait_for(shown, ["No block for “zzz”"])
+    press(them, Qt.Key_Escape)
+    them.wait_for("getComputedStyle(document.querySelector('.blocklyFlyout')).display", "none")
+
+
+def test_down_in_an_empty_search_goes_to_the_categories(view, them):
+    view.open_search()
+    goes_to(them, "Find a block")
+    press(them, Qt.Key_Down)
+    goes_to(them, "events")
+
+
+def test_finding_blocks_in_the_workspace_goes_round_and_leaves_the_keys_there(view, them):
+    view.open_find()
+    goes_to(them, "Find in the blocks")
+    count = "document.querySelector('.nepFind span').textContent"
+    now = "[...document.querySelectorAll('.nepFoundNow')].map(e => e.dataset.id)"
+    QTest.keyClicks(them.target, "wa")
+    them.wait_for(count, "1 of 1")
+    them.wait_for(now, ["w"])
+    QTest.keyClicks(them.target, "x")
+    them.wait_for(count, "none")
+    press(them, Qt.Key_Backspace, Qt.Key_Backspace, Qt.Key_Backspace)
+    QTest.keyClicks(them.target, "t")
+    them.wait_for(count, "1 of 2")
+    press(them, Qt.Key_Return)
+    them.wait_for(count, "2 of 2")
+    press(them, Qt.Key_Return)
+    them.wait_for(now, ["start"])
+    press(them, Qt.Key_Escape)
+    goes_to(them, "when started")
+    assert them.ask("document.querySelectorAll('.nepFound').length") == 0
+    press(them, Qt.Key_Down)
+    goes_to(them, "wait")
+
+
+def test_f1_explains_the_block_that_the_keys_are_on_and_else_is_the_windows(qtbot, view, them):
+    window = QMainWindow()
+    qtbot.addWidget(window)
+    pressed: list[str] = []
+    action = QAction("keys", window)
+    action.setShortcut("F1")
+    action.triggered.connect(lambda: pressed.append("window"))
+    window.addAction(action)
+    window.setCentralWidget(view)
+    window.resize(1300, 700)
+    window.show()
+    window.activateWindow()
+    take_the_keys(them)
+    press(them, Qt.Key_Tab)
+    goes_to(them, "events")
+    press(them, Qt.Key_F1)
+    qtbot.waitUntil(lambda: pressed == ["window"], timeout=WAIT_MS)
+    press(them, Qt.Key_W, Qt.Key_Down, Qt.Key_Down)
+    goes_to(them, "wait")
+    qtbot.waitUntil(lambda: view._on_block, timeout=WAIT_MS)
+    press(them, Qt.Key_F1)
+    them.wait_for(f"({CARD}).includes('Waits that many seconds')")
+    goes_to(them, "Close the help")
+    assert "secondsa number; 2 unless you change it" in them.ask(CARD)
+    press(them, Qt.Key_Escape)
+    goes_to(them, "wait")
+    assert them.ask(CARD) == ""
+    assert pressed == ["window"]
+    view.setParent(None)  # it is the test's, not the window's
+
+
+def test_the_context_menu_explains_blocks_also_in_the_toolbox(view, them):
+    box = them.box("[data-id=w] > .blocklyPath")
+    at = (round(box["left"] + 14), round(box["top"] + 20))
+    QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(*at))
+    items = "[...document.querySelectorAll('.blocklyMenuItem')].map(e => e.textContent)"
+    number_of = f"({items}).findIndex(each => each.startsWith('Help'))"
+    them.wait_for(f"{number_of} >= 0")
+    them.ask(f"document.querySelectorAll('.blocklyMenuItem')[{number_of}].setAttribute('data-test', 'help')")
+    them.click("[data-test=help]")
+    them.wait_for(f"({CARD}).includes('Waits that many seconds')")
+
+
+def test_a_colour_is_chosen_with_keys(qtbot, view, person):
+    light = block("robot_pepper_do_light", "l", ROBOT="Pepper", WHERE="eyes", COLOUR="#ffffff")
+    them = person(state=workspace(light | {"x": 60, "y": 60}))
+    take_the_keys(them)
+    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down, Qt.Key_Right, Qt.Key_Right, Qt.Key_Right)
+    goes_to(them, "colour: white")
+    press(them, Qt.Key_Return)
+    them.wait_for("document.activeElement.title", "white")
+    press(them, Qt.Key_Right, Qt.Key_Down)
+    them.wait_for("document.activeElement.title", "blue")
+    press(them, Qt.Key_Return)
+    goes_to(them, "colour: blue")
+    assert them.tops()[0]["fields"]["COLOUR"] == "#0a5cff"
+
+
+def test_what_blocks_are_called_is_words_without_pictures(them):
+    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down)
+    goes_to(them, "Begin stack, when started")
+    press(them, Qt.Key_Down)
+    goes_to(them, "wait, 5, s")
+    assert "empty" not in them.ask("document.activeElement.getAttribute('aria-label')").lower()
+
+
+def test_a_button_on_a_block_has_its_words_and_obeys_enter(qtbot, view, person):
+    them = person(state=workspace(list_of() | {"id": "l", "x": 60, "y": 60}))
+    take_the_keys(them)
+    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down, Qt.Key_Right)
+    goes_to(them, "take the last gap away")
+    press(them, Qt.Key_Right)
+    goes_to(them, "add one gap")
+    press(them, Qt.Key_Return)
+    qtbot.waitUntil(lambda: them.tops()[0]["extraState"] == {"items": 1}, timeout=WAIT_MS)
