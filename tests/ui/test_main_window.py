@@ -350,20 +350,42 @@ def test_an_alert_is_a_banner_until_it_is_cured(qtbot, window: MainWindow, comma
 def test_what_a_dead_studio_left_is_offered_without_a_dialog(
     qtbot, window: MainWindow, commands: Commands, home: Path
 ) -> None:
-    journal = Journal(home / "journal")
-    journal.write("Story", None, {"blocks": {"blocks": [{"type": "events_started"}]}}, {})
-    file = next((home / "journal").glob("*.json"))
-    entry = json.loads(file.read_text("utf-8"))
-    file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
+    for name in ("Story", "Tale", "Song"):
+        Journal(home / "journal").write(name, None, {"blocks": {"blocks": [{"type": "events_started"}]}}, {})
+    for file in (home / "journal").glob("*.json"):
+        entry = json.loads(file.read_text("utf-8"))
+        file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
     show(qtbot, window)
-    commands.offer_unsaved(left_behind(home / "journal"))
+    commands.tabs.come_back(left_behind(home / "journal"), window.banner)
     assert window.banner.isVisible()
+    assert "“Song” and 2 others were not saved" in window.banner.banner.accessibleName()
     assert QApplication.activeModalWidget() is None
     QTest.mouseClick(window.banner.banner.button, Qt.MouseButton.LeftButton)
-    assert window.session.document.name == "Story"
-    assert window.session.document.dirty
+    assert {document.name for document in window.session.documents} == {"Story", "Tale", "Song"}
+    assert all(document.dirty for document in window.session.documents)
     assert window.showing == "behaviour"
     assert not window.banner.isVisible()
+
+
+def test_a_studio_that_closed_in_order_has_its_tabs_again_and_asks_nothing(
+    qtbot, theme: Theme, window: MainWindow, commands: Commands, home: Path
+) -> None:
+    window.session.tabs.come_back([])
+    window.session.document.edited({"blocks": {"blocks": [{"type": "events_started"}]}})
+    commands.run("file.new")
+    window.session.document.edited({"blocks": {"blocks": [{"type": "events_message"}]}})
+    window.close()
+    for file in (home / "journal").glob("*.json"):
+        entry = json.loads(file.read_text("utf-8"))
+        file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
+    again = Session(
+        Settings(home), address="127.0.0.1:9", journal_folder=home / "journal", start_companions=False
+    )
+    rest = again.tabs.come_back(left_behind(home / "journal"))
+    assert rest == []
+    assert [document.name for document in again.documents] == ["New behaviour", "New behaviour 2"]
+    assert all(document.dirty for document in again.documents)
+    again.close()
 
 
 def test_the_theme_changes_at_once(qtbot, window: MainWindow, commands: Commands) -> None:
