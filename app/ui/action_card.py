@@ -15,7 +15,7 @@ from app.ui.forms import ActionForm
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.try_list import TryList
-from app.ui.try_words import end_words, field_words, left_words, now_words, progress_of
+from app.ui.try_words import end_words, left_words, now_words, output_words, progress_of
 from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, paint, set_role
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ class ActionCard(Card):
         said, status, sentence = end_words(invocation) if invocation is not None else ("", "ok", "")
         self.result.set(said, status)
         if invocation is not None and invocation.state == "succeeded":
-            self.words.setText(field_words(self.action.output, invocation.output))
+            self.words.setText(output_words(self.action, invocation.output))
         set_role(self.error, "textSecondary" if status == "off" else "error")
         self.error.setText(sentence)
         self.error.setVisible(bool(sentence))

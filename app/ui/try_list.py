@@ -14,7 +14,7 @@ from app.robots.description import Action
 from app.ui.icons import paint_icon
 from app.ui.input_words import input_words
 from app.ui.theme import Theme
-from app.ui.try_words import end_words, field_words
+from app.ui.try_words import end_words, output_words
 from app.ui.widgets import paint
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class TryRow(QAbstractButton):
         said, status, sentence = end_words(made)
         self.when = time.strftime("%H:%M:%S", time.localtime(made.at_s))
         self.given = input_words(action, made.given)
-        told = field_words(action.output, made.output) if made.state == "succeeded" else ""
+        told = output_words(action, made.output) if made.state == "succeeded" else ""
         self.result = f"{said}, {told}" if told else sentence.rstrip(".") or said
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)

@@ -44,6 +44,12 @@ def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
     return field_words(action.feedback, feedback)
 
 
+def output_words(action: Action, output: Mapping[str, object]) -> str:
+    """What the robot answered; how long it took is said by the result itself."""
+    told = [field for field in action.output if SILENT_UNITS.get(field.unit or "") != field.title]
+    return field_words(told, output)
+
+
 def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
     """How much is done, 0 to 1: what the robot calls progress, or what of the asked is done or left to do."""
     for name in SHARES:
