@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.ui.robot_item import LIST_WIDTH, RobotItem
 from app.ui.theme import Theme
@@ -46,14 +46,11 @@ class RobotList(QWidget):
         column.addWidget(label(said, "body", role="textSecondary", wrap=True))
         self.why = Button(self._theme, "Find out why", "stethoscope", size="small")
         self.why.clicked.connect(lambda: run("help.doctor"))
-        self.turtle = Button(self._theme, "Virtual Turtle", "bot", kind="ghost", size="small")
+        self.turtle = Button(self._theme, "Use a virtual Turtle", "bot", kind="ghost", size="small")
         self.turtle.setAccessibleName("Use the virtual Turtle")
         self.turtle.clicked.connect(lambda: run("robots.turtle"))
-        row = QHBoxLayout()
-        row.addWidget(self.why)
-        row.addWidget(self.turtle)
-        row.addStretch(1)
-        column.addLayout(row)
+        for button in (self.why, self.turtle):  # below each other: large text needs the width
+            column.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
         return card
 
     def show_links(self, links: Sequence[RobotLink]) -> None:
