@@ -1,0 +1,45 @@
+"""Slow motion: chosen in the run bar or the Run menu, also while a program runs."""
+
+from __future__ import annotations
+
+from app.ui.commands import PACES, Commands
+from app.ui.main_window import MainWindow
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+class Runner:
+    """Stands for the runner of a program."""
+
+    def __init__(self) -> None:
+        self.paces: list[float] = []
+
+    def set_pace(self, seconds: float) -> None:
+        self.paces.append(seconds)
+
+    def stop(self) -> None: ...
+
+
+def test_the_run_bar_offers_the_speeds_of_the_menu(window: MainWindow, commands: Commands) -> None:
+    offered = [action.text() for action in window.run_bar._paces.actions()]
+    assert offered == ["Full speed", "Slow motion: 0.5 s a block", "Very slow: 1.5 s a block"]
+    assert commands.actions["run.full_speed"].isChecked()
+    assert window.run_bar.pace.accessibleName() == "Speed"
+
+
+def test_a_speed_reaches_the_program_that_runs_and_the_next_one(
+    window: MainWindow, commands: Commands
+) -> None:
+    runs, runner = window.session.runs, Runner()
+    runs._runner = runner  # type: ignore[assignment]
+    for name in PACES:
+        commands.run(name)
+    assert runner.paces == [0.0, 0.5, 1.5]
+    assert runs.pace_s == 1.5
+    window.show_layout("behaviour")
+    window.tick()
+    assert window.run_bar.pace.isChecked()
+    commands.run("run.full_speed")
+    window.tick()
+    assert not window.run_bar.pace.isChecked()
+    runs._runner = None
