@@ -139,6 +139,11 @@ class Subscriber:
         return self._inlet.lost
 
     @property
+    def refused(self) -> int:
+        """What came and was no message at all; why is an alert in the graph."""
+        return self._inlet.refused
+
+    @property
     def is_closed(self) -> bool:
         """Whether it, or its node, was closed."""
         return self._inlet.is_closed

@@ -21,6 +21,7 @@ __all__ = [
     "HEADER_BYTES",
     "LATCHED",
     "SIZE_MAX",
+    "SUBSCRIPTION_MAX_BYTES",
     "VERSION",
     "Header",
     "check_size",
@@ -40,6 +41,8 @@ __all__ = [
 VERSION = 1
 HEADER_BYTES = 32
 TOPIC_MAX_BYTES = 200
+SUBSCRIPTION_MAX_BYTES = 4096
+"""Whoever subscribes more is disconnected: libzmq keeps some forty bytes for each of them."""
 
 LATCHED = 1
 """Flag: the publisher keeps this message and sends it to whoever comes late."""

@@ -107,6 +107,10 @@ class Inlet(Protocol):
         """Messages that did not arrive or were dropped here for lack of room; None when nobody can know."""
 
     @property
+    def refused(self) -> int:
+        """What came and was no message at all."""
+
+    @property
     def is_closed(self) -> bool:
         """Whether it was closed, or its carrier was."""
 

@@ -129,8 +129,7 @@ class MemoryInlet:
         self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self.ready: deque[Message] = deque()
         self.spec = spec
-        self.received = 0
-        self.lost = 0
+        self.received = self.lost = self.refused = 0
         self.problem = ""
         self.is_closed = False
 

@@ -23,6 +23,7 @@ from nep.errors import NepError
 from nep.records import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.views import GraphView
 from nep.waker import Waker
+from nep.wire import SUBSCRIPTION_MAX_BYTES
 
 __all__ = ["BACKEND", "ZeromqCarrier"]
 
@@ -97,6 +98,7 @@ class ZeromqCarrier:
     def _xpub(self) -> Socket:
         socket = self._socket(zmq.XPUB)
         socket.setsockopt(zmq.XPUB_VERBOSE, 1)  # a hello may come twice when a subscriber reconnects
+        socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # of what it receives
         return socket
 
     def _hold(self, outlet: _Outlet) -> None:

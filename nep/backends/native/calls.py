@@ -13,6 +13,7 @@ from typing import NamedTuple
 import zmq
 
 from nep.addresses import endpoint_of, is_loopback
+from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import Socket, wait_until
 from nep.bodies import decode_answer, encode_request
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
@@ -54,6 +55,7 @@ class Calls:
         self._calls: dict[int, _Call] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
+        self.refusals = Refusals()
         self.is_connected = False
         """Whether a master was there when the socket was read last."""
         self._changed = threading.Condition(threading.Lock())
@@ -158,7 +160,13 @@ class Calls:
         try:
             number, answer = decode_answer(self._socket.recv_multipart(zmq.DONTWAIT)[-1])
         except WireError as error:
-            _logger.warning("the master at '%s' says what nobody understands: %s", self.address, error)
+            if self.refusals.add(error.reason):
+                _logger.warning(
+                    "the master at '%s' says what nobody understands (%d times so far): %s",
+                    self.address,
+                    self.refusals.count,
+                    error,
+                )
             return None
         call = self._calls.pop(number, None)
         if call is None or isinstance(answer, Push):

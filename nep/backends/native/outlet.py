@@ -16,6 +16,7 @@ import zmq
 from nep.backends.base import PublisherSpec
 from nep.backends.native.io import Rest, Served
 from nep.backends.native.places import Places
+from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import SendMark, Socket, wait_until
 from nep.encoded import Encoded
 from nep.errors import ClosedError
@@ -65,6 +66,7 @@ class NativeOutlet:
         self.count = 0
         self.subscribers = 0
         """How many said hello and have not gone."""
+        self.refusals = Refusals()
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
@@ -196,6 +198,8 @@ class NativeOutlet:
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
             event = self._socket.recv(zmq.DONTWAIT)
             hello = parse_hello(event[1:])
+            if hello is None and event[1:] != self._topic:
+                self._refuse(event)
             if hello is None or hello[1] != self.spec.topic:
                 continue  # a topic filter, or a subscriber of whoever had this port before
             if event[0] == 1:
@@ -204,6 +208,11 @@ class NativeOutlet:
                 self._seen.pop(hello[0], None)
                 self.subscribers = len(self._seen)
             self._changed.notify_all()
+
+    def _refuse(self, event: bytes) -> None:
+        """Nobody of ours sends that; other programs' filters are harmless."""
+        if self.refusals.add(f"{len(event)} bytes that are no subscription of it"):
+            _logger.info("'%s' was sent %s", self.spec.topic, self.refusals.told())
 
     def _greet(self, subscriber: int) -> None:
         """What was latched, then the echo: from here on the subscriber counts."""

@@ -19,17 +19,16 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Generic, TypeVar
 
 import zmq
 
 from nep.backends.base import SubscriberSpec
+from nep.backends.native.ahead import ROOM_BYTES, Ahead
 from nep.backends.native.io import IoThread, Rest
-from nep.backends.native.readable import Readable
+from nep.backends.native.reporting import R, Reporting
 from nep.backends.native.sockets import SHORT_WAIT_S, wait_until
 from nep.inbox import Inbox
 from nep.message import Message
-from nep.records import SubscriberCount
 from nep.waker import Waker
 
 __all__ = ["SocketInlet"]
@@ -49,25 +48,17 @@ _BATCH_S = 0.005
 _BATCH_MESSAGES = 10_000
 _BATCH_BYTES = 64 * 2**20
 _FEW = 50
-_BRISK_S = 10e-6
-"""A reader that comes back sooner than this after a message gets several at once: twice as many each time."""
-_MOST_AHEAD = 64
-_AHEAD_BYTES = 2**18
 
 
-R = TypeVar("R", bound=Readable)
-
-
-class SocketInlet(Generic[R]):
+class SocketInlet(Reporting[R]):
     """Reads from `readable`. `on_close` unregisters; it is called once, without the lock."""
 
     def __init__(
         self, readable: R, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
     ) -> None:
-        self.spec = spec
+        super().__init__(readable, spec)
         self.is_closed = False
         self.fd = readable.fd
-        self._readable = readable
         self._io = io
         self._on_close = on_close
         self._read = readable.read
@@ -75,11 +66,8 @@ class SocketInlet(Generic[R]):
         self._keeps_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
         """What was read ahead, in front of the inbox; anybody may take from its left without the lock."""
-        self._ahead = 1
-        self._most_ahead = max(1, min(_MOST_AHEAD, spec.max_messages))
-        self._read_at = 0.0
+        self._ahead = Ahead(spec.max_messages)
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
-        self._problem = ""
         self._leased_until = 0.0
         self._io_comes_at = _NEVER
         self._is_brisk = False
@@ -92,25 +80,6 @@ class SocketInlet(Generic[R]):
         self._changed = threading.Condition(self._lock)
 
     # ---- what the reader sees
-
-    @property
-    def received(self) -> int:
-        """Messages that arrived."""
-        return self._readable.received
-
-    @property
-    def lost(self) -> int | None:
-        """Messages that did not arrive, or were dropped here for lack of room."""
-        return self._readable.lost
-
-    def report(self, problem: str) -> None:
-        """The reader's trouble with a message, for the next renewal."""
-        self._problem = problem
-
-    def counts(self) -> SubscriberCount:
-        """The statistics for a renewal."""
-        problem = self._problem or self._readable.refusals.told()
-        return SubscriberCount(self.spec.id, self.received, self.lost, problem)
 
     def poll(self) -> Message | None:
         """The next message if one is there, read in the caller's thread."""
@@ -273,13 +242,11 @@ class SocketInlet(Generic[R]):
             self._fill()
         if self._inbox.messages or not self._keeps_all:
             return self._inbox.take()
-        is_brisk = now - self._read_at < self._ahead * _BRISK_S
-        self._read_at = now
-        self._ahead = min(2 * self._ahead, self._most_ahead) if is_brisk else 1
-        if self._ahead == 1:
+        most = self._ahead.count(now)
+        if most == 1:
             return self._read(may_wait=may_wait)
-        if self._read_into(self.ready, self._ahead, _AHEAD_BYTES, may_wait=may_wait) < self._ahead:
-            self._ahead = 1
+        if self._read_into(self.ready, most, ROOM_BYTES, may_wait=may_wait) < most:
+            self._ahead.begin()
         return self.ready.popleft() if self.ready else None
 
     def _fill(self, most: int = _BATCH_MESSAGES) -> int:

@@ -7,6 +7,7 @@ import time
 __all__ = ["Refusals"]
 
 _TOLD_S = 5.0
+_LOGGED = frozenset(10**n for n in range(20))
 
 
 class Refusals:
@@ -17,11 +18,12 @@ class Refusals:
         self._reason = ""
         self._last_at = 0.0
 
-    def add(self, reason: str) -> None:
-        """One more, and why."""
+    def add(self, reason: str) -> bool:
+        """One more, and why. Whether to log it: the first, the tenth, the hundredth, ..."""
         self.count += 1
         self._reason = reason
         self._last_at = time.monotonic()
+        return self.count in _LOGGED
 
     def told(self) -> str:
         """The newest reason and how many there were; empty when there was none in the last seconds."""

@@ -1,0 +1,388 @@
+"""Truncated, random and huge parts on every native port: it serves on, counts and names them, loses nothing.
+
+Each example sends some bad messages, then a good one behind them on the same connection: when the good one
+has come, the bad ones have been dealt with, so nothing here has to wait for a time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import logging
+import socket
+import struct
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+import zmq
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import nep
+from nep import bodies, wire
+from nep.errors import WireError
+from nep.masters import Master
+from nep.packing import pack
+from nep.records import NodeRecord
+from nep.requests import AddSubscriber, Done, Found, Ping, Refused, SubscriberRecord
+from tests.nep.programs import eventually
+
+FEW = settings(
+    deadline=None,
+    max_examples=25,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+TOPIC = b"bad\0"
+HUGE = st.sampled_from([70_000, 1_000_000, 4_000_000]).map(lambda size: b"\x93" * size)
+HEADERS = st.builds(
+    wire.Header,
+    st.sampled_from([1, 3, 5, 99]),
+    st.sampled_from([0, 1, 2, 4, 0xFFFF]),
+    st.integers(1, 9),
+    st.just(0),
+    st.sampled_from([7, 2**62]),
+    st.sampled_from([0, 3, 4, 1000, 2**32 - 1]),
+).map(wire.Header.pack)
+PARTS = st.binary(max_size=40) | HEADERS | HEADERS.map(lambda head: head[:-1]) | HUGE | st.just(TOPIC)
+BAD = st.lists(PARTS, min_size=0, max_size=4).map(lambda parts: [TOPIC, *parts])
+
+
+@pytest.fixture(scope="module")
+def master() -> Iterator[Master]:
+    with Master("127.0.0.1:0", learn_s=0.0) as made:
+        yield made
+
+
+@pytest.fixture
+def context() -> Iterator[zmq.Context[zmq.Socket[bytes]]]:
+    made: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    made.linger = 0
+    yield made
+    made.destroy(0)
+
+
+# ---- a subscriber's port
+
+
+class Rogue:
+    """A publisher that sends what it likes, beside good messages of its own."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]]) -> None:
+        self.socket = context.socket(zmq.XPUB)
+        self.port = self.socket.bind_to_random_port("tcp://127.0.0.1")
+        self.seqs = itertools.count(1)
+
+    def good(self, told: bool = True) -> bytes:
+        """Send a good message; its payload."""
+        payload = b"good %d" % next(self.seqs)
+        head = wire.Header(3, 0, int(payload[5:]), 0, 42, len(payload) if told else 0)
+        self.socket.send_multipart([TOPIC, head.pack(), payload])
+        return payload
+
+
+def is_message(parts: list[bytes]) -> bool:
+    try:
+        read = wire.split(parts)
+    except WireError:
+        return False
+    return read.header.codec in {1, 3, 5} and read.topic == "bad"
+
+
+def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
+    context: zmq.Context[zmq.Socket[bytes]],
+) -> None:
+    rogue = Rogue(context)
+    with nep.node("victim") as node:
+        sub = node.new_sub("bad", "bytes", node.direct(port=rogue.port, mode="one2many", wire="native"))
+
+        @FEW
+        @given(st.lists(BAD, min_size=1, max_size=4), st.booleans())
+        def attack(messages: list[list[bytes]], told: bool) -> None:
+            refused = sub.refused
+            expected = [rogue.good()]
+            bad = 0
+            for parts in messages:
+                rogue.socket.send_multipart(parts)
+                bad += not is_message(parts)
+                expected.append(rogue.good(told))
+            heard = []
+            while len(heard) < len(expected):
+                message = sub.receive(5.0)
+                assert message is not None, "a good message was lost"
+                if message.publisher == 42:
+                    heard.append(bytes(message.data))
+            assert heard == expected
+            assert sub.refused - refused >= bad  # what is short and then long again may be two
+
+        rogue.socket.recv()  # it is connected
+        rogue.socket.recv()
+        attack()
+        rogue.socket.send_multipart([TOPIC, b"short"])
+        expected = rogue.good()
+        message = sub.receive(5.0)
+        assert message is not None
+        assert bytes(message.data) == expected
+        assert "a header has 32 bytes, this one has 5" in sub._inlet.counts().problem  # type: ignore[attr-defined]
+
+
+# ---- a publisher's port
+
+SUBSCRIPTIONS = (
+    st.binary(max_size=40)
+    | st.binary(max_size=30).map(lambda junk: b"\x01\xffhello/" + junk)
+    | st.binary(max_size=30).map(lambda junk: b"\x00\xffhello/" + junk)
+    | st.sampled_from([b"\x01" + wire.hello_part(5, "other"), b"\x00" + wire.hello_part(5, "victim")])
+    | st.sampled_from([b"\x01", b"\x01" + b"x" * 4000, b"x" * 4000])
+)
+
+
+def shake_hands(port: int) -> socket.socket:
+    """A bare connection to a publisher, with ZMTP's greeting done: whoever sends more than libzmq would."""
+    made = socket.create_connection(("127.0.0.1", port), timeout=5.0)
+    made.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32))
+    left = 64
+    while left:
+        left -= len(made.recv(left))
+    ready = b"\x05READY\x0bSocket-Type" + struct.pack(">I", 3) + b"SUB"
+    made.sendall(bytes([4, len(ready)]) + ready)
+    return made
+
+
+def test_a_publisher_leaves_whoever_subscribes_a_book(master: Master) -> None:
+    with nep.node("victim", master=master.address) as node:
+        pub = node.new_pub("book", "bytes")
+        sub = node.new_sub("book", "bytes")
+        (info,) = node.graph().topics["book"].publishers
+        for size in (wire.SUBSCRIPTION_MAX_BYTES + 1, 4_000_000, 2**62):
+            with shake_hands(int(info.endpoints[0].rpartition(":")[2])) as rogue:
+                with contextlib.suppress(OSError):  # it does not even read all of it
+                    rogue.sendall(b"\x02" + struct.pack(">Q", size) + b"\x01")
+                    rogue.sendall(b"a" * min(size - 1, 4_000_000))
+                with contextlib.suppress(ConnectionResetError):
+                    while rogue.recv(1000):
+                        pass  # until it is left
+        pub.publish(b"still here")
+        message = sub.receive(5.0)
+        assert message is not None
+        assert (pub.subscribers, sub.lost) == (1, 0)
+
+
+def test_a_publisher_serves_on_whatever_subscribers_send(
+    context: zmq.Context[zmq.Socket[bytes]], master: Master
+) -> None:
+    with nep.node("victim", master=master.address) as node:
+        pub = node.new_pub("victim", "bytes")
+        (info,) = node.graph().topics["victim"].publishers
+        sub = node.new_sub("victim", "bytes")
+        rogue = context.socket(zmq.XSUB)
+        rogue.connect(info.endpoints[0])
+        ids = itertools.count(1000)
+
+        @FEW
+        @given(st.lists(st.lists(SUBSCRIPTIONS, min_size=1, max_size=2), min_size=1, max_size=5))
+        def attack(messages: list[list[bytes]]) -> None:
+            for parts in messages:
+                rogue.send_multipart(parts)
+            own = wire.hello_part(next(ids), "victim")
+            rogue.send(b"\x01" + own)
+            while True:  # the answer to a proper hello, behind all of the others
+                assert rogue.poll(5000), "a proper subscriber is not greeted any more"
+                first, *_rest = rogue.recv_multipart()
+                if first == own:
+                    break
+            rogue.send(b"\x00" + own)
+            pub.publish(b"still here")
+            message = sub.receive(5.0)
+            assert message is not None
+            assert bytes(message.data) == b"still here"
+
+        refused = pub._outlet.refusals  # type: ignore[attr-defined]
+        rogue.send(b"\x01nobody knows that")
+        attack()
+        assert refused.count >= 1
+        assert "are no subscription of it" in refused.told()
+        assert sub.lost == 0
+        rogue.close()
+        eventually(lambda: pub.subscribers == 1)
+
+
+# ---- the master's port
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats() | st.text() | st.binary(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=8,
+)
+NAMES = st.sampled_from([*bodies._REQUESTS, "fly", ""])
+FIELDS = st.dictionaries(
+    st.sampled_from(
+        [
+            "node",
+            "node_id",
+            "epoch",
+            "revision",
+            "publisher",
+            "publishers",
+            "subscribers",
+            "id",
+            "managed",
+            "hosts",
+        ]
+    ),
+    VALUES | st.just("attacker"),
+    max_size=5,
+)
+REQUESTS = (
+    st.binary(max_size=60)
+    | VALUES.map(pack)
+    | st.builds(lambda do, call, what: pack({"do": do, "call": call, "what": what}), NAMES, VALUES, FIELDS)
+    | st.integers(1, 100_000).map(lambda depth: b"\x91" * depth)
+    | st.integers(1, 3000).map(lambda depth: pack({"do": "look", "call": 1})[:-1] + b"\x91" * depth + b"\xc0")
+    | HUGE
+)
+
+
+def test_a_master_answers_everything_and_serves_on(
+    context: zmq.Context[zmq.Socket[bytes]], master: Master, caplog: pytest.LogCaptureFixture
+) -> None:
+    with nep.node("bystander", master=master.address) as node:
+        node.new_pub("bystander", "bytes")
+        attacker = context.socket(zmq.DEALER)
+        attacker.setsockopt(zmq.ROUTING_ID, b"attacker")
+        attacker.connect(f"tcp://{master.address}")
+        calls = itertools.count(10**6)
+
+        @FEW
+        @given(st.lists(st.lists(REQUESTS, min_size=1, max_size=3), min_size=1, max_size=4))
+        def attack(messages: list[list[bytes]]) -> None:
+            for parts in messages:
+                attacker.send_multipart(parts)
+            call = next(calls)
+            attacker.send(bodies.encode_request(Ping(), call))
+            answers = 0
+            while True:
+                assert attacker.poll(5000), "the master does not answer any more"
+                number, answer = bodies.decode_answer(attacker.recv())
+                if number == call:
+                    assert isinstance(answer, Done)
+                    break
+                answers += 1
+                if isinstance(answer, Refused):
+                    assert answer.reason
+            assert answers == len(messages)  # every sender is told what was wrong
+
+        attack()
+        view = node.graph()
+        assert "bystander" in view.topics
+    assert "could not carry out" not in caplog.text
+
+
+@pytest.mark.parametrize("size", [0, 1, 200, 255])
+def test_a_master_serves_nodes_with_any_id(
+    context: zmq.Context[zmq.Socket[bytes]], master: Master, size: int
+) -> None:
+    with context.socket(zmq.DEALER) as dealer:
+        ask_with_id(dealer, master, size)
+
+
+def ask_with_id(dealer: zmq.Socket[bytes], master: Master, size: int) -> None:
+    if size:
+        dealer.setsockopt(zmq.ROUTING_ID, b"\xfe" * size)
+    dealer.connect(f"tcp://{master.address}")
+    record = SubscriberRecord(5, "t", "json")
+    said = NodeRecord("\udcfe" * size if size else "x", "odd", "host", None)
+    body = pack({"do": "subscriber+", "call": 3, "what": {}})
+    if not size:
+        body = bodies.encode_request(AddSubscriber(said, record), 3)
+    dealer.send(body)
+    assert dealer.poll(2000)
+    assert isinstance(bodies.decode_answer(dealer.recv())[1], Refused)
+    dealer.send(bodies.encode_request(Ping(), 4))
+    assert dealer.poll(2000)
+
+
+# ---- a node's port to its master
+
+ANSWERS = (
+    st.binary(max_size=60)
+    | VALUES.map(pack)
+    | st.builds(
+        lambda name, call, what: pack({"is": name, "re": call, "what": what}),
+        st.sampled_from([*bodies._ANSWERS, "fly"]),
+        st.integers(0, 20) | VALUES,
+        st.dictionaries(
+            st.sampled_from(
+                ["epoch", "revision", "publisher", "publishers", "topics", "last_seqs", "view", "id", "topic"]
+            ),
+            VALUES | st.just(1),
+            max_size=6,
+        ),
+    )
+    | st.integers(1, 100_000).map(lambda depth: b"\x91" * depth)
+    | HUGE
+)
+
+
+def test_a_node_stands_whatever_a_master_says(
+    context: zmq.Context[zmq.Socket[bytes]], caplog: pytest.LogCaptureFixture
+) -> None:
+    router = context.socket(zmq.ROUTER)
+    port = router.bind_to_random_port("tcp://127.0.0.1")
+    caplog.set_level(logging.WARNING)
+    with nep.node("victim", master=f"127.0.0.1:{port}", wait_s=10.0) as node:
+        answered: list[object] = []
+
+        def serve(until: str) -> bytes:
+            """Answer requests properly, until one of this name came; who asked."""
+            while True:
+                assert router.poll(5000), "the node says nothing any more"
+                sender, body = router.recv_multipart()
+                asked = bodies.decode_request(body)
+                name = bodies._REQUEST_NAMES[type(asked.request)]  # type: ignore[index]
+                answered.append(asked.request)
+                reply = Found(9, 1) if name in {"subscriber+", "join"} else Done(9, 1)
+                router.send_multipart([sender, bodies.encode_answer(reply, asked.call)])
+                if name == until:
+                    return sender
+
+        made: list[nep.Subscriber] = []
+        thread = threading.Thread(target=lambda: made.append(node.new_sub("t", "bytes")))
+        thread.start()
+        sender = serve("subscriber+")
+        thread.join()
+
+        @FEW
+        @given(st.lists(st.lists(ANSWERS, min_size=1, max_size=2), min_size=1, max_size=4))
+        def attack(messages: list[list[bytes]]) -> None:
+            for parts in messages:
+                router.send_multipart([sender, *parts])
+            ended: list[object] = []
+
+            def look() -> None:
+                try:
+                    ended.append(node.graph(5.0))
+                except nep.NepError as error:
+                    ended.append(error)
+
+            thread = threading.Thread(target=look)
+            thread.start()
+            serve("look")
+            thread.join()
+            assert ended
+
+        attack()
+        started = time.monotonic()
+        thread = threading.Thread(target=lambda: made.append(node.new_sub("u", "bytes")))
+        thread.start()
+        serve("subscriber+")
+        thread.join()
+        assert time.monotonic() - started < 5.0
+        assert len(made) == 2
+        thread = threading.Thread(target=node.close)
+        thread.start()
+        serve("leave")
+        thread.join()
+    assert "what nobody understands" in caplog.text
+    assert "a socket could not be served" not in caplog.text
