@@ -59,7 +59,7 @@ class DockTitle(QWidget):
         self._theme, self._panel, self._density = theme, panel, density
         self._whole = panel.replaces_title()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.name = Elided("titleLarge" if density == "comfortable" else "title", "textSecondary", 60)
+        self.name = Elided("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
         self._subtitle = Elided("code", "textTertiary")
         self._tabs: list[TitleTab] = []
         self.more = IconButton(theme, "ellipsis", f"More about {panel.title()}")

@@ -37,17 +37,20 @@ class PaletteField(QAbstractButton):
         self.updateGeometry()
         self.update()
 
+    def _side(self) -> float:
+        return self._theme.scaled(ICON)
+
     def _key_room(self) -> float:
         return paint.key_width(self._theme, self._key) + 7 if self._key else 0.0
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
-        wide = LEFT + ICON + GAP + paint.width_of(font, self.text()) + 16 + self._key_room()
+        wide = LEFT + self._side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_room()
         high = max(HIGH, round(paint.height_of(font)) + 8)
         return QSize(max(WIDE, round(wide)), high)
 
     def minimumSizeHint(self) -> QSize:
-        least = LEFT + ICON + GAP + (self._key_room() or LEFT)
+        least = LEFT + self._side() + GAP + (self._key_room() or LEFT)
         return QSize(round(least), self.sizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -56,10 +59,11 @@ class PaletteField(QAbstractButton):
         over = self.underMouse() or self.isDown()
         fill = theme.colour("hover" if over else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("borderStrong"))
-        square = QRectF(LEFT, middle - ICON / 2, ICON, ICON)
+        side = self._side()
+        square = QRectF(LEFT, middle - side / 2, side, side)
         paint_icon(painter, square, "search", theme.colour("textSecondary"))
         font = theme.font("body")
-        left = LEFT + ICON + GAP
+        left = LEFT + side + GAP
         room = rect.width() - left - self._key_room() - 4
         if room >= self._theme.scaled(LEAST_ROOM):
             area = QRectF(left, 0, room, rect.height())
