@@ -1,4 +1,4 @@
-"""The bar above every layout: logo, menus, layout switch, palette field, the robots' chip, at the start Stop."""
+"""The bar above every layout: logo, menus, layout switch, palette field, robots, on the start page Stop."""
 
 from __future__ import annotations
 
