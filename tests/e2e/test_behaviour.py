@@ -22,7 +22,7 @@ def with_robot(start: Callable[..., Studio], tmp_path: Path) -> Callable[[dict],
 
     def open_script(script: dict) -> Studio:
         studio = start(str(write(tmp_path / "Mine.nepb", script)))
-        studio.choose("Robots", "Use the virtual robot")
+        studio.choose("Robots", "Use the virtual Pepper")
         studio.says("Pepper ready", 40)
         studio.spot("[data-id=started]")
         return studio

@@ -75,7 +75,7 @@ def test_the_robot_stops_and_ends_when_studio_is_killed(
     start: Callable[..., Studio], tmp_path: Path, address: str
 ) -> None:
     studio = start(str(write(tmp_path / "Turning.nepb", started(forever(turn(300))))))
-    studio.choose("Robots", "Use the virtual robot")
+    studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows")

@@ -21,7 +21,7 @@ def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     """Studio with the virtual robot and a behaviour that turns for ever; it runs."""
     speech = {**say("Round and round"), "x": 420, "y": 56}
     studio = start(str(write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech)))
-    studio.choose("Robots", "Use the virtual robot")
+    studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.spot("[data-id=turn]")
     studio.click("Run", kind="RunButton")

@@ -1,0 +1,66 @@
+"""A person tries a real robot for the first time: the question, the movement, Stop; and a second robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from tests.e2e.programs import Program
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(110)
+
+
+def press(studio: Studio, name: str) -> None:
+    """Click on a widget that has come to its place: a panel that has just opened is still laid out."""
+    places: list[object] = []
+
+    def rests() -> bool:
+        places.append(studio.find(name)["rect"])
+        return places[-3:] == [places[-1]] * 3
+
+    until(rests, f"{name} comes to rest")
+    studio.click(name)
+
+
+@pytest.fixture
+def table(start: Callable[..., Studio]) -> Iterator[Studio]:
+    """Studio, and the example of a driver, which is no virtual robot."""
+    studio = start()
+    network = {"NEP_MASTER": studio.master}
+    with Program("examples/thirty_line_driver.py", "--name", "Table", environment=network):
+        studio.says("Table ready", 40)
+        studio.choose("Robots", "Try what a robot can do")
+        studio.find("Try turn")
+        yield studio
+
+
+def test_it_moves_only_after_let_it_move_and_asks_once(table: Studio) -> None:
+    press(table, "Try turn")
+    table.says("Let Table move?")
+    table.says("“turn” moves Table.")
+    table.click("Not now")
+    until(lambda: not table.all("Let it move"), "the question has gone")
+    assert not table.all("Cancel turn")
+    press(table, "Try turn")
+    table.click("Let it move")
+    table.says("done in ")
+    press(table, "Try turn")
+    table.find("Cancel turn")
+    assert not table.all("Let it move")
+    table.screen.key("F12")
+    table.says("Table stopped (")
+    table.says("stopped after ")
+
+
+def test_a_second_virtual_robot_comes_and_is_drawn(start: Callable[..., Studio]) -> None:
+    studio = start()
+    studio.choose("Robots", "Use the virtual Turtle")
+    studio.says("Turtle ready", 40)
+    studio.choose("Robots", "Try what a robot can do")
+    studio.find("The robot in its room")
+    press(studio, "Try turn")  # a virtual robot is not asked for
+    studio.says("done in ")
+    assert not studio.all("Let it move")
