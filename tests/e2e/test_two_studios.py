@@ -34,7 +34,7 @@ def test_both_work_both_stop_and_the_second_outlives_the_first(
 
     environment = {} if same_home else {"NEP_STUDIO_HOME": str(tmp_path / "other")}
     second = start("--new-window", **environment)
-    second.says("Pepper", 40)
+    second.says("Pepper ready", 40)
     assert len(second.children("nep", "master")) == 1
     second.choose("Robots", "Use the virtual Pepper")
     second.choose("View", "Developer layout")
