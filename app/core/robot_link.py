@@ -107,7 +107,8 @@ class RobotLink:
     @property
     def running(self) -> tuple[Invocation, ...]:
         """The tries that have not ended."""
-        return tuple(made for made in self.invocations.values() if made.running)
+        known = {made.id: made for made in (*self.tried, *self.invocations.values())}
+        return tuple(made for made in known.values() if made.running)
 
     @property
     def chip(self) -> str:

@@ -168,3 +168,14 @@ def test_a_cancel_is_sent_once_it_runs_and_never_after_its_end(bench) -> None:
     bench.tries.cancel(bench.link, "move")
     bench.tries.cancel(bench.link, "turn")
     assert len(bench.sent) == count
+
+
+def test_two_tries_of_one_action_both_come_to_their_end(bench) -> None:
+    first, second = bench.begin(), bench.begin()
+    bench.answer(first, "accepted")
+    bench.answer(second, "accepted", replaces=["move"])
+    bench.answer(first, "canceled", error="move took its place")
+    assert (first.state, second.state) == ("canceled", "accepted")
+    assert bench.rested == []  # the second one still keeps the robot awake
+    bench.answer(second, "succeeded")
+    assert bench.rested == ["Turtle"]
