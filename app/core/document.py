@@ -7,7 +7,6 @@ import itertools
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -17,27 +16,14 @@ from app.blocks.robot_mend import blocks_of, use_robot
 from app.core import deep_json
 from app.core.behaviour_file import TOO_DEEP, BehaviourFile, Descriptions, Workspace, read_file, write_file
 from app.core.beside import Beside
+from app.core.compiled import QUICK_S, Compiled, Key, compiled, is_long
 from app.core.journal import Journal, Unsaved
 from app.errors import DescriptionError, DocumentError
 from app.robots.description import Robot, parse
 
 UNNAMED = "New behaviour"
 
-QUICK_S = 0.02
-"""A behaviour that compiles faster than this is compiled at once, in the window's thread."""
-LONG_CHARACTERS = 20_000
-Key = tuple[int, int, int]
-
 _keys = itertools.count(1)
-
-
-@dataclass(frozen=True)
-class Compiled:
-    """A program, what it was made of, and how long that took."""
-
-    key: Key
-    program: Program
-    seconds: float
 
 
 class Document:
@@ -70,7 +56,7 @@ class Document:
         self._connected: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
         self._compiled: tuple[Key, Program] | None = None
-        self._compile_s = 0.0
+        self._compile_s: float | None = None
         self._asked: Key | None = None
         self.beside: Beside[Compiled] | None = None
         self._definitions: tuple[int, Mapping[str, object]] | None = None
@@ -86,8 +72,8 @@ class Document:
         self.workspace = workspace
         self.dirty = True
         self.edits += 1
-        self._keep_used_robots()
-        self._write_journal()
+        text = self._keep_used_robots()
+        self._write_journal(text)
 
     def new(self, name: str = UNNAMED) -> None:
         """Begin an empty behaviour."""
@@ -201,15 +187,23 @@ class Document:
         key = self._key()
         if self._compiled is not None and self._compiled[0] == key:
             return self._compiled[1]
-        if self.beside is None or (self._compile_s < QUICK_S and not self._is_long()):
+        if self.beside is None:
             return self.program()
         done = self.beside.take(self.key)
         if done is not None:
             self._compiled, self._compile_s = (done.key, done.program), done.seconds
         if self._asked != key:
+            if self._is_quick():
+                return self.program()
             self._asked = key
-            self.beside.ask(self.key, partial(_compiled, key, self._compiling(), self._timer))
+            self.beside.ask(self.key, partial(compiled, key, self._compiling(), self._timer))
         return self._compiled[1] if self._compiled is not None else None
+
+    def _is_quick(self) -> bool:
+        """Whether compiling holds the window up so little that it may be done at once."""
+        if self._compile_s is not None:
+            return self._compile_s < QUICK_S
+        return self._asked is None and not is_long(self.workspace)
 
     def _key(self) -> Key:
         return self.revision, self.edits, self.definitions_revision
@@ -217,17 +211,6 @@ class Document:
     def _compiling(self) -> Callable[[], Program]:
         """The compilation of what is here now; it may run in any thread."""
         return partial(compile_behaviour, self.workspace, self._connected, absent=self.absent, name=self.name)
-
-    def _is_long(self) -> bool:
-        """Whether a behaviour that was never compiled is worth a thread: its file is long."""
-        if self._compiled is not None:
-            return False
-        inner = self.workspace.get("blocks")
-        tops = inner.get("blocks") if isinstance(inner, Mapping) else None
-        try:
-            return len(repr(tops)) > LONG_CHARACTERS
-        except RecursionError:
-            return True
 
     def problems(self) -> tuple[Problem, ...]:
         """What the compiler says of the blocks."""
@@ -247,14 +230,16 @@ class Document:
         self._journal = self._make_journal()
         self.name, self.path, self.workspace = found.name, path, found.workspace
         self.robots, self.others = dict(found.robots), found.others
+        self._compile_s = self._asked = None
         self.dirty = False
         self.saved_at = None
         self.revision += 1
         self.definitions_revision += 1
 
-    def _write_journal(self) -> None:
+    def _write_journal(self, text: str | None = None) -> None:
+        """``text`` is the JSON of the blocks when it is made already."""
         try:
-            self._journal.write(self.name, self.path, self.workspace, self.robots)
+            self._journal.write(self.name, self.path, self.workspace, self.robots, text)
         except OSError as error:
             self.journal_error = f"unsaved work can't be kept ({error.strerror or error}); save the file now"
         except RecursionError:
@@ -262,24 +247,23 @@ class Document:
         else:
             self.journal_error = None
 
-    def _keep_used_robots(self) -> None:
-        """Keep the descriptions of the robots that the blocks name: they are known without them later."""
+    def _keep_used_robots(self) -> str | None:
+        """Keep the descriptions of the robots that the blocks name: they are known without them later.
+
+        The JSON of the blocks is returned, if they have any.
+        """
         try:
             text = deep_json.dumps(self.workspace)
         except RecursionError:
-            return  # the journal, which comes next, says so
+            return None  # the journal, which comes next, says so
         for robot in self._connected:
             if json.dumps(robot.name, ensure_ascii=False) in text:
                 self.robots[robot.name] = dict(robot.source)
+        return text
 
     def _known(self) -> list[Robot]:
         found = (_parsed(description) for description in self.robots.values())
         return [robot for robot in found if robot is not None]
-
-
-def _compiled(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> Compiled:
-    began = timer()
-    return Compiled(key, compiling(), timer() - began)
 
 
 def _parsed(description: Mapping[str, object]) -> Robot | None:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from app.blocks import editor_definitions
 from app.core.beside import Beside
-from app.core.document import UNNAMED, Compiled, Document
+from app.core.compiled import Compiled
+from app.core.document import UNNAMED, Document
 from app.core.journal import Unsaved
 from app.errors import DocumentError
 from app.robots.description import Robot

@@ -7,6 +7,7 @@ that a second Studio does not offer what the first one still holds.
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import time
 import uuid
@@ -53,18 +54,23 @@ class Journal:
         path: Path | None,
         workspace: Mapping[str, object],
         robots: Mapping[str, Mapping[str, object]],
+        text: str | None = None,
     ) -> None:
-        """Keep the newest state. It survives the death of this process. Raises OSError."""
+        """Keep the newest state; ``text`` is the JSON of the workspace when it is made already.
+
+        It survives the death of this process. Raises OSError.
+        """
         entry = {
             "pid": os.getpid(),
             "born_s": _born(os.getpid()),
             "name": name,
             "path": str(path) if path is not None else None,
             "edited_s": self._clock(),
-            "workspace": workspace,
             "robots": robots,
         }
-        data = deep_json.dumps(entry).encode("utf-8", "surrogatepass")
+        blocks = text if text is not None else deep_json.dumps(workspace)
+        whole = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {blocks}}}'
+        data = whole.encode("utf-8", "surrogatepass")
         write_atomically(self._file, data, durable=False)
 
     def discard(self) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 from app.core.behaviour_file import LARGEST_BYTES
 from app.core.beside import Beside
-from app.core.document import Compiled, Document, read
+from app.core.compiled import Compiled
+from app.core.document import Document, read
 from app.core.journal import Journal, left_behind
 from app.errors import DocumentError
 from app.robots import rize
@@ -239,3 +240,19 @@ def test_a_short_behaviour_is_compiled_at_once(document: Document) -> None:
     document.edited(STARTED)
     assert document.newest() is document.program()
     assert beside._thread is None
+
+
+def test_a_long_file_opened_in_an_untouched_tab_does_not_hold_the_window_up(
+    document: Document, tmp_path: Path
+) -> None:
+    other = Document(lambda: Journal(tmp_path / "other"))
+    other.edited(_many(800))
+    other.save(tmp_path / "long.nepb")
+    beside: Beside[Compiled] = Beside("test compiler")
+    document.beside = beside
+    assert document.newest() is not None, "an empty one is compiled at once"
+    document.open(tmp_path / "long.nepb")
+    before = document.newest()
+    until(lambda: document.newest() is not before)
+    assert document.newest() is document.program()
+    beside.close()

@@ -121,3 +121,21 @@ def test_a_cured_problem_leaves_the_keyboard_in_the_panel(panel, window) -> None
     document.found, document.edits = (), 21
     panel.refresh()
     assert panel.hasFocus()
+
+
+def test_hundreds_of_problems_are_counted_and_the_first_are_shown(panel, window) -> None:
+    document = window.session.document
+    document.found = tuple(
+        Problem("error", f"x{n}", None, f"b{n}", f"b{n} needs a number.") for n in range(500)
+    )
+    document.edits = 30
+    panel.refresh()
+    assert (len(panel.rows), panel.chip.text) == (60, "500")
+    assert panel.others.text() == "and 440 more, when these are mended"
+    document.found, document.edits = document.found[400:], 31
+    panel.refresh()
+    assert [row.problem.subject for row in panel.rows][0] == "b400"
+    assert panel.others.text() == "and 40 more, when these are mended"
+    document.found, document.edits = document.found[:1], 32
+    panel.refresh()
+    assert not panel.others.isVisibleTo(panel)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 STATUS = {"error": "error", "warning": "warn", "info": "info"}
 PLURAL = {"error": ("error", "errors"), "warning": ("warning", "warnings"), "info": ("hint", "hints")}
+MOST_ROWS = 60
 NOTHING = "Nothing to mend.\nProblems appear here while you build."
 
 
@@ -138,6 +139,10 @@ class ProblemsPanel(PanelWidget):
         self._column = QVBoxLayout(inside)
         self._column.setContentsMargins(0, 4, 0, 4)
         self._column.setSpacing(0)
+        self.others = label("", "body", role="textSecondary")
+        self.others.setContentsMargins(14, 6, 8, 6)
+        self.others.hide()
+        self._column.addWidget(self.others)
         self._column.addStretch(1)
         scroll = self._scroll = QScrollArea()
         scroll.setAccessibleName("Problems")
@@ -180,14 +185,16 @@ class ProblemsPanel(PanelWidget):
         kept = {row.line: row for row in self.rows}
         held = False
         for line, row in kept.items():
-            if line not in found:
+            if line not in found[:MOST_ROWS]:
                 held = held or row.holds_focus()
                 self._column.removeWidget(row)
                 row.hide()
                 row.deleteLater()
-        self.rows = [kept.get(line) or self._row(line) for line in dict.fromkeys(found)]
+        self.rows = [kept.get(line) or self._row(line) for line in list(dict.fromkeys(found))[:MOST_ROWS]]
         for place, row in enumerate(self.rows):
             self._column.insertWidget(place, row)
+        self.others.setText(f"and {len(found) - MOST_ROWS} more, when these are mended")
+        paint.show_when(self.others, len(found) > MOST_ROWS)
         self.pages.setCurrentIndex(1 if found else 0)
         if held:  # a cured problem does not throw the keyboard out of the panel
             (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
