@@ -93,7 +93,8 @@ class Document:
 
         It is unsaved, and journalled anew before the old journal goes.
         """
-        self._replace(BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots), unsaved.path)
+        found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.others)
+        self._replace(found, unsaved.path)
         self.dirty = True
         self._write_journal()
         unsaved.journal.unlink(missing_ok=True)
@@ -239,7 +240,7 @@ class Document:
     def _write_journal(self, text: str | None = None) -> None:
         """``text`` is the JSON of the blocks when it is made already."""
         try:
-            self._journal.write(self.name, self.path, self.workspace, self.robots, text)
+            self._journal.write(self.name, self.path, self.workspace, self.robots, text, self.others)
         except OSError as error:
             self.journal_error = f"unsaved work can't be kept ({error.strerror or error}); save the file now"
         except RecursionError:

@@ -12,7 +12,7 @@ import os
 import time
 import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
@@ -32,6 +32,7 @@ class Unsaved:
     edited_s: float
     workspace: Mapping[str, object]
     robots: Mapping[str, Mapping[str, object]]
+    others: Mapping[str, object] = field(default_factory=dict)
 
 
 class Journal:
@@ -55,10 +56,11 @@ class Journal:
         workspace: Mapping[str, object],
         robots: Mapping[str, Mapping[str, object]],
         text: str | None = None,
+        others: Mapping[str, object] | None = None,
     ) -> None:
         """Keep the newest state; ``text`` is the JSON of the workspace when it is made already.
 
-        It survives the death of this process. Raises OSError.
+        ``others`` is what else its file says. It survives the death of this process. Raises OSError.
         """
         entry = {
             "pid": os.getpid(),
@@ -67,6 +69,7 @@ class Journal:
             "path": str(path) if path is not None else None,
             "edited_s": self._clock(),
             "robots": robots,
+            "others": dict(others or {}),
         }
         blocks = text if text is not None else deep_json.dumps(workspace)
         whole = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {blocks}}}'
@@ -104,6 +107,7 @@ def _read(file: Path) -> Unsaved | None:
             edited_s=float(entry["edited_s"]),
             workspace=dict(entry["workspace"]),
             robots={str(name): dict(td) for name, td in dict(entry["robots"]).items()},
+            others=dict(entry.get("others", {})),
         )
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None

@@ -150,6 +150,7 @@ def test_an_example_is_opened_without_its_file(document: Document, tmp_path: Pat
 
 
 def test_work_left_behind_is_put_back_and_stays_journalled(document: Document, journals: Path) -> None:
+    document.others = {"description": "what it does"}
     document.edited(STARTED)
     (file,) = journals.glob("*.json")
     entry = json.loads(file.read_bytes())
@@ -159,6 +160,7 @@ def test_work_left_behind_is_put_back_and_stays_journalled(document: Document, j
     after = Document(lambda: Journal(journals))
     after.recover(unsaved)
     assert after.workspace == STARTED
+    assert after.others == {"description": "what it does"}
     assert after.dirty
     assert not unsaved.journal.exists()
     assert len(list(journals.glob("*.json"))) == 1

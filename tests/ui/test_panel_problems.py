@@ -134,7 +134,7 @@ def test_hundreds_of_problems_are_counted_and_the_first_are_shown(panel, window)
     assert panel.others.text() == "and 440 more, when these are mended"
     document.found, document.edits = document.found[400:], 31
     panel.refresh()
-    assert [row.problem.subject for row in panel.rows][0] == "b400"
+    assert panel.rows[0].problem.subject == "b400"
     assert panel.others.text() == "and 40 more, when these are mended"
     document.found, document.edits = document.found[:1], 32
     panel.refresh()
