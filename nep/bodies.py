@@ -87,7 +87,8 @@ def decode_request(body: bytes) -> Asked:
     try:
         envelope = _envelope(body)
         number = envelope.get("call", 0)
-        call = number if isinstance(number, int) else 0
+        # Negative ones are those of the master's own process: nobody else may take their replies.
+        call = number if type(number) is int and number >= 0 else 0
         name = envelope.get("do")
         kind = _REQUESTS.get(name) if isinstance(name, str) else None
         if kind is None:

@@ -157,17 +157,21 @@ class Subscriber:
         ready = self._ready
         while ready:  # read already
             try:
-                return True, self.decoded(ready.popleft())
-            except (DecodeError, IndexError):  # another thread took the last one
-                continue
+                message = ready.popleft()
+            except IndexError:  # another thread took the last one
+                break
+            try:
+                return True, self.decoded(message) if self._problem else message.payload
+            except DecodeError as error:
+                self._tell(error)
         limit = None if block_mode and timeout_s is None else max(0.0, timeout_s or 0.0)
         deadline = time.monotonic() + limit if limit else None
         while True:
-            message = self.receive(limit)
-            if message is None:
+            came = self.receive(limit)
+            if came is None:
                 return False, self._empty()
             try:
-                return True, self.decoded(message)
+                return True, self.decoded(came)
             except DecodeError:
                 if deadline is not None:
                     limit = max(0.0, deadline - time.monotonic())
@@ -208,15 +212,19 @@ class Subscriber:
         try:
             payload = message.payload
         except DecodeError as error:
-            if not self._problem:
-                _logger.warning("a message on '%s' cannot be read: %s", self.topic, error)
-            self._problem = str(error)
-            self._inlet.report(self._problem)
+            self._tell(error)
             raise
         if self._problem:
             self._problem = ""
             self._inlet.report("")
         return payload
+
+    def _tell(self, error: DecodeError) -> None:
+        """A message cannot be read: log the first, and tell the graph."""
+        if not self._problem:
+            _logger.warning("a message on '%s' cannot be read: %s", self.topic, error)
+        self._problem = str(error)
+        self._inlet.report(self._problem)
 
     def close(self) -> None:
         """Unregister; what was not read is forgotten. May be called twice."""

@@ -51,7 +51,8 @@ def read_renewal(body: bytes) -> RenewalSaid | None:
     except (ValueError, LookupError, TypeError, AttributeError):
         return None
     numbers = type(said.call) is type(said.epoch) is type(said.revision) is int
-    is_usual = numbers and type(said.node_id) is str and type(said.cpu_ratio) in {float, type(None)}
+    is_usual = numbers and said.call >= 0 and type(said.node_id) is str
+    is_usual = is_usual and type(said.cpu_ratio) in {float, type(None)}
     is_usual = is_usual and {type(said.publishers), type(said.subscribers)} <= {list, tuple}
     return said if is_usual else None
 

@@ -73,6 +73,12 @@ def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None
     assert is_running(master.address)
 
 
+def test_nobody_takes_replies_that_are_for_the_masters_own_process(master: Master) -> None:
+    asked = bodies.decode_request(pack({"do": "ping", "call": -1}))
+    assert asked == bodies.Asked(0, Ping())
+    assert bodies.decode_request(pack({"do": "ping", "call": True})).call == 0
+
+
 def test_a_socket_of_another_kind_does_not_kill(master: Master) -> None:
     context = zmq.Context()
     for kind in (zmq.REQ, zmq.PUB, zmq.REP):

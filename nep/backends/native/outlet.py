@@ -43,6 +43,7 @@ _Part = bytes | memoryview | zmq.Frame
 _SNDMORE = int(zmq.SNDMORE)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
+_time_ns = time.time_ns
 
 _NO_COPY_BYTES = 65_536
 _LOOK_NS = 500_000
@@ -141,37 +142,47 @@ class NativeOutlet:
 
     def send(self, encoded: Encoded) -> None:
         """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed."""
-        data: bytes | memoryview | zmq.Frame = encoded.data
-        if isinstance(data, memoryview):
+        data: bytes | memoryview | zmq.Frame
+        data, beside = encoded
+        if type(data) is not bytes:
             data = _sendable(data)
-        extension = extension_part(encoded.extension) if encoded.extension else None
+        extension = extension_part(beside) if beside else None
         size = len(data)
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.count = seq = self.count + 1
-            self._bytes += size
-            self._last_stamp_ns = stamp_ns = time.time_ns()
-            form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
-            header = pack_quickly(form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id)
             if not self._mark.is_set:
                 self._mark.sending(size)
-            if extension is None and not self._flags:
+            self.count = seq = self.count + 1
+            self._bytes += size
+            self._last_stamp_ns = stamp_ns = _time_ns()
+            if extension or self._flags:
+                self._send_all(data, extension)
+            else:
                 send = self._send
                 send(self._topic, _SNDMORE)
-                send(header, _SNDMORE)
+                send(
+                    pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id),
+                    _SNDMORE,
+                )
                 send(data, 0, size < _NO_COPY_BYTES)
-            else:
-                tail = (header, data) if extension is None else (header, data, extension)
-                if self.spec.is_latched:
-                    self._latched = tail
-                self._send_parts(self._topic, tail)
             if not 0 <= stamp_ns - self._looked_ns < _LOOK_NS:
                 self._looked_ns = stamp_ns
                 self._read_subscriptions()
             elif not self._io_comes:
                 self._io_comes = True
                 self._serve_soon(self)
+
+    def _send_all(self, data: _Part, extension: bytes | None) -> None:
+        """Send what has flags, with the lock held."""
+        form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
+        stamp_ns = self._last_stamp_ns or 0
+        size = len(data) if len(data) <= SIZE_MAX else 0
+        header = pack_quickly(form, size, self.count, stamp_ns, self._id)
+        tail = (header, data) if extension is None else (header, data, extension)
+        if self.spec.is_latched:
+            self._latched = tail
+        self._send_parts(self._topic, tail)
 
     def _send_parts(self, first: bytes, tail: tuple[_Part, ...]) -> None:
         """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
@@ -270,8 +281,10 @@ class NativeOutlet:
             self._read_subscriptions()
 
 
-def _sendable(data: memoryview) -> _Part:
+def _sendable(data: bytes | memoryview) -> _Part:
     """What can be sent as it lies: a received message itself; of what can still change a copy."""
+    if isinstance(data, bytes):
+        return data
     origin = data.obj
     if isinstance(origin, _Frame) and data.nbytes == len(origin) and data.readonly:
         return origin
