@@ -71,13 +71,16 @@ class BehaviourTab(QAbstractButton):
         self.update()
         return wider
 
+    def _icon(self) -> int:
+        return round(self._theme.scaled(ICON))
+
     def _has_icon(self) -> bool:
         return self.isChecked() or self.facts.runs
 
     def sizeHint(self) -> QSize:
         font = self._font(current=True)
         name = min(self._theme.scaled(LONGEST_NAME), paint.width_of(font, self.facts.name) + 1)
-        icon = ICON + 8 if self._has_icon() else 0
+        icon = self._icon() + 8 if self._has_icon() else 0
         height = max(28, round(paint.height_of(font)) + 6)
         return QSize(round(PADDING + icon + name + SLOT + 4), height)
 
@@ -101,8 +104,9 @@ class BehaviourTab(QAbstractButton):
         ink = theme.colour("selectedText" if current else "textSecondary")
         left = float(PADDING)
         if self._has_icon():
-            self._paint_mark(painter, QRectF(left, rect.center().y() - ICON / 2, ICON, ICON))
-            left += ICON + 8
+            side = self._icon()
+            self._paint_mark(painter, QRectF(left, rect.center().y() - side / 2, side, side))
+            left += side + 8
         words = rect.adjusted(left, 0, -SLOT - 2, 0)
         paint.words(painter, words, self.facts.name, self._font(current=current), ink)
         self._paint_slot(painter, over or self.hasFocus())

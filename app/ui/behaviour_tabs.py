@@ -32,6 +32,7 @@ class BehaviourTabs(QWidget):
         self._current = ""
         self._left = 0.0
         self.tabs: dict[str, BehaviourTab] = {}
+        self._room = QWidget(self)  # cuts off what the wheel has moved out of sight
         self.add = IconButton(theme, "plus", "New behaviour", "Ctrl+N", parent=self)
         self.add.setProperty("command", "file.new")
         self.setAccessibleName("Open behaviours")
@@ -60,7 +61,7 @@ class BehaviourTabs(QWidget):
     def _tab(self, facts: TabFacts) -> BehaviourTab:
         key = facts.key
         if key not in self.tabs:
-            tab = self.tabs[key] = BehaviourTab(self._theme, self)
+            tab = self.tabs[key] = BehaviourTab(self._theme, self._room)
             tab.chosen.connect(lambda: self.chosen.emit(key))
             tab.close_pressed.connect(lambda: self.closed.emit(key))
             tab.dragged.connect(lambda x: self._drag(key, x))
@@ -91,16 +92,20 @@ class BehaviourTabs(QWidget):
         self._place(bring=True)
 
     def _widths(self) -> list[int]:
-        """As wide as the names want; all shorter where that does not fit."""
+        """As wide as the names want; all but the current one shorter where that does not fit."""
         wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
         room = self.width() - self.add.sizeHint().width() - GAP * (len(wanted) + 1)
         least = round(self._theme.scaled(SHORTEST))
-        if sum(wanted) <= room or not wanted:
-            return wanted
-        most = max(wanted)
-        while most > least and sum(min(each, most) for each in wanted) > room:
+        keys = [each.key for each in self._facts]
+
+        def cut(most: int) -> list[int]:
+            pairs = zip(keys, wanted, strict=True)
+            return [width if key == self._current else min(width, most) for key, width in pairs]
+
+        most = max(wanted, default=least)
+        while most > least and sum(cut(most)) > room:
             most -= 4
-        return [min(each, max(most, least)) for each in wanted]
+        return cut(max(most, least))
 
     def _place(self, *, bring: bool = False) -> None:
         widths = self._widths()
@@ -109,6 +114,7 @@ class BehaviourTabs(QWidget):
         if bring:
             self._left = self._left_for_current(widths, room)
         self._left = max(0.0, min(self._left, float(total - room)))
+        self._room.setGeometry(0, 0, max(0, room), self.height())
         x = -self._left
         for each, width in zip(self._facts, widths, strict=True):
             tab = self.tabs[each.key]
