@@ -184,7 +184,7 @@ class Pictures(SelfDrive):
 
     def _begin(self) -> None:
         self._commands.run("robots.virtual")
-        self._commands.open_at_start(self._behaviour)
+        self._commands.files.open(self._behaviour)
 
     def _inspect(self) -> None:
         self._window.open_topic("/Pepper/camera")
