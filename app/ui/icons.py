@@ -10,7 +10,7 @@ import difflib
 from collections.abc import Callable
 from functools import lru_cache
 
-from PySide6.QtCore import QByteArray, QPoint, QRect, QRectF, QSize, QSizeF, Qt
+from PySide6.QtCore import QByteArray, QPoint, QPointF, QRect, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import QColor, QIcon, QIconEngine, QPainter, QPixmap
 from PySide6.QtSvg import QSvgRenderer
 
@@ -63,6 +63,24 @@ def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, fi
         thin = rect.width() >= THIN_FROM_PX
         _renderer(name, colour.name(), round(colour.alphaF(), 3), filled, thin).render(painter, rect)
     painter.restore()
+
+
+@lru_cache(maxsize=256)
+def _drawn(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
+    pixmap = QPixmap(round(side * ratio), round(side * ratio))
+    pixmap.setDevicePixelRatio(ratio)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
+    paint_icon(painter, QRectF(0, 0, side, side), name, QColor.fromRgba(rgba))
+    painter.end()
+    return pixmap
+
+
+def paint_icon_again(painter: QPainter, rect: QRectF, name: str, colour: QColor) -> None:
+    """`paint_icon` for what is painted many times a second: drawn once, then copied to whole pixels."""
+    ratio = painter.device().devicePixelRatioF()
+    place = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
+    painter.drawPixmap(place, _drawn(name, rect.width(), colour.rgba(), ratio))
 
 
 class IconEngine(QIconEngine):

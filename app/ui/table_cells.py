@@ -9,7 +9,7 @@ from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRect, Q
 from PySide6.QtGui import QFont, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
-from app.ui.icons import paint_icon
+from app.ui.icons import paint_icon, paint_icon_again
 from app.ui.table import CELL_ROLE, Cell, Column, Order
 from app.ui.theme import Theme
 from app.ui.widgets.small import SPARK, paint_sparkline
@@ -94,7 +94,7 @@ class CellDelegate(QStyledItemDelegate):
         x = box.right() - advance - taken if figures else box.left()
         if cell.icon:
             top = box.center().y() - ICON / 2
-            paint_icon(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
+            paint_icon_again(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
             x += ICON + 5.0
         painter.setFont(font)
         painter.setPen(colour)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -84,3 +85,29 @@ def test_copies_of_an_icon_outlive_the_first(theme: Theme) -> None:
         del icon
     gc.collect()
     assert all(not copy.pixmap(QSize(16, 16), 1.0).isNull() for copy in copies)
+
+
+def test_an_icon_that_is_painted_again_and_again_is_drawn_once_and_looks_the_same(qapp) -> None:
+    def painted(paint: Callable[[QPainter], None]) -> QImage:
+        image = QImage(40, 40, QImage.Format.Format_RGB32)
+        image.setDevicePixelRatio(2.0)
+        image.fill(QColor("white"))
+        painter = QPainter(image)
+        paint(painter)
+        painter.end()
+        return image
+
+    place, colour = QRectF(3, 3, 14, 14), QColor("#204080")
+    direct = painted(lambda painter: icons.paint_icon(painter, place, "braces", colour))
+    icons._drawn.cache_clear()
+    again = [painted(lambda p: icons.paint_icon_again(p, place, "braces", colour)) for _ in range(3)]
+    assert icons._drawn.cache_info().misses == 1
+    for image in again:
+        far = max(
+            abs(image.pixelColor(x, y).red() - direct.pixelColor(x, y).red())
+            for x in range(40)
+            for y in range(40)
+        )
+        assert far <= 2
+    other = painted(lambda p: icons.paint_icon_again(p, place, "braces", QColor("#802020")))
+    assert other != again[0]
