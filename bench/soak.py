@@ -148,9 +148,8 @@ def soak(opened: Studio, seconds: float) -> list[Sample]:
     next_step = next_sample = began
     while (now := time.monotonic()) < began + seconds:
         if now >= next_step:
-            next_step = now + (
-                HURRY_S if now < began + FIRST_S else STEP_S
-            )  # at first everything is opened once
+            # at first everything is opened once, so that it is there when the judging begins
+            next_step = now + (HURRY_S if now < began + FIRST_S else STEP_S)
             next(doing)()
         if now >= next_sample:
             next_sample = now + EVERY_S
