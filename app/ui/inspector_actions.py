@@ -12,24 +12,37 @@ from app.ui.inspector_parts import plain_words
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from app.ui.panels.inspector import InspectorPanel
+    from PySide6.QtWidgets import QWidget
+
+    from app.ui.inspector_body import InspectorBody
+    from app.ui.theme import Theme
     from app.ui.tree import Node
+    from nep.message import Message
 
 
 class InspectorActions(QObject):
     """Copy a value, its path, or the message; find; compare."""
 
-    def __init__(self, panel: InspectorPanel) -> None:
+    def __init__(
+        self,
+        theme: Theme,
+        panel: QWidget,
+        body: InspectorBody,
+        shown: Callable[[], Message | None],
+        *,
+        find: Callable[[], object],
+        toast: Callable[[str], None],
+    ) -> None:
+        """Keys work in ``panel``; ``shown`` is its message, ``find`` goes to its field."""
         super().__init__(panel)
-        self._panel = panel
-        tree = panel.tree
+        self._body, self._shown, self._toast = body, shown, toast
         rows: tuple[tuple[str, str, str, Callable[[], object]], ...] = (
             ("Copy value", "Ctrl+C", "copy", self.copy_value),
             ("Copy path", "Ctrl+Shift+C", "link", self.copy_path),
             ("Copy the message as JSON", "Ctrl+Shift+J", "braces", self.copy_message),
-            ("Find a key or value", "Ctrl+F", "search", panel.focus_filter),
-            ("Next one", "F3", "", lambda: panel.finder.step(1)),
-            ("Previous one", "Shift+F3", "", lambda: panel.finder.step(-1)),
+            ("Find a key or value", "Ctrl+F", "search", find),
+            ("Next one", "F3", "", lambda: body.finder.step(1)),
+            ("Previous one", "Shift+F3", "", lambda: body.finder.step(-1)),
         )
         self._actions: list[QAction] = []
         for words, key, icon, does in rows:
@@ -37,9 +50,9 @@ class InspectorActions(QObject):
             action.setShortcut(QKeySequence(key))
             action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             if icon:
-                action.setIcon(panel.theme.icon(icon))
+                action.setIcon(theme.icon(icon))
             action.triggered.connect(lambda _on=False, do=does: do())
-            (tree if key.endswith("C") else panel).addAction(action)  # fields copy their own text
+            (body.tree if key.endswith("C") else panel).addAction(action)  # fields copy their own text
             self._actions.append(action)
 
     def listed(self) -> list[QAction]:
@@ -65,20 +78,20 @@ class InspectorActions(QObject):
 
     def copy_message(self) -> None:
         """Put the whole message on the clipboard: JSON as it was sent, anything else as JSON."""
-        message = self._panel.message
+        message = self._shown()
         if message is None:
             return
         if message.codec == "json":
             text = str(message.data, "utf-8", "replace")
         else:
-            text = plain_words(self._panel.model.value())
-        self._copied(text, f"the message of {self._panel.subtitle()}")
+            text = plain_words(self._body.model.value())
+        self._copied(text, f"the message of {message.topic}")
 
     def _chosen(self) -> Node | None:
         """The value that is chosen in the tree."""
-        index = self._panel.tree.currentIndex()
-        return self._panel.model.node(index) if index.isValid() else None
+        index = self._body.tree.currentIndex()
+        return self._body.model.node(index) if index.isValid() else None
 
     def _copied(self, text: str, what: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self._panel.context.toast(f"Copied {what}")
+        self._toast(f"Copied {what}")

@@ -12,13 +12,15 @@ from hypothesis import strategies as st
 from app.core import lazy_json
 from app.core.lazy_json import JsonIndex, LazyList, LazyObject, Unreadable
 
+TEXTS = st.text(alphabet=st.sampled_from('ab"\\{}[],: \n\u00e9\u20ac'), max_size=12)
+NUMBERS = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
 VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers(-(2**53), 2**53)
-    | st.floats(allow_nan=False, allow_infinity=False) | st.text(alphabet=st.sampled_from('ab"\\{}[],: \n\u00e9\u20ac'), max_size=12),
-    lambda inside: st.lists(inside, max_size=5)
-    | st.dictionaries(st.text('k"\\{,:', max_size=4), inside, max_size=5),
+    st.none() | st.booleans() | NUMBERS | TEXTS,
+    lambda inside: (
+        st.lists(inside, max_size=5) | st.dictionaries(st.text('k"\\{,:', max_size=4), inside, max_size=5)
+    ),
     max_leaves=25,
-)  # fmt: skip
+)
 
 
 def whole(value: object) -> object:

@@ -73,7 +73,9 @@ class InspectorPanel(PanelWidget):
         body = self.body
         self.model, self.tree, self.finder = body.model, body.tree, body.finder
         self.mode, self.strip, self.foot, self.bytes = body.mode, body.strip, body.foot, body.bytes
-        self.own = InspectorActions(self)
+        self.own = InspectorActions(
+            self.theme, self, body, lambda: self._shown, find=self.focus_filter, toast=self.context.toast
+        )
         self.foot.copy_value.clicked.connect(self.own.copy_value)
         self.foot.copy_path.clicked.connect(self.own.copy_path)
         self.tree.selectionModel().currentChanged.connect(self._chosen)
@@ -224,11 +226,6 @@ class InspectorPanel(PanelWidget):
     def comparing(self) -> bool:
         """Whether the tree shows how the message differs from another one."""
         return self.compare.isChecked() or self.pin.isChecked()
-
-    @property
-    def message(self) -> Message | None:
-        """What is shown."""
-        return self._shown
 
     def _pin(self, pinned: bool) -> None:
         self._pinned = self._value if pinned and self._value is not None else OFF
