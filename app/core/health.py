@@ -123,7 +123,7 @@ class Health:
             f"message:{topic}",
             "warn",
             f"{topic} sends what can't be read ({messages}).",
-            f"{checked.sentence}. Look at the raw bytes in the Inspector.{more}",
+            f"{checked.sentence[:1].upper()}{checked.sentence[1:]}. Look at the raw bytes in the Inspector.{more}",
             button="Look at it",
             action=f"inspect:{topic}",
             count=checked.bad,

@@ -43,7 +43,7 @@ def test_bad_messages_are_one_alert_with_the_exact_count(case: Case) -> None:
     (alert,) = case.alerts.active
     assert (alert.id, alert.count, alert.action) == ("message:/a", 990, "inspect:/a")
     assert "990 messages" in alert.title
-    assert "too fast" not in alert.detail
+    assert alert.detail == "No json. Look at the raw bytes in the Inspector."
 
 
 def test_what_was_not_tried_is_said(case: Case) -> None:
