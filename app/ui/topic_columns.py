@@ -29,7 +29,7 @@ def name_cell(topic: Topic) -> Cell:
 def type_cell(topic: Topic) -> Cell:
     """The type's icon and word; of "robot/answer" the last one, the tooltip has the whole."""
     icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
-    return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"), middle=True)
+    return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"))
 
 
 def publishers_cell(topic: Topic) -> Cell:
@@ -116,8 +116,8 @@ def _loss_tip(topic: Topic) -> str:
 
 
 COLUMNS: tuple[Column[Topic], ...] = (
-    Column("topic", "Topic", 140, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
-    Column("type", "Type", 71, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
+    Column("topic", "Topic", 137, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
+    Column("type", "Type", 82, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
     Column(
         "publishers",
         "Publishers",
@@ -132,9 +132,9 @@ COLUMNS: tuple[Column[Topic], ...] = (
         "subscribers", "Subscribers", 80, subscribers_cell, lambda t: t.subscribers, figures=True, off=True
     ),
     Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
-    Column("curve", "", 62, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
+    Column("curve", "", 57, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
     Column("rate", "Rate /s", 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
-    Column("bandwidth", "Bandwidth", 76, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
+    Column("bandwidth", "Bandwidth", 73, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
     Column("age", "Age", 67, age_cell, lambda t: t.age_s, figures=True, yields=2),
     Column("loss", "Loss", 75, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
 )

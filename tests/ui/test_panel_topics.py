@@ -86,7 +86,7 @@ def test_what_studio_itself_brought_is_no_news(panel, window) -> None:
 
 def test_a_type_says_its_last_word_and_has_an_icon_without_a_publisher() -> None:
     cell = type_cell(Topic("/a", "robot/answer", "json"))
-    assert (cell.text, cell.icon, cell.middle) == ("answer", "braces", True)
+    assert (cell.text, cell.icon) == ("answer", "braces")
     assert type_cell(Topic("/a", "json", "")).icon == "braces"
     assert type_cell(Topic("/a", "own/kind", "")).icon == "box"
 
