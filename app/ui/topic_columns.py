@@ -117,7 +117,7 @@ def _loss_tip(topic: Topic) -> str:
 
 COLUMNS: tuple[Column[Topic], ...] = (
     Column("topic", "Topic", 137, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
-    Column("type", "Type", 82, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
+    Column("type", "Type", 80, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
     Column(
         "publishers",
         "Publishers",
@@ -134,8 +134,8 @@ COLUMNS: tuple[Column[Topic], ...] = (
     Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
     Column("curve", "", 57, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
     Column("rate", "Rate /s", 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
-    Column("bandwidth", "Bandwidth", 73, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
-    Column("age", "Age", 67, age_cell, lambda t: t.age_s, figures=True, yields=2),
+    Column("bandwidth", "Bandwidth", 77, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
+    Column("age", "Age", 66, age_cell, lambda t: t.age_s, figures=True, yields=2),
     Column("loss", "Loss", 75, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
 )
 
