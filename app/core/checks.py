@@ -42,9 +42,13 @@ class Checked:
 class Checks:
     """Tries messages in the source's thread (`look`); the window's thread takes what was found (`take`)."""
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        """``clock`` gives seconds; it measures the work."""
-        self._clock = clock
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        work: Callable[[], float] = time.thread_time,
+    ) -> None:
+        """``clock`` gives seconds that pass, ``work`` those that the calling thread has worked."""
+        self._clock, self._work = clock, work
         self._lock = threading.Lock()
         self._found: dict[str, Checked] = {}
         self._suspects: dict[str, float] = {}
@@ -83,12 +87,12 @@ class Checks:
         found.sentence = _problem(newest, keep=True)  # always, and it stays decoded: panels show this one
         found.last_good = not found.sentence
         found.checked, found.bad = 1, int(not found.last_good)
-        began = self._clock()
+        now, began = self._refilled, self._work()
         if found.bad:
-            self._suspects[topic] = began
-        left = self._advance_s - (0.0 if self._is_suspect(topic, began) else RESERVE_S)
+            self._suspects[topic] = now
+        left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVE_S)
         for message in messages[:-1]:
-            if self._clock() - began >= left:
+            if self._work() - began >= left:
                 break
             problem = _problem(message, keep=False)
             found.checked += 1
@@ -96,10 +100,10 @@ class Checks:
                 found.bad += 1
                 found.sentence = found.sentence or problem
                 if found.bad == 1:
-                    self._suspects[topic] = began
+                    self._suspects[topic] = now
                     left = self._advance_s
         found.unchecked = len(messages) - found.checked
-        self._advance_s -= self._clock() - began
+        self._advance_s -= self._work() - began
 
     def _is_suspect(self, topic: str, now: float) -> bool:
         seen = self._suspects.get(topic)

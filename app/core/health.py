@@ -118,12 +118,13 @@ class Health:
 
     def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
         messages = "1 message" if bad.count == 1 else f"{bad.count} messages"
+        why = f"{checked.sentence[:1].upper()}{checked.sentence[1:]}."
         more = f" {bad.unchecked} more came too fast to be tried." if bad.unchecked else ""
         self._alerts.put(
             f"message:{topic}",
             "warn",
             f"{topic} sends what can't be read ({messages}).",
-            f"{checked.sentence[:1].upper()}{checked.sentence[1:]}. Look at the raw bytes in the Inspector.{more}",
+            f"{why} Look at the raw bytes in the Inspector.{more}",
             button="Look at it",
             action=f"inspect:{topic}",
             count=checked.bad,

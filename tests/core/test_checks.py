@@ -43,7 +43,7 @@ def test_every_message_is_tried_and_the_newest_bad_one_is_told() -> None:
 
 
 def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> None:
-    checks = Checks()  # the real clock: the promise is about real work
+    checks = Checks()  # the real clocks: the promise is about real work
     for _ in range(10):
         checks.look("/a", messages(*[BAD] * 10_000))
     found = checks.take()["/a"]
@@ -54,7 +54,7 @@ def test_a_hundred_thousand_bad_messages_in_a_burst_are_counted_exactly() -> Non
 
 def test_a_topic_that_is_well_leaves_the_reserve_to_those_that_are_not() -> None:
     clock = Clock(step_s=0.01)
-    checks = Checks(clock)
+    checks = Checks(clock, clock)
     checks.look("/a", messages(*[GOOD] * 500))
     well = checks.take()["/a"]
     assert 0 < well.checked < 60
@@ -70,7 +70,7 @@ def test_a_topic_that_is_well_leaves_the_reserve_to_those_that_are_not() -> None
 
 
 def test_one_bad_message_makes_the_rest_of_its_batch_worth_the_reserve() -> None:
-    checks = Checks(Clock(step_s=0.01))
+    checks = Checks(work=Clock(step_s=0.01))
     checks.look("/a", messages(BAD, *[GOOD] * 200))
     found = checks.take()["/a"]
     assert found.bad == 1
@@ -79,7 +79,7 @@ def test_one_bad_message_makes_the_rest_of_its_batch_worth_the_reserve() -> None
 
 def test_a_clock_that_jumps_back_takes_nothing_away() -> None:
     clock = Clock()
-    checks = Checks(clock)
+    checks = Checks(clock, clock)
     clock.now -= 50.0
     checks.look("/a", messages(BAD, BAD))
     assert checks.take()["/a"].bad == 2
