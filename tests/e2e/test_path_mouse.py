@@ -1,0 +1,176 @@
+"""A person's path with the mouse alone, from the start page to a saved behaviour; each step is a picture."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.e2e.film import Film, MouseOnly, snapped, topic
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
+from tests.e2e.waiting import until
+
+pytestmark = pytest.mark.timeout(230)
+WORKSPACE = ".nepTab:not([hidden])"
+
+
+class Hand:
+    """What a hand does here with several blocks."""
+
+    def __init__(self, studio: Studio) -> None:
+        self.studio = studio
+
+    def put_hat(self) -> str:
+        """Drag "when started" onto the empty page; the block's id."""
+        self.studio.open_category("Events")
+        view = self.studio.find(kind="QWebEngineView")["rect"]
+        self.studio.drag(f"{WORKSPACE} .blocklyFlyout .events_started", view[0] + 420, view[1] + 90)
+        (hat,) = until(self.studio.blocks, "the hat is in the workspace")
+        return hat
+
+    def put(self, category: str, kind: str, above: str, dx: float = 16, dy: float = 20) -> str:
+        """Drag a block to just below another one, or with ``dx`` into it; its id."""
+        self.studio.open_category(category)
+        left, top, _, height = self.studio.spot(f"{WORKSPACE} [data-id='{above}'] > .blocklyPath")
+        into = 62 if dx > 16 else height + dy
+        self.studio.drag(f"{WORKSPACE} .blocklyFlyout .{kind}", left + dx, top + into)
+        return snapped(self.studio, above, kind)
+
+    def text_of(self, block: str) -> str:
+        words = f"document.querySelector(\"[data-id='{block}']\").textContent"
+        return str(self.studio.page(words)).replace("\u00a0", " ")
+
+
+def colours_of(studio: Studio, block: str) -> str:
+    """The label of the colour of a block."""
+    field = f"document.querySelector(\"[data-id='{block}'] .nepColour\")"
+    return str(studio.page(f"{field}.outerHTML"))
+
+
+def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_path: Path) -> None:
+    home = tmp_path / "person"
+    home.mkdir()
+    studio = start(HOME=str(home))
+    studio.screen = mouse = MouseOnly(studio.screen.display)
+    film, hand = Film(studio, "mouse", tmp_path), Hand(studio)
+
+    with film.step("The start page asks what you would like to do"):
+        studio.says("What would you like to do?")
+    with film.step("One click: the virtual robot comes"):
+        studio.click("Use the virtual robot")
+        studio.says("Pepper ready", 40)
+        studio.says("virtual, ready")
+    with film.step("A new behaviour, by the menu"):
+        studio.choose("File", "New behaviour")
+        studio.find("New behaviour", kind="BehaviourTab")
+        until(lambda: studio.blocks() == [], "its page is empty")
+    with film.step("The first block is dragged from the toolbox"):
+        hat = hand.put_hat()
+    with film.step("What is to be done for ever goes below it"):
+        loop = hand.put("Control", "control_forever", hat)
+    with film.step("The eyes, a sentence, a turn and a wait are dragged into it"):
+        light = hand.put("Face and lights", "robot_pepper_do_light", loop, dx=40)
+        say = hand.put("Speech", "robot_pepper_do_say", light)
+        turn = hand.put("Movement", "robot_pepper_do_turn", say)
+        hand.put("Control", "control_wait", turn)
+    with film.step("A drop-down: turn to the right"):
+        studio.screen.click(*middle(direction(studio, turn)))
+        menu_item(studio, "right")
+        until(lambda: "right" in hand.text_of(turn), "the block says so")
+    with film.step("A colour: the eyes become red"):
+        studio.point(f"{WORKSPACE} [data-id='{light}'] .nepColour", 12, 9)
+        studio.point(".nepPalette [title=red]", 8, 8)
+        until(lambda: "#ff3b30" in colours_of(studio, light), "the block has it")
+    with film.step("Run: the block that runs now glows"):
+        studio.click("Run", kind="RunButton")
+        until(lambda: studio.outlined("running"), "a block glows", 40)
+        studio.find("Pause", kind="RunButton", enabled=True)
+    with film.step("Pause: the program waits, the robot holds still"):
+        studio.click("Pause", kind="RunButton")
+        studio.says("Paused at “")
+        until(lambda: studio.outlined("stopped"), "the next block is outlined")
+    with film.step("Go on"):
+        studio.click("Go on", kind="RunButton")
+        until(lambda: studio.outlined("running"), "it glows again")
+    with film.step("Stop: every robot has answered"):
+        studio.click("Stop", kind="StopButton")
+        studio.says("Pepper stopped (")
+        assert not studio.outlined("running")
+    see_what_the_robot_says(studio, film, mouse)
+    save(studio, film, home)
+    assert 15 <= len(film.pictures)
+
+
+def direction(studio: Studio, turn: str) -> list[float]:
+    """Where the drop-down "left" of the turn block is on the screen."""
+    found = (
+        f"(e => e && (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
+        f"([...document.querySelectorAll(\"[data-id='{turn}'] .blocklyDropdownField\")]"
+        f".find(e => e.textContent.includes('left')))"
+    )
+    left, top, width, height = until(lambda: studio.page(found), "the drop-down is there")
+    view = studio.find(kind="QWebEngineView")["rect"]
+    return [view[0] + left, view[1] + top, width, height]
+
+
+def menu_item(studio: Studio, words: str) -> None:
+    """Choose from the drop-down that is open in the page."""
+    found = (
+        f"(e => e && (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
+        f"([...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.includes('{words}')))"
+    )
+    before: list[object] = []
+
+    def still() -> object:
+        before.append(studio.page(found))
+        return before[-1] if len(before) > 1 and before[-1] == before[-2] else None
+
+    left, top, width, height = until(still, f"{words} is offered")
+    view = studio.find(kind="QWebEngineView")["rect"]
+    studio.screen.click(view[0] + left + width / 2, view[1] + top + height / 2)
+
+
+def see_what_the_robot_says(studio: Studio, film: Film, mouse: MouseOnly) -> None:
+    with film.step("The Developer layout lists the topics"):
+        studio.click("Developer")
+        studio.row("Topics", "/Pepper/faces")
+    with film.step("One click on a topic: its newest message"):
+        mouse.click(*topic(studio, "/Pepper/state"))
+        until(lambda: "room" in studio.values("Newest message"), "the inspector shows it")
+    with film.step("A value is opened"):
+        closed = len(studio.rows("Newest message"))
+        row = studio.row("Newest message", "objects")
+        mouse.click(row["rect"][0] - 8, middle(row["rect"])[1])
+        until(lambda: len(studio.rows("Newest message")) > closed, "its parts are there")
+    with film.step("One click on a picture topic: the robot's camera"):
+        mouse.click(*topic(studio, "/Pepper/camera"))
+        view = studio.find(kind="ZoomablePicture")
+        until(lambda: studio.picture(view)[::5, ::5].std() > 20, "the picture is there")
+    with film.step("The wheel makes the picture larger"):
+        fitting = studio.find(kind="ZoomablePicture")["description"]
+        mouse.wheel(*middle(view["rect"]), 5)
+        until(lambda: studio.find(kind="ZoomablePicture")["description"] != fitting, "it says its size")
+
+
+def save(studio: Studio, film: Film, home: Path) -> None:
+    with film.step("Back to the blocks, as they were left"):
+        studio.click("Behaviour", kind="_Segment")
+        until(lambda: len(studio.blocks()) >= 6, "the blocks are there")
+    with film.step("Save asks for a place"):
+        studio.choose("File", "Save")
+        studio.find(kind="QFileDialog")
+    with film.step("Saved"):
+        studio.click("&Save", kind="QPushButton")
+        until(lambda: not studio.all(kind="QFileDialog"), "the dialog is gone")
+        path = home / "New behaviour.nepb"
+        until(path.exists, lambda: f"{path} is there: {list(home.glob('*'))}")
+        until(lambda: not any("not saved" in str(t["name"]) for t in studio.all(kind="BehaviourTab")), "no dot")
+    words = path.read_text("utf-8")
+    assert all(kind in words for kind in ("robot_pepper_do_say", "robot_pepper_do_turn", "control_wait"))
+    (hat,) = json.loads(words)["workspace"]["blocks"]["blocks"]
+    assert hat["type"] == "events_started"
+    assert np.all([picture.stat().st_size > 10_000 for picture in film.pictures])
