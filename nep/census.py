@@ -215,14 +215,15 @@ class Census:
         """A publisher has sent so much until now."""
         if count != publisher.count:
             publisher.changed_at = now
-        if now - publisher.changed_at < FADES_S:
+            publisher.count, publisher.bytes = count, size_bytes
             self.touched.add(publisher.record.topic)
-        publisher.count, publisher.bytes = count, size_bytes
+        elif now - publisher.changed_at < FADES_S:
+            self.touched.add(publisher.record.topic)
         publisher.meter.add(now, count, size_bytes)
 
     def seen(self, subscriber: Subscriber, received: int | None, lost: int | None, problem: str) -> None:
         """A subscriber has received so much until now."""
-        if (received, lost, problem) != (subscriber.received, subscriber.lost, subscriber.problem):
+        if received != subscriber.received or lost != subscriber.lost or problem != subscriber.problem:
             self.touched.add(subscriber.record.topic)
             subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
 

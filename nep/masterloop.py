@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import zmq
 
-from nep.addresses import endpoint_of
 from nep.bodies import Asked, decode_request
 from nep.collecting import collecting_later
-from nep.errors import AddressInUseError, ClosedError, NepError, WaitTimeoutError
+from nep.errors import ClosedError, NepError, WaitTimeoutError
 from nep.graph import Graph, GraphView
 from nep.listening import Listening
+from nep.masterport import MasterPort
 from nep.outgoing import Outgoing, with_hosts, without
 from nep.renewals import read_renewal, renewed_body
 from nep.requests import Done, Join, Listen, Look, Refused, Reply, ReportAlerts, Request, node_of
@@ -30,7 +30,6 @@ __all__ = ["MasterLoop"]
 
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
-_REQUEST_MAX_BYTES = 64 * 2**20
 _REST_MS = 10
 _NODES_PER_MS = 50
 """How long renewals may gather: not at all with fewer nodes than these, then 1 ms longer for so many each."""
@@ -54,8 +53,8 @@ class MasterLoop:
         self._graph = graph
         self._listeners = listeners
         self._owner = owner
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._router = self._context.socket(zmq.ROUTER)
+        self._port = MasterPort(address)
+        self.address = self._port.address
         self._waker = Waker()
         self._submitted: deque[Submission] = deque()
         self._pending: dict[int, Submission] = {}
@@ -67,18 +66,7 @@ class MasterLoop:
         self._told_revision = graph.revision
         self.ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
-        self._router.setsockopt(zmq.LINGER, 200)
-        self._router.setsockopt(zmq.ROUTER_MANDATORY, 1)  # an error instead of silence when a peer is gone
-        self._router.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a node that reconnects takes its name over
-        self._router.setsockopt(zmq.SNDHWM, 10_000)
-        self._router.setsockopt(zmq.MAXMSGSIZE, _REQUEST_MAX_BYTES)
-        try:
-            self._router.bind(endpoint_of(address))
-        except zmq.ZMQError as error:
-            self._release()
-            raise AddressInUseError(address) from error
-        self.address = self._router.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
-        self._listening = Listening(self._router, int(self.address.rpartition(":")[2]))
+        self._listening = Listening(self._port.socket, int(self.address.rpartition(":")[2]))
         self._follow_at = 0.0
 
     # ---- from other threads
@@ -119,7 +107,7 @@ class MasterLoop:
         try:
             while not self._closing:
                 if self._is_open and len(polled) == 1:
-                    polled.append((self._router, int(zmq.POLLIN)))
+                    polled.append((self._port.socket, int(zmq.POLLIN)))
                 self._rest_from_renewals(waker)
                 zmq.zmq_poll(polled, self._until(tick_at))
                 self._waker.clear()
@@ -176,22 +164,16 @@ class MasterLoop:
             self._apply(Asked(self._calls, submission.request), "")
 
     def _serve_router(self) -> None:
+        others = bool(self._listening.hosts)
         for _ in range(1000):  # then time for the rest of the loop
             try:
-                (sender, *body), is_near = self._receive()
+                (sender, *body), address = self._port.receive(with_address=others)
             except zmq.Again:
                 return
             except zmq.ZMQError:
                 _logger.exception("the master could not read a request")
                 return
-            self._serve(sender, body, is_near)
-
-    def _receive(self) -> tuple[list[bytes], bool]:
-        """The parts of a request, and whether it comes from this computer."""
-        if not self._listening.hosts:
-            return self._router.recv_multipart(zmq.DONTWAIT), True
-        frames = self._router.recv_multipart(zmq.DONTWAIT, copy=False)
-        return [frame.bytes for frame in frames], frames[0].get("Peer-Address") == "127.0.0.1"
+            self._serve(sender, body, not others or address == "127.0.0.1")
 
     def _renew_quickly(self, sender: bytes, body: bytes) -> bool:
         """Answer a usual renewal; False when it is something else."""
@@ -202,7 +184,7 @@ class MasterLoop:
             return False
         hosts = self._listening.hosts
         answer = renewed_body(said.call, self._graph.epoch, self._graph.revision, last_seqs, hosts)
-        if not self._deliver_body(sender, answer):
+        if not self._port.send(sender, answer):
             self._send(self._graph.drop((said.node_id,)))
         return True
 
@@ -270,16 +252,7 @@ class MasterLoop:
         """Send one answer; False when its node has no connection any more."""
         answer = with_hosts(without(each.answer, dead), self._listening.hosts)
         body = self._views.body(answer, each.call or 0)
-        return self._deliver_body(each.to.encode("utf-8", "surrogateescape"), body)
-
-    def _deliver_body(self, to: bytes, body: bytes) -> bool:
-        try:
-            self._router.send_multipart((to, body), zmq.DONTWAIT)
-        except zmq.Again:
-            pass  # it does not read; its next renewal tells it what it missed
-        except zmq.ZMQError as error:
-            return error.errno != zmq.EHOSTUNREACH
-        return True
+        return self._port.send(each.to.encode("utf-8", "surrogateescape"), body)
 
     def _tell_listeners(self, now: float) -> None:
         """With many nodes that come at once, not after each: telling shall not take most of the time."""
@@ -294,6 +267,5 @@ class MasterLoop:
             self._tell_at = 4.0 * time.monotonic() - 3.0 * now  # three times as long as it took
 
     def _release(self) -> None:
-        self._router.close()
-        self._context.term()
+        self._port.close()
         self._waker.close()

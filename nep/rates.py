@@ -23,11 +23,12 @@ class Meter:
 
     def add(self, now: float, count: int, size_bytes: int) -> None:
         """The counters stood so at `now` (seconds, monotonic)."""
-        if self._samples and count < self._samples[-1][1]:
-            self._samples.clear()  # the counter began anew
-        self._samples.append((now, count, size_bytes))
-        while len(self._samples) > 2 and now - self._samples[0][0] > _WINDOW_S:
-            self._samples.popleft()
+        samples = self._samples
+        if samples and count < samples[-1][1]:
+            samples.clear()  # the counter began anew
+        samples.append((now, count, size_bytes))
+        while now - samples[0][0] > _WINDOW_S and len(samples) > 2:
+            samples.popleft()
 
     def rates(self) -> tuple[float, float] | None:
         """(messages a second, bytes a second); None before there are two readings half a second apart."""
