@@ -17,6 +17,7 @@ from app.core import deep_json
 from app.core.behaviour_file import TOO_DEEP, BehaviourFile, Descriptions, Workspace, read_file, write_file
 from app.core.beside import Beside
 from app.core.compiled import QUICK_S, Compiled, Key, compiled, is_long
+from app.core.earlier import Stamp, stamp_of
 from app.core.journal import Journal, Unsaved
 from app.errors import DescriptionError, DocumentError
 from app.robots.description import Robot, parse
@@ -49,6 +50,7 @@ class Document:
         self.robots: dict[str, Mapping[str, object]] = {}
         self.dirty = False
         self.saved_at: float | None = None
+        self._stamp: Stamp | None = None  # of the file, as it was read or written last
         self.revision = 0
         self.mends = 0
         self.edits = 0
@@ -83,6 +85,7 @@ class Document:
         """Open a file. Raises DocumentError; then what was open stays."""
         self._replace(read_file(path), path)
         self.saved_at = path.stat().st_mtime
+        self._stamp = stamp_of(path)
 
     def example(self, path: Path) -> None:
         """Open an example as a new, unsaved behaviour. Raises DocumentError."""
@@ -95,6 +98,9 @@ class Document:
         """
         found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.others)
         self._replace(found, unsaved.path)
+        now = stamp_of(unsaved.path) if unsaved.path is not None else None
+        if now is not None and now[0] <= unsaved.edited_s * 1e9:
+            self._stamp = now  # nobody wrote the file after that work was done
         self.dirty = True
         self._write_journal()
         unsaved.journal.unlink(missing_ok=True)
@@ -109,6 +115,7 @@ class Document:
         self.path, self.name = target, name
         self.dirty = False
         self.saved_at = self._clock()
+        self._stamp = stamp_of(target)
         self._journal.discard()
 
     def mend(self, action: str) -> bool:
@@ -134,6 +141,17 @@ class Document:
         """Another behaviour was saved as its file: its blocks are unsaved work now."""
         self.path, self.dirty = None, True
         self._write_journal()
+
+    def file_went_back(self) -> None:
+        """Its file says again what it said before the last saving: the blocks here are unsaved work."""
+        self.dirty, self._stamp = True, stamp_of(self.path) if self.path is not None else None
+        self._write_journal()
+
+    @property
+    def changed_outside(self) -> bool:
+        """Whether somebody else has written its file since it was opened or saved here."""
+        now = stamp_of(self.path) if self.path is not None else None
+        return now is not None and now != self._stamp
 
     @property
     def blank(self) -> bool:
@@ -233,7 +251,7 @@ class Document:
         self.robots, self.others = dict(found.robots), found.others
         self._compile_s = self._asked = None
         self.dirty = False
-        self.saved_at = None
+        self.saved_at = self._stamp = None
         self.revision += 1
         self.definitions_revision += 1
 

@@ -11,7 +11,8 @@ from PySide6.QtCore import Qt
 from app.core.companions import VIRTUAL_ROBOTS
 from app.ui.actions import Actions, Handler
 from app.ui.docks import Dock
-from app.ui.files import Asks, Files, SystemDialogs
+from app.ui.file_dialogs import Asks, SystemDialogs
+from app.ui.files import Files
 from app.ui.habits import Habits
 from app.ui.main_window import MainWindow
 from app.ui.mends import RobotMends

@@ -7,19 +7,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QWidget
-
 from app.blocks.mend import mend
 from app.core import deep_json
 from app.core.behaviour_file import SUFFIX
 from app.core.document import Document
+from app.core.earlier import Earlier, free_path, keep_earlier, stamp_of
 from app.core.journal import Unsaved
 from app.core.session import Session
 from app.core.settings import home
 from app.errors import AppError, DocumentError, SettingsError
-
-FILTER = f"Behaviours (*{SUFFIX})"
+from app.ui.file_dialogs import Asks
 
 
 @runtime_checkable
@@ -30,58 +27,13 @@ class Flushes(Protocol):
         """Call ``done`` once the newest edit is in the document."""
 
 
-class Asks(Protocol):
-    """Asks a person for a file; ``take`` is called with the answer, never when the person gives up."""
+class Closed:
+    """A tab that was closed: what to say of it, and how its file was before, if it was written over."""
 
-    def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which file to open."""
-
-    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Where to save."""
-
-
-class SystemDialogs:
-    """The system's own file dialogs, not blocking the window."""
-
-    def __init__(self, window: QWidget) -> None:
-        self._window = window
-
-    def _show(self, dialog: QFileDialog) -> None:
-        """Show a dialog that leaves Stop free: the window can be used, and F12 works in the dialog too."""
-        everywhere = Qt.ShortcutContext.ApplicationShortcut
-        dialog.addActions([act for act in self._window.actions() if act.shortcutContext() == everywhere])
-        dialog.setWindowModality(Qt.WindowModality.NonModal)
-        dialog.show()
-
-    def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog("Open a behaviour", folder, take)
-        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        self._show(dialog)
-
-    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog("Save the behaviour", str(Path(suggestion).parent), take)
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix(SUFFIX.lstrip("."))
-        dialog.selectFile(Path(suggestion).name)
-        self._show(dialog)
-
-    def _dialog(self, title: str, folder: str, take: Callable[[Path], None]) -> QFileDialog:
-        dialog = QFileDialog(self._window, title, folder, FILTER)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(lambda chosen: take(Path(chosen)))
-        return dialog
-
-
-def kept_path(folder: Path, name: str, now_s: float) -> Path:
-    """A free file name in ``folder`` for work that never had one."""
-    plain = "".join(c if c.isalnum() or c in " -_" else "_" for c in name).strip() or "behaviour"
-    stamp = time.strftime("%Y-%m-%d %H.%M.%S", time.localtime(now_s))
-    path = folder / f"{plain} {stamp}{SUFFIX}"
-    number = 2
-    while path.exists():
-        path = folder / f"{plain} {stamp} {number}{SUFFIX}"
-        number += 1
-    return path
+    def __init__(self, document: Document, words: str = "", earlier: Earlier | None = None) -> None:
+        self.words, self.earlier = words, earlier
+        self.workspace = document.workspace
+        self.stamp = stamp_of(document.path) if document.path is not None else None
 
 
 class Files:
@@ -91,7 +43,7 @@ class Files:
         self,
         session: Session,
         asks: Asks,
-        say: Callable[[str], object],
+        say: Callable[..., object],
         shown: Callable[[], object],
         editor: Callable[[], object],
         clock: Callable[[], float] = time.time,
@@ -146,16 +98,25 @@ class Files:
 
         self.with_newest(lambda: self._show(put_back))
 
-    def close(self, document: Document) -> None:
-        """Close a tab. Its program is stopped; unsaved work goes to its file, or where Recent finds it."""
+    def close(self, *documents: Document) -> None:
+        """Close tabs. Their programs are stopped; unsaved work goes to its file, or where Recent finds it.
+
+        What was written over can be put back.
+        """
 
         def closed() -> None:
             runs = self._session.runs
-            if runs.active and runs.document is document:
-                runs.stop()
-            if self._keep(document):
+            gone = []
+            for document in documents:
+                if runs.active and runs.document is document:
+                    runs.stop()
+                kept = self._keep(document)
+                if kept is None:
+                    continue
                 self._documents.close(document)
-                self._session.tabs.keep()
+                gone.append(kept)
+            self._session.tabs.keep()
+            self._tell_closed([each for each in gone if each.words])
 
         self.with_newest(closed)
 
@@ -215,6 +176,7 @@ class Files:
     def _save(self, path: Path | None) -> None:
         document = self._session.document
         try:
+            earlier = self._foreign(document) if path is None else None
             document.save(path)
         except AppError as error:
             self._cant_save(error)
@@ -224,7 +186,17 @@ class Files:
         self._session.alerts.cure("file")
         if document.path is not None:
             self._remember(document.path)
-        self._say(f"Saved {document.name}")
+        if earlier is None:
+            self._say(f"Saved {document.name}")
+            return
+        words = f"Saved {document.name}. Another program had changed the file; what it wrote is kept."
+        self._say(words, "Open that", lambda: self.open(earlier.copy))
+
+    def _foreign(self, document: Document) -> Earlier | None:
+        """What somebody else has written into its file meanwhile. Raises DocumentError."""
+        if document.path is None or not document.changed_outside:
+            return None
+        return keep_earlier(document.path)
 
     def _show(self, act: Callable[[], object]) -> None:
         """Show another tab."""
@@ -237,21 +209,50 @@ class Files:
         self._session.alerts.cure("file")
         self._shown()
 
-    def _keep(self, document: Document) -> bool:
-        """Save what is not saved yet; False, and an alert, when that can't be done."""
+    def _keep(self, document: Document) -> Closed | None:
+        """Save what is not saved yet; None, and an alert, when that can't be done."""
         if not document.dirty:
-            return True
-        had_file, name = document.path is not None, document.name
-        path = document.path or kept_path(home() / "kept", document.name, self._clock())
+            return Closed(document)
+        name, path = document.name, document.path
         try:
-            document.save(None if had_file else path)
+            earlier = keep_earlier(path) if path is not None else None
+            if path is None:
+                document.save(free_path(home() / "kept", name, self._clock()))
+            else:
+                document.save()
         except AppError as error:
             self._documents.show(document)
             self._cant_save(error)
-            return False
-        self._remember(path, name)
-        self._say(f"Saved {name}" if had_file else f"Kept {name} in Recent")
-        return True
+            return None
+        if document.path is not None:
+            self._remember(document.path, name)
+        return Closed(document, f"Saved {name}" if path is not None else f"Kept {name} in Recent", earlier)
+
+    def _tell_closed(self, closed: Sequence[Closed]) -> None:
+        """Say which unsaved work was saved, and offer to take it back."""
+        if not closed:
+            return
+        words = closed[0].words if len(closed) == 1 else f"Saved {len(closed)} behaviours"
+        back = [each for each in closed if each.earlier is not None]
+        if back:
+            self._say(words, "Undo", lambda: self._show(lambda: self._take_back(back)))
+        else:
+            self._say(words)
+
+    def _take_back(self, closed: Sequence[Closed]) -> None:
+        """Let the files say what they said before, and open the tabs again, with their work unsaved."""
+        for each in closed:
+            if each.earlier is None:
+                continue
+            if stamp_of(each.earlier.path) != each.stamp:
+                self._documents.open(each.earlier.copy)  # somebody wrote the file meanwhile: it stays
+                continue
+            there = self._documents.with_path(each.earlier.path)  # opened again before "Undo" was pressed
+            each.earlier.put_back()
+            if there is not None:
+                there.file_went_back()
+            else:
+                self._documents.open(each.earlier.path).edited(each.workspace)
 
     def _remember(self, path: Path, name: str | None = None) -> None:
         try:

@@ -49,9 +49,7 @@ class Tabs:
         self._show()
 
     def _close_others(self, document: Document) -> None:
-        for other in tuple(self._session.documents):
-            if other is not document:
-                self._files.close(other)
+        self._files.close(*(other for other in self._session.documents if other is not document))
 
     def _save_as(self, document: Document) -> None:
         self._files.show(document)

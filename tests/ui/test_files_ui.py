@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from app.core.document import Document
+from app.core.earlier import free_path
 from app.ui.commands import Commands
-from app.ui.files import kept_path
 from app.ui.main_window import MainWindow
 from tests.ui.shell_parts import Answers
 
@@ -97,6 +97,112 @@ def test_a_changed_file_is_saved_when_its_tab_is_closed_and_opens_again(commands
     assert window.session.document.workspace == changed("z")
     commands.run("tab.reopen")
     assert window.toast.text == "No tab was closed"
+
+
+def press_toast(window: MainWindow) -> None:
+    window.toast.button.click()
+
+
+def test_saving_at_the_close_of_a_tab_can_be_taken_back(commands, window, tmp_path: Path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    before = path.read_bytes()
+    commands.files.open(path)
+    window.session.document.edited(changed("z"))
+    commands.run("tab.close")
+    assert path.read_bytes() != before
+    assert window.toast.button.accessibleName() == "Undo"
+    press_toast(window)
+    assert path.read_bytes() == before
+    assert names(window) == ["Mine"]
+    assert window.session.document.dirty
+    assert window.session.document.workspace == changed("z")
+
+
+def test_what_a_file_said_before_it_was_written_over_stays_findable(
+    commands, window, home: Path, tmp_path
+) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    before = path.read_bytes()
+    commands.files.open(path)
+    window.session.document.edited(changed("z"))
+    commands.run("tab.close")
+    copies = list((home / "earlier").glob("Mine, before *.nepb"))
+    assert [copy.read_bytes() for copy in copies] == [before]
+
+
+def test_several_tabs_are_closed_and_taken_back_together(commands, window, tmp_path: Path) -> None:
+    paths = [saved(tmp_path / f"{name}.nepb") for name in "ABC"]
+    before = [path.read_bytes() for path in paths]
+    for path in paths:
+        commands.files.open(path)
+        window.session.document.edited(changed(path.stem))
+    commands.run(f"tab.close_others:{window.session.document.key}")
+    assert window.toast.text == "Saved 2 behaviours"
+    press_toast(window)
+    assert [path.read_bytes() for path in paths] == before
+    assert {document.name: document.dirty for document in window.session.documents} == dict.fromkeys(
+        "ABC", True
+    )
+
+
+def test_a_tab_opened_again_before_undo_is_unsaved_work(commands, window, tmp_path: Path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    before = path.read_bytes()
+    commands.files.open(path)
+    window.session.document.edited(changed("z"))
+    commands.run("tab.close")
+    commands.run("tab.reopen")
+    press_toast(window)
+    assert path.read_bytes() == before
+    assert (names(window), window.session.document.dirty) == (["Mine"], True)
+    assert window.session.document.workspace == changed("z")
+
+
+def test_undo_does_not_write_over_what_somebody_else_wrote(commands, window, tmp_path: Path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    before = path.read_bytes()
+    commands.files.open(path)
+    window.session.document.edited(changed("z"))
+    commands.run("tab.close")
+    path.write_bytes(before + b"\n")
+    press_toast(window)
+    assert path.read_bytes() == before + b"\n"
+    assert names(window) == ["Mine"]  # what the copy is called inside
+    assert window.session.document.workspace == BLOCKS
+
+
+def test_a_tab_stays_when_what_it_writes_over_can_not_be_kept(commands, window, home: Path, tmp_path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    before = path.read_bytes()
+    commands.files.open(path)
+    window.session.document.edited(changed("z"))
+    (home / "earlier").write_text("in the way", "utf-8")
+    commands.run("tab.close")
+    assert path.read_bytes() == before
+    assert (names(window), window.session.document.dirty) == (["Mine"], True)
+    assert window.session.alerts.active[0].title.startswith("Mine.nepb was not saved")
+
+
+def test_saving_over_what_another_program_wrote_keeps_that(commands, window, home: Path, tmp_path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    commands.files.open(path)
+    window.session.document.edited(changed("z"))
+    foreign = path.read_bytes().replace(b'"a"', b'"theirs"')
+    path.write_bytes(foreign)
+    commands.run("file.save")
+    assert window.toast.text == "Saved Mine. Another program had changed the file; what it wrote is kept."
+    assert [copy.read_bytes() for copy in (home / "earlier").iterdir()] == [foreign]
+    press_toast(window)
+    assert b'"theirs"' in window.session.document.path.read_bytes()
+
+
+def test_saving_twice_is_no_change_by_others(commands, window, home: Path, tmp_path) -> None:
+    commands.files.open(saved(tmp_path / "Mine.nepb"))
+    for id in "xy":
+        window.session.document.edited(changed(id))
+        commands.run("file.save")
+        assert window.toast.text == "Saved Mine"
+    assert not (home / "earlier").exists()
 
 
 def test_a_tab_that_can_not_be_saved_stays(commands, window, tmp_path: Path) -> None:
@@ -209,8 +315,8 @@ def test_mending_changes_the_blocks_and_tells_the_editor(commands: Commands, doc
 
 
 def test_kept_files_never_replace_each_other(tmp_path: Path) -> None:
-    first = kept_path(tmp_path, "a/b: c", 0)
+    first = free_path(tmp_path, "a/b: c", 0)
     first.touch()
-    second = kept_path(tmp_path, "a/b: c", 0)
+    second = free_path(tmp_path, "a/b: c", 0)
     assert first.parent == tmp_path
     assert first != second

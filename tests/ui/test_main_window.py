@@ -16,7 +16,7 @@ from app.core.session import Session
 from app.core.settings import Settings
 from app.ui.actions import TABLE, shortcuts
 from app.ui.commands import Commands
-from app.ui.files import SystemDialogs
+from app.ui.file_dialogs import SystemDialogs
 from app.ui.main_window import MainWindow
 from app.ui.theme import Theme
 from app.ui.widgets import Button
