@@ -64,7 +64,7 @@ class Commands:
         self._session = window.session
         asking = asks if asks is not None else SystemDialogs(window)
         self.files = Files(
-            window.session, asking, window.toast.say, lambda: self._show("behaviour"), self._editor
+            window.session, asking, window.toast.say, lambda: self._show("behaviour"), window.editor
         )
         self.tabs = Tabs(window.session, self.files, lambda: self._show("behaviour"))
         self.habits = Habits(window, self.files)
@@ -164,7 +164,7 @@ class Commands:
 
     def _show_block(self, block: str) -> None:
         self._show("behaviour")
-        editor = self._editor()
+        editor = self._window.editor()
         if isinstance(editor, ShowsBlocks):
             editor.show_block(block)
 
@@ -188,19 +188,14 @@ class Commands:
     def _show(self, layout: str) -> None:
         self.habits.show_layout(layout)
 
-    def _editor(self) -> object:
-        bench = self._window.benches.get("behaviour")
-        dock = bench.docks.get("behaviour") if bench is not None else None
-        return dock.panel if dock is not None else None
-
     def _edit(self, what: str) -> None:
-        editor = self._editor()
+        editor = self._window.editor()
         if isinstance(editor, Undoes):
             (editor.undo if what == "undo" else editor.redo)()
 
     def _find_in_blocks(self, *, to_add: bool = False) -> None:
         self._show("behaviour")
-        editor = self._editor()
+        editor = self._window.editor()
         if isinstance(editor, FindsBlocks):
             editor.find_blocks(to_add=to_add)
 

@@ -15,9 +15,11 @@ from app.ui.app_bar import AppBar
 from app.ui.arrangements import Arrangements
 from app.ui.banner import BannerPlace
 from app.ui.docks import Dock
+from app.ui.enter_key import EnterKey
 from app.ui.focus_ring import FocusRing
 from app.ui.garbage import Settling
 from app.ui.layouts import LAYOUTS, layout_named
+from app.ui.leaving import Leaving
 from app.ui.move_question import MoveQuestion
 from app.ui.panel_focus import PanelFocus
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext
@@ -61,9 +63,11 @@ class MainWindow(QMainWindow):
         self._alerts_seen = -1
         self._ticks = self._halves = 0
         self._shut = False
+        self._leaving = Leaving(self, self.editor, self.close)
         self._build(examples)
         self.context = PanelContext(session, theme, self.open_topic, self.toast.say, self._run)
         self.ring = FocusRing(theme, self)
+        self.enter = EnterKey(self)
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS // 2)
         self.timer.timeout.connect(self._half_tick)
@@ -151,6 +155,12 @@ class MainWindow(QMainWindow):
     def bench(self) -> Workbench | None:
         """The workbench that shows; None on the start page."""
         return self.benches.get(self.showing)
+
+    def editor(self) -> object:
+        """The panel of behaviours; None until it was first shown."""
+        bench = self.benches.get("behaviour")
+        dock = bench.docks.get("behaviour") if bench is not None else None
+        return dock.panel if dock is not None else None
 
     def open_panel(self, name: str) -> Dock | None:
         """Show a panel in this layout; "behaviour" in its own layout only."""
@@ -259,6 +269,11 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self._shut:
+            if self._moves():
+                self.session.runs.stop()  # told now, answered while the session closes
+            if not self._leaving.ready():
+                event.ignore()
+                return
             self._shut = True
             self.timer.stop()
             self.state.keep_place(self)
@@ -266,8 +281,6 @@ class MainWindow(QMainWindow):
                 self.arrangements.keep(bench, name)
             self.state.keep_theme(self.theme)
             self.hide()
-            if self._moves():
-                self.session.runs.stop()  # told now, answered while the session closes
             for bench in self.benches.values():
                 bench.shut()
             self.session.close()

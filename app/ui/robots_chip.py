@@ -20,5 +20,11 @@ def robots_chip(session: Session) -> tuple[str, str]:
         return (f"{silent[0].name}: {words}" if len(links) > 1 else words[:1].upper() + words[1:]), "error"
     if len(links) > 1:
         return f"{len(links)} robots", "ok"
-    state = "running" if session.runs.active else WORDS[links[0].state]
-    return f"{links[0].name} {state}", "ok"
+    return f"{links[0].name} {_doing(session, links[0].state)}", "ok"
+
+
+def _doing(session: Session, state: str) -> str:
+    """What the only robot does, for its program or for a person."""
+    if not session.runs.active:
+        return WORDS[state]
+    return "holds still" if session.runs.view().state == "paused" else "running"

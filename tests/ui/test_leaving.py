@@ -1,0 +1,64 @@
+"""The newest edit is taken over before the window closes; an editor that hangs does not keep it open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject
+
+from app.ui import leaving
+from app.ui.leaving import Leaving
+from app.ui.main_window import MainWindow
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+BLOCKS = {"blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": "a"}]}}
+
+
+class Late:
+    """An editor that answers when it is told to."""
+
+    def __init__(self) -> None:
+        self.done: list[Callable[[], None]] = []
+
+    def flush(self, done: Callable[[], None]) -> None:
+        self.done.append(done)
+
+
+def test_without_an_editor_it_closes_at_once(qapp) -> None:
+    closed: list[bool] = []
+    assert Leaving(QObject(), lambda: None, lambda: closed.append(True)).ready()
+    assert closed == []
+
+
+def test_a_late_editor_is_waited_for_and_asked_once(qtbot, qapp) -> None:
+    editor, closed, parent = Late(), [], QObject()
+    waits = Leaving(parent, lambda: editor, lambda: closed.append(waits.ready()))
+    assert not waits.ready()
+    assert not waits.ready()
+    assert len(editor.done) == 1
+    editor.done[0]()
+    qtbot.waitUntil(lambda: closed == [True], timeout=leaving.LONGEST_MS - 100)
+    qtbot.wait(leaving.LONGEST_MS)  # its own end of waiting comes, too, and closes nothing twice
+    assert closed == [True]
+
+
+def test_an_editor_that_hangs_is_left(qtbot, qapp) -> None:
+    editor, closed, parent = Late(), [], QObject()
+    waits = Leaving(parent, lambda: editor, lambda: closed.append(True))
+    assert not waits.ready()
+    qtbot.waitUntil(lambda: closed == [True], timeout=5 * leaving.LONGEST_MS)
+    assert waits.ready()
+
+
+def test_the_window_takes_the_newest_edit_with_it(qtbot, window: MainWindow, commands, monkeypatch) -> None:
+    bench = window.show_layout("behaviour")
+    editor, shut = Late(), []
+    monkeypatch.setattr(bench.docks["behaviour"].panel, "flush", editor.flush)
+    window.on_shut = lambda: shut.append(window.session.document.dirty)
+    window.show()
+    assert not window.close()
+    assert (shut, window.isVisible()) == ([], True)
+    window.session.document.edited(BLOCKS)
+    editor.done[0]()
+    qtbot.waitUntil(lambda: shut == [True], timeout=5000)
+    assert not window.isVisible()
