@@ -108,7 +108,7 @@ def with_caption(picture: Picture, words: str) -> Picture:
     return np.vstack([picture[:, :, ::-1], strip])
 
 
-# -- what both paths need -------------------------------------------------------------------------------------
+# -- what both paths need ---------------------------------------------------------------------------
 
 
 def snapped(studio: Person, above: str, kind: str) -> str:

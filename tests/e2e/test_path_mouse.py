@@ -1,4 +1,4 @@
-"""A person's path with the mouse alone, from the start page to a saved behaviour; each step is a picture."""
+"""A person's path with the mouse alone, from the start page to a saved behaviour; every step is filmed."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_p
         assert not studio.outlined("running")
     see_what_the_robot_says(studio, film, mouse)
     save(studio, film, home)
-    assert 15 <= len(film.pictures)
+    assert len(film.pictures) >= 15
 
 
 def direction(studio: Studio, turn: str) -> list[float]:
@@ -168,7 +168,9 @@ def save(studio: Studio, film: Film, home: Path) -> None:
         until(lambda: not studio.all(kind="QFileDialog"), "the dialog is gone")
         path = home / "New behaviour.nepb"
         until(path.exists, lambda: f"{path} is there: {list(home.glob('*'))}")
-        until(lambda: not any("not saved" in str(t["name"]) for t in studio.all(kind="BehaviourTab")), "no dot")
+        until(
+            lambda: not any("not saved" in str(t["name"]) for t in studio.all(kind="BehaviourTab")), "no dot"
+        )
     words = path.read_text("utf-8")
     assert all(kind in words for kind in ("robot_pepper_do_say", "robot_pepper_do_turn", "control_wait"))
     (hat,) = json.loads(words)["workspace"]["blocks"]["blocks"]

@@ -1,0 +1,48 @@
+"""Enter on a button: once for each press, and only when nothing but the button is meant."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
+
+from app.ui.enter_key import EnterKey
+from app.ui.theme import Theme
+from app.ui.widgets import Button
+
+
+@pytest.fixture
+def window(qtbot) -> QWidget:
+    made = QWidget()
+    column = QVBoxLayout(made)
+    made.button, made.field = Button(Theme("light"), "Do it"), QLineEdit()
+    column.addWidget(made.button)
+    column.addWidget(made.field)
+    made.pressed = []
+    made.button.clicked.connect(lambda: made.pressed.append("button"))
+    made.field.returnPressed.connect(lambda: made.pressed.append("field"))
+    made.enter = EnterKey(made)
+    qtbot.addWidget(made)
+    made.show()
+    made.activateWindow()
+    qtbot.waitUntil(made.isActiveWindow)
+    return made
+
+
+@pytest.mark.parametrize("key", [Qt.Key_Return, Qt.Key_Enter, Qt.Key_Space])
+def test_a_button_with_the_keyboard_is_pressed(qtbot, window, key):
+    window.button.setFocus()
+    QTest.keyClick(window.windowHandle(), key)
+    qtbot.waitUntil(lambda: window.pressed == ["button"])
+
+
+def test_fields_and_other_keys_are_left_alone(qtbot, window):
+    window.button.setFocus()
+    QTest.keyClick(window.windowHandle(), Qt.Key_Return, Qt.ControlModifier)
+    QTest.keyClick(window.windowHandle(), Qt.Key_A)
+    window.button.setEnabled(False)
+    window.field.setFocus()
+    QTest.keyClick(window.windowHandle(), Qt.Key_Return)
+    qtbot.waitUntil(lambda: bool(window.pressed))
+    assert window.pressed == ["field"]
