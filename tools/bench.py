@@ -25,6 +25,7 @@ NAMES = (
     "studio_images",
     "studio_topics",
     "studio_start",
+    "blocks_editor",
 )
 LONG = ("soak",)
 """Those that take a quarter of an hour run only when they are asked for."""

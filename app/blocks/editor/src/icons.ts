@@ -25,14 +25,22 @@ export function iconName(name: string, style: string): string {
   return Object.hasOwn(lucide, fallback) ? fallback : 'circle-dot';
 }
 
+/** Each icon is parsed once; a page with a thousand blocks copies it. */
+const drawings = new Map<string, SVGGElement>();
+
 /** Fills `group` with the icon, scaled to `size` units; colours come from CSS. */
 export function drawIcon(group: Element, name: string, size: number): void {
-  const filled = FILLED[name];
-  const inner = document.createElementNS(SVG, 'g');
-  inner.setAttribute('transform', `scale(${size / 24})`);
-  inner.setAttribute('class', filled ? 'nepGlyph' : 'nepLines');
-  inner.innerHTML = filled ?? lucide[name] ?? '';
-  group.replaceChildren(inner);
+  const key = `${size} ${name}`;
+  let drawn = drawings.get(key);
+  if (!drawn) {
+    const filled = FILLED[name];
+    drawn = document.createElementNS(SVG, 'g');
+    drawn.setAttribute('transform', `scale(${size / 24})`);
+    drawn.setAttribute('class', filled ? 'nepGlyph' : 'nepLines');
+    drawn.innerHTML = filled ?? lucide[name] ?? '';
+    drawings.set(key, drawn);
+  }
+  group.replaceChildren(drawn.cloneNode(true));
 }
 
 /** A free-standing <svg> of the icon for HTML (toolbox, buttons). */

@@ -135,10 +135,16 @@ export class Program {
     this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
       !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
     Checker.lenient = true;
+    // What costs at each block, once: the scrollbars, and how wide the same words are.
+    this.workspace.setResizesEnabled(false);
+    Blockly.utils.dom.startTextWidthCache();
     try {
       this.loadOthers(others, how);
+      this.workspace.setResizesEnabled(false);
       for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
     } finally {
+      Blockly.utils.dom.stopTextWidthCache();
+      this.workspace.setResizesEnabled(true);
       Checker.lenient = false;
     }
   }
@@ -155,12 +161,12 @@ export class Program {
   }
 
   private append(state: BlockState, how: {recordUndo?: boolean}): void {
-    const before = new Set(this.workspace.getTopBlocks(false));
+    const before = this.workspace.getTopBlocks(false).length;
     try {
       Blockly.serialization.blocks.append(keep(state) as Blockly.serialization.blocks.State, this.workspace, how);
     } catch (error) {
       console.warn(`kept whole: ${String(error)}`);
-      for (const block of this.workspace.getTopBlocks(false)) if (!before.has(block)) block.dispose(false);
+      for (const block of this.workspace.getTopBlocks(false).slice(before)) block.dispose(false);
       Blockly.serialization.blocks.append(keepWhole(state) as Blockly.serialization.blocks.State, this.workspace, how);
     }
   }

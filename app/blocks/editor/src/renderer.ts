@@ -3,14 +3,47 @@ import * as Blockly from 'blockly/core';
 
 export type BlockState = 'running' | 'stopped' | 'error';
 
+type Shape = [path: string, offset: Blockly.utils.Coordinate, rtl: boolean];
+
 const SVG = 'http://www.w3.org/2000/svg';
 /** Widths of the strokes that together make the soft glow; cheaper than a blur, repainted ten times a second. */
+/** A block that is over sooner gets its outline only: a glow that nobody can see cost half a core at 30 a second. */
+const GLOW_AFTER_MS = 150;
 const GLOW_WIDTHS = [19, 15, 11, 7];
 
 /** A block's shape that can carry one outline above everything inside the block. */
 export class StatePath extends Blockly.zelos.PathObject {
   private state: BlockState | null = null;
   private marks: SVGGElement[] = [];
+  private glowing = 0;
+  /** The shapes of connections that nobody has looked at: Blockly would draw each, a fifth of a page's elements. */
+  private readonly undrawn = new Map<Blockly.RenderedConnection, Shape>();
+
+  override addConnectionHighlight(connection: Blockly.RenderedConnection, ...shape: Shape): SVGElement {
+    if (connection.isHighlighted() || this.drawn.has(connection)) return this.draw(connection, shape);
+    this.undrawn.set(connection, shape);
+    return undefined as unknown as SVGElement;  // the one who calls looks whether there is any
+  }
+
+  override removeConnectionHighlight(connection: Blockly.RenderedConnection): void {
+    this.undrawn.delete(connection);
+    this.drawn.delete(connection);
+    super.removeConnectionHighlight(connection);
+  }
+
+  /** Draws the shape of a connection that the keys or a dragged block come to. */
+  drawConnection(connection: Blockly.RenderedConnection): void {
+    const shape = this.undrawn.get(connection);
+    if (shape) connection.setAriaRole(this.draw(connection, shape));
+  }
+
+  private readonly drawn = new Set<Blockly.RenderedConnection>();
+
+  private draw(connection: Blockly.RenderedConnection, shape: Shape): SVGElement {
+    this.undrawn.delete(connection);
+    this.drawn.add(connection);
+    return super.addConnectionHighlight(connection, ...shape);
+  }
 
   override setPath(path: string): void {
     super.setPath(path);
@@ -21,13 +54,18 @@ export class StatePath extends Blockly.zelos.PathObject {
   setState(state: BlockState | null): void {
     if (state === this.state) return;
     this.state = state;
+    window.clearTimeout(this.glowing);
     for (const mark of this.marks) mark.remove();
     this.marks = [];
     if (!state) return;
     // The outline lies on everything inside the block, the glow behind the block itself.
     const outline = this.mark(`nepState nepState-${state}`, 'nepOutline', [state === 'running' ? 4 : 3]);
     this.svgRoot.append(outline);
-    if (state === 'running') this.svgRoot.prepend(this.mark('nepState nepGlow', 'nepGlowRing', GLOW_WIDTHS));
+    if (state === 'running') this.glowing = window.setTimeout(() => this.glow(), GLOW_AFTER_MS);
+  }
+
+  private glow(): void {
+    this.svgRoot.prepend(this.mark('nepState nepGlow', 'nepGlowRing', GLOW_WIDTHS));
   }
 
   private mark(name: string, pathName: string, widths: number[]): SVGGElement {
@@ -69,3 +107,14 @@ Blockly.blockRendering.register(RENDERER, Renderer);
 export function pathOf(block: Blockly.BlockSvg): StatePath | null {
   return block.pathObject instanceof StatePath ? block.pathObject : null;
 }
+
+/** Blockly asks for the drawn shape of a connection by this name, wherever it needs one. */
+interface Finds {
+  findHighlightSvg(this: Blockly.RenderedConnection): SVGPathElement | null;
+}
+const finds = Blockly.RenderedConnection.prototype as unknown as Finds;
+const find = finds.findHighlightSvg;
+finds.findHighlightSvg = function (this: Blockly.RenderedConnection) {
+  pathOf(this.getSourceBlock())?.drawConnection(this);
+  return find.call(this);
+};

@@ -9,9 +9,12 @@ import {type BlockState, pathOf} from './renderer';
 const SVG = 'http://www.w3.org/2000/svg';
 const BUBBLE_WIDTH = 300;
 const GAP = 14;
+const PICTURE_MS = 66;
 
 export class States {
   private running = new Set<string>();
+  private next: string[] = [];
+  private resting = 0;
   private stopped = new Set<string>();
   private errors = new Map<string, string>();
   private absent = new Set<string>();
@@ -24,9 +27,17 @@ export class States {
     workspace.addChangeListener((event) => this.onEvent(event));
   }
 
+  /** The first at once, the next ones as often as an eye can follow: each is a picture of the whole page. */
   highlight(ids: string[]): void {
+    this.next = ids;
+    if (this.resting) return;
     this.running = new Set(ids);
     this.outline();
+    this.resting = window.setTimeout(() => {
+      this.resting = 0;
+      const {next} = this;
+      if (next.length !== this.running.size || next.some((id) => !this.running.has(id))) this.highlight(next);
+    }, PICTURE_MS);
   }
 
   markStopped(ids: string[]): void {
@@ -53,6 +64,9 @@ export class States {
 
   /** Another program is here: nothing of it runs, nothing is wrong with it. */
   forget(): void {
+    window.clearTimeout(this.resting);
+    this.resting = 0;
+    this.next = [];
     this.running = new Set();
     this.stopped = new Set();
     this.errors = new Map();
