@@ -20,7 +20,8 @@ def link(name: str, state: str) -> SimpleNamespace:
 
 
 def with_robots(*links: SimpleNamespace, active: bool = False) -> SimpleNamespace:
-    return SimpleNamespace(fleet=SimpleNamespace(links=list(links)), runs=SimpleNamespace(active=active))
+    runs = SimpleNamespace(active=active, view=lambda: SimpleNamespace(state="running" if active else "idle"))
+    return SimpleNamespace(fleet=SimpleNamespace(links=list(links)), runs=runs)
 
 
 @pytest.fixture
