@@ -1,4 +1,4 @@
-"""How long a program needs to join: a new node and its first publisher, with live and with killed subscribers.
+"""How long a program needs to join: a new node and its first publisher, with live and killed subscribers.
 
     python bench/nep_join.py [--subscribers 10] [--rounds 40]
 
@@ -7,7 +7,7 @@ first message reaches every subscriber, so nothing else has to be waited for (an
 
     live       all subscribers are there
     killed     one more was there and has just been killed (SIGKILL); the master does not know yet
-    plain      a bound XPUB of plain pyzmq that waits until as many plain subscribers in as many processes have
+    plain      a bound XPUB of plain pyzmq that waits until as many plain subscribers in other processes have
                connected: what processes and sockets cost without a master; "plain again" is the same again
 """
 

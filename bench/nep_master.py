@@ -80,7 +80,9 @@ def join(n):
     mine, others = ids(n)
     node = NodeRecord(f"{n:016x}", f"robot{n}", "computer", os.getpid(), since_ns=time.time_ns())
     publishers = tuple(
-        PublisherRecord(1_000_000 + t, f"/robot{n}/sensor{t}", "json", "json", (f"tcp://127.0.0.1:{20000 + t}",))
+        PublisherRecord(
+            1_000_000 + t, f"/robot{n}/sensor{t}", "json", "json", (f"tcp://127.0.0.1:{20000 + t}",)
+        )
         for t in mine
     )
     subscribers = tuple(

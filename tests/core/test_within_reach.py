@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.session import LEARNING_S, Session
+from app.core.master_state import LEARNING_S
+from app.core.session import Session
 from app.core.settings import Settings
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
 from nep.masters import Master

@@ -50,7 +50,8 @@ def heard(driver: Peer) -> None:
 
 
 def test_blocks_drive_it_without_a_window(driver: Peer, tmp_path: Path) -> None:
-    with Program("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30", "--allow-moving") as program:
+    words = ("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30", "--allow-moving")
+    with Program(*words) as program:
         assert program.wait(60) == 0, program.lines
         program.says("Turtle: stop sent; this robot cannot confirm")
     heard(driver)

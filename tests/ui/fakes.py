@@ -513,7 +513,9 @@ LOG = (
 
 FOUND = (
     Finding(
-        "master:foreign", "error", "Port 7780 is held by “python3 server.py” (process 77), which is no master.",
+        "master:foreign",
+        "error",
+        "Port 7780 is held by “python3 server.py” (process 77), which is no master.",
         "End that program, or start the master on port 7781 and tell it to all programs"
         " (NEP_MASTER=127.0.0.1:7781).", "nep master --port 7781",
     ),

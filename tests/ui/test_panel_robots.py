@@ -5,12 +5,11 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLineEdit
 
 from app.robots.parts import Field
-from app.ui.try_words import feedback_words, progress_of
 from app.ui.long_text import LongText
 from app.ui.panels.robots import PANEL, RobotsPanel
+from app.ui.try_words import feedback_words, progress_of
 from tests.ui.fakes import ACTIONS, Invocation, RobotLink, Session, pepper
 from tests.ui.panel_case import Window, button, press
 

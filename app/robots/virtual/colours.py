@@ -36,7 +36,7 @@ def colours_in(picture: Picture) -> dict[str, Seen]:
         mask = np.zeros((height, width), np.uint8)
         for low, high in ranges:
             least = np.array([low, _LEAST_SATURATION, _LEAST_VALUE], np.uint8)
-            mask |= cv2.inRange(hsv, least, np.array([high, 255, 255], np.uint8))
+            cv2.bitwise_or(mask, cv2.inRange(hsv, least, np.array([high, 255, 255], np.uint8)), dst=mask)
         count, _, parts, middles = cv2.connectedComponentsWithStats(mask)
         if count < 2:
             continue

@@ -95,7 +95,7 @@ class Chip(QWidget):
         paint.box(painter, rect, rect.height() / 2, theme.colour(tint), edge)
         plain = {"off": "textSecondary", "running": "text"}
         ink = theme.colour(plain.get(self._status, status.colour))
-        left = PADDING + (1 if self._large else 0)
+        left = float(PADDING + (1 if self._large else 0))
         name = self._icon_name()
         if name:
             side = self._side()
