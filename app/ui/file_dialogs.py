@@ -36,6 +36,7 @@ class SystemDialogs:
         dialog.addActions([act for act in self._window.actions() if act.shortcutContext() == everywhere])
         dialog.setWindowModality(Qt.WindowModality.NonModal)
         dialog.show()
+        dialog.activateWindow()  # the keys go there, also where no window manager sees to it
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog("Open a behaviour", folder, take)

@@ -142,6 +142,7 @@ class SettingsSheet(Overlay):
         dialog.fileSelected.connect(self.keep_folder)
         dialog.setWindowModality(Qt.WindowModality.NonModal)
         dialog.show()
+        dialog.activateWindow()  # the keys go there, also where no window manager sees to it
 
     def keep_folder(self, folder: str) -> None:
         """Keep pictures there from now on."""
