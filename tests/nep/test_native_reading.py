@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.masters import Master
-from tests.nep.programs import eventually
+from tests.nep.programs import eventually, running
 
 
 @pytest.fixture
@@ -150,3 +150,46 @@ def test_closing_does_not_wait_for_a_reader(node: nep.Node) -> None:
     assert monotonic() - started < 0.3
     assert ended.wait(2.0)
     thread.join()
+
+
+COMING_AND_GOING = """
+import os, sys, threading, nep
+size, is_over = int(sys.argv[2]), threading.Event()
+with nep.node("a", master=sys.argv[1]) as a, nep.node("b", master=sys.argv[1]) as b:
+    pub = a.new_pub("busy", "bytes")
+    data = os.urandom(size)
+    def stream():
+        while not is_over.is_set():
+            pub.publish(data)
+    thread = threading.Thread(target=stream)
+    thread.start()
+    for _ in range(30):
+        b.new_sub("busy", "bytes").close()
+    is_over.set()
+    thread.join()
+print("stands")
+"""
+
+
+@pytest.mark.parametrize("size", [1000, 20_000])
+def test_subscribers_that_come_and_go_end_no_program(master: Master, size: int) -> None:
+    """It did: libzmq does not stand another high-water mark while a connection is closing."""
+    for _ in range(2):
+        with running(COMING_AND_GOING, master.address, str(size)) as program:
+            assert program.line() == "stands"
+
+
+def test_a_publisher_of_large_messages_listens_on_another_port_as_well(node: nep.Node) -> None:
+    pub, first = node.new_pub("large", "bytes"), node.new_sub("large", "bytes")
+    (before,) = node.graph().topics["large"].publishers
+    pub.publish(b"x" * 100_000)
+    eventually(lambda: node.graph().topics["large"].publishers[0].endpoints != before.endpoints)
+    second = node.new_sub("large", "bytes")
+    pub.publish(b"y" * 100_000)
+    for sub, heard in ((first, b"xy"), (second, b"y")):
+        for letter in heard:
+            message = sub.receive(2.0)
+            assert message is not None
+            assert message.data[0] == letter
+    assert pub.subscribers == 2
+    assert first.lost == second.lost == 0

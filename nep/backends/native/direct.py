@@ -61,7 +61,7 @@ class OriginalOutlet:
         self._filters = 0
         self._is_closed = False
         self._linger_ms = 0
-        self._mark = SendMark(socket)
+        self._mark = SendMark(socket, spec.codec.name)
         self._changed = threading.Condition(threading.Lock())
         socket.setsockopt(zmq.XPUB_VERBOSER, 1)  # so that filters can be counted: one a subscriber
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -90,7 +90,8 @@ class OriginalOutlet:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.count += 1
-            self._mark.sending(len(frame))
+            if not self._mark.is_set:
+                self._mark.sending(len(frame))
             self._socket.send(frame, zmq.DONTWAIT, copy=len(frame) < 65_536)
             self._read_filters()
 
@@ -123,7 +124,6 @@ class OriginalOutlet:
         while not self._socket.closed and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
             event = self._socket.recv_multipart(zmq.DONTWAIT)[0]
             self._filters += {b"\x01": 1, b"\x00": -1}.get(event[:1], 0)
-            self._mark.greeted()
             self._changed.notify_all()
 
 

@@ -186,14 +186,14 @@ class MasterLink:
         return Rest(due=self._renew_at)
 
     def _follow_addresses(self) -> None:
-        """Move all publishers when this computer has another address, or the master serves at another."""
+        """Move publishers when this computer or the master has another address, or they want other ports."""
         if not self._is_near:
             self._own_host = host_towards(self.address) or self._own_host
-        if self.hosts == self._moved_to:
-            return
-        self._moved_to = self.hosts
+        is_elsewhere, self._moved_to = self.hosts != self._moved_to, self.hosts
         with self._lock:
             for id, (record, outlet) in self._publishers.items():
+                if not is_elsewhere and not outlet.wants_ports:
+                    continue
                 try:
                     moved = replace(record, endpoints=outlet.move(self.hosts))
                 except AddressInUseError:

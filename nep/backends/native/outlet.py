@@ -17,7 +17,7 @@ from nep.backends.base import PublisherSpec
 from nep.backends.native.io import Rest, Served
 from nep.backends.native.places import Places
 from nep.backends.native.refusals import Refusals
-from nep.backends.native.sockets import SendMark, Socket, wait_until
+from nep.backends.native.sockets import Part, SendMark, Socket, sendable, wait_until
 from nep.encoded import Encoded
 from nep.errors import ClosedError
 from nep.records import Expected, PublisherCount
@@ -38,8 +38,6 @@ __all__ = ["NativeOutlet"]
 
 _logger = logging.getLogger("nep")
 
-_Frame = zmq.Frame
-_Part = bytes | memoryview | zmq.Frame
 _SNDMORE = int(zmq.SNDMORE)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
@@ -50,6 +48,8 @@ _LOOK_NS = 500_000
 """Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
 after it, because sending may have swallowed the descriptor's signal."""
 _SERVE_S = 0.02
+_CALM_S = 0.5
+"""Nobody has come or gone for so long."""
 _BYE_AGAIN_S = 0.05
 
 
@@ -79,8 +79,9 @@ class NativeOutlet:
         self._seen: dict[int, int] = {}
         self._names: dict[int, str] = {}
         self._waited: set[int] = set()
-        self._latched: tuple[_Part, ...] | None = None
+        self._latched: tuple[Part, ...] | None = None
         self._looked_ns = 0
+        self._changed_at = 0.0
         self._io_comes = False
         self._served = 0
         self._id = spec.id
@@ -88,7 +89,7 @@ class NativeOutlet:
         self._codec = spec.codec.number
         self._flags = LATCHED if spec.is_latched else 0
         self._form = form_of(self._codec, self._flags)
-        self._mark = SendMark(socket)
+        self._mark = SendMark(socket, spec.codec.name)
         # `with` is three times faster on the lock itself than on the condition over it.
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
@@ -130,7 +131,15 @@ class NativeOutlet:
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Be reached at these addresses of this computer from now on; the endpoints. See `Places.move`."""
         with self._lock:
+            if self.wants_ports and not self._socket.closed:
+                self._mark.lower()
+                self._places.move_on()
             return () if self._socket.closed else self._places.move(hosts)
+
+    @property
+    def wants_ports(self) -> bool:
+        """Whether to `move`, though to the same addresses: see `SendMark`."""
+        return self._mark.is_to_lower and time.monotonic() - self._changed_at > _CALM_S
 
     # ---- sending
 
@@ -142,10 +151,10 @@ class NativeOutlet:
 
     def send(self, encoded: Encoded) -> None:
         """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed."""
-        data: bytes | memoryview | zmq.Frame
+        data: Part
         data, beside = encoded
         if type(data) is not bytes:
-            data = _sendable(data)
+            data = sendable(data)
         extension = extension_part(beside) if beside else None
         size = len(data)
         with self._lock:
@@ -173,7 +182,7 @@ class NativeOutlet:
                 self._io_comes = True
                 self._serve_soon(self)
 
-    def _send_all(self, data: _Part, extension: bytes | None) -> None:
+    def _send_all(self, data: Part, extension: bytes | None) -> None:
         """Send what has flags, with the lock held."""
         form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
         stamp_ns = self._last_stamp_ns or 0
@@ -184,7 +193,7 @@ class NativeOutlet:
             self._latched = tail
         self._send_parts(self._topic, tail)
 
-    def _send_parts(self, first: bytes, tail: tuple[_Part, ...]) -> None:
+    def _send_parts(self, first: bytes, tail: tuple[Part, ...]) -> None:
         """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
         send = self._send
         send(first, _SNDMORE)
@@ -218,6 +227,7 @@ class NativeOutlet:
             else:
                 self._seen.pop(hello[0], None)
                 self.subscribers = len(self._seen)
+            self._changed_at = time.monotonic()
             self._changed.notify_all()
 
     def _refuse(self, event: bytes) -> None:
@@ -231,7 +241,6 @@ class NativeOutlet:
         # First: whoever gets the echo may rely on being counted.
         self._seen[subscriber] = self.count
         self.subscribers = len(self._seen)
-        self._mark.greeted()
         if self._latched is not None:
             self._send_parts(own, self._latched)
         self._send_parts(own, (self._notice(0),))
@@ -279,15 +288,3 @@ class NativeOutlet:
             for subscriber in self._seen:
                 self._send_parts(hello_part(subscriber, self.spec.topic), (self._notice(BYE),))
             self._read_subscriptions()
-
-
-def _sendable(data: bytes | memoryview) -> _Part:
-    """What can be sent as it lies: a received message itself; of what can still change a copy."""
-    if isinstance(data, bytes):
-        return data
-    origin = data.obj
-    if isinstance(origin, _Frame) and data.nbytes == len(origin) and data.readonly:
-        return origin
-    if not (data.readonly and data.c_contiguous):
-        return bytes(data)
-    return data if data.itemsize == data.ndim == 1 else data.cast("B")

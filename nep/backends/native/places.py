@@ -40,6 +40,10 @@ class Places:
             raise problem
         return tuple(self._bound[host] for host in hosts if host in self._bound)
 
+    def move_on(self) -> None:
+        """Bind at other ports with the next `move`. Those that are bound stay, for whoever knows them."""
+        self._bound.clear()
+
     def _leave(self, host: str) -> None:
         endpoint = self._bound.pop(host)
         try:

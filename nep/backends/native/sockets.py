@@ -15,6 +15,7 @@ from nep.errors import AddressInUseError
 __all__ = [
     "LOOPBACK",
     "SHORT_WAIT_S",
+    "Part",
     "SendMark",
     "bind",
     "bind_free_port",
@@ -22,11 +23,13 @@ __all__ = [
     "host_towards",
     "keep_alive",
     "receive_mark",
+    "sendable",
     "wait_shortly",
     "wait_until",
 ]
 
 Socket = zmq.Socket[bytes]
+Part = bytes | memoryview | zmq.Frame
 
 LOOPBACK = "127.0.0.1"
 SHORT_WAIT_S = 0.005
@@ -43,30 +46,33 @@ _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)
 class SendMark:
     """Keeps what is queued for each subscriber within bytes, though libzmq counts messages only.
 
-    The high-water mark is chosen once, at the first message, for streams of messages like it: 256 MB, with
-    room for four times its size. It cannot be lowered later: libzmq tells the sender of what was read in
-    portions of half a mark, and a sender whose new mark is below what is still untold waits for ever. A
-    connection has the mark of when the socket was bound; `greeted` lowers it before anything is sent on it.
+    The high-water mark is chosen at the first message, for streams of messages like it: 256 MB, with room for
+    four times its size. A connection has the mark of when the socket was bound. Setting another on a socket
+    that has connections ends the program when one of them is just closing (libzmq 4.3.5 tells the mark to the
+    other end, which may be gone). So it is done once, in a calm moment, and only when the first mark would
+    allow four times as much; for whoever comes later ports have to be bound anew.
     """
 
-    def __init__(self, owner: Socket) -> None:
+    def __init__(self, owner: Socket, codec: str) -> None:
         self._owner = owner
-        self._mark = 0
+        self._mark = 2 * _LEAST if codec == "image" else _MOST
         self.is_set = False
         """Whether the mark was chosen."""
-        owner.setsockopt(zmq.SNDHWM, _MOST)
+        self.is_to_lower = False
+        """Whether it is too high."""
+        owner.setsockopt(zmq.SNDHWM, self._mark)
 
     def sending(self, size_bytes: int) -> None:
-        """A message of this size is about to be sent."""
-        if not self._mark:
-            self._mark = min(_MOST, max(_LEAST, _QUEUE_BYTES // (4 * size_bytes + 1)))
-            self._owner.setsockopt(zmq.SNDHWM, self._mark)
-            self.is_set = True
+        """The first message has this size and is about to be sent."""
+        self.is_set = True
+        mark = max(_LEAST, _QUEUE_BYTES // (4 * size_bytes + 1))
+        self.is_to_lower = 4 * mark < self._mark
+        self._mark = min(mark, self._mark)
 
-    def greeted(self) -> None:
-        """A subscriber has connected."""
-        if self._mark:
-            self._owner.setsockopt(zmq.SNDHWM, self._mark)
+    def lower(self) -> None:
+        """Lower it, for all connections and for ports that are bound after this."""
+        self.is_to_lower = False
+        self._owner.setsockopt(zmq.SNDHWM, self._mark)
 
 
 def receive_mark(codec: str) -> int:
@@ -140,3 +146,15 @@ def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout
             return False
         changed.wait(min(left, _SLICE_S))
     return True
+
+
+def sendable(data: bytes | memoryview) -> Part:
+    """What can be sent as it lies: a received message itself; of what can still change a copy."""
+    if isinstance(data, bytes):
+        return data
+    origin = data.obj
+    if isinstance(origin, zmq.Frame) and data.nbytes == len(origin) and data.readonly:
+        return origin
+    if not (data.readonly and data.c_contiguous):
+        return bytes(data)
+    return data if data.itemsize == data.ndim == 1 else data.cast("B")
