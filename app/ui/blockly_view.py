@@ -6,7 +6,7 @@ shown) or die (its process can be killed): it is given everything again and the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
@@ -33,7 +33,7 @@ class BlocklyView(BlocklyHost):
         super().__init__(parent, language)
         self._tabs = Tabs()
         self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
-        self._live: Json = {}
+        self._live: Json = {"values": {}, "old": []}
         self._waiting: dict[int, Callable[[Json], None]] = {}
         self._tokens = 0
         self._bridge.edited.connect(self._edited)
@@ -126,10 +126,14 @@ class BlocklyView(BlocklyHost):
         """Show these blocks grey and dashed: their robot is not connected."""
         self._show("absent", list(ids))
 
-    def set_live_values(self, values: Mapping[str, str]) -> None:
-        """Set the words of sensor blocks, by block id or by ``<robot>/<property>``. No undo, no change."""
-        if values != self._live:
-            self._live = dict(values)
+    def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None:
+        """Set the words of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
+
+        No undo, no change. Those whose key is among ``old`` are faint: the robot has not told them lately.
+        """
+        live: Json = {"values": dict(values), "old": sorted(old)}
+        if live != self._live:
+            self._live = live
             self._tell("live", self._live)
 
     # -- commands ---------------------------------------------------------------------------------

@@ -154,6 +154,7 @@ def small(tree):
     return all(small(part) for part in tree[2:])
 
 
+@pytest.mark.timeout(180)  # 3000 programs; a busy computer may need more than a minute
 @settings(
     max_examples=3000,
     deadline=None,

@@ -251,3 +251,17 @@ def test_a_button_on_a_block_has_its_words_and_obeys_enter(qtbot, view, person):
     goes_to(them, "add one gap")
     press(them, Qt.Key_Return)
     qtbot.waitUntil(lambda: them.tops()[0]["extraState"] == {"items": 1}, timeout=WAIT_MS)
+
+
+def test_enter_on_a_text_opens_it(qtbot, view, person):
+    say = block("robot_pepper_do_say", "s", ROBOT="Pepper")
+    say["inputs"] = {"TEXT": {"shadow": {"type": "values_text", "id": "t", "fields": {"TEXT": "Hello"}}}}
+    them = person(state=workspace(say | {"x": 60, "y": 60}))
+    take_the_keys(them)
+    press(them, Qt.Key_Tab, Qt.Key_W, Qt.Key_Down, Qt.Key_Right, Qt.Key_Right)
+    goes_to(them, "Hello")
+    press(them, Qt.Key_Return)
+    them.wait_for("!!document.querySelector('.blocklyHtmlInput')")
+    QTest.keyClicks(them.target, "Good day")
+    press(them, Qt.Key_Return)
+    qtbot.waitUntil(lambda: "Good day" in str(them.tops()), timeout=WAIT_MS)

@@ -167,3 +167,18 @@ def test_live_values_are_in_the_flyout_too(view, person):
     them.open_category("Sensors")
     live = "document.querySelector('.blocklyFlyout .nepLive')?.textContent.replaceAll('\\u00a0', ' ')"
     them.wait_for(live, "84 %")
+
+
+def test_old_values_are_faint_and_figures_do_not_move_the_block(view, person):
+    them = person(state=PICTURE)
+    view.set_live_values({"Pepper/battery": "84 %"})
+    live = "document.querySelector('.blocklyBlockCanvas .nepLive')"
+    them.wait_for(f"{live}.textContent.replaceAll('\\u00a0', ' ')", "84 %")
+    path = f"{live}.closest('.blocklyBlock').querySelector('.blocklyPath').getAttribute('d')"
+    before = them.ask(path)
+    view.set_live_values({"Pepper/battery": "79 %"}, ["Pepper/battery"])
+    them.wait_for(f"{live}.textContent.replaceAll('\\u00a0', ' ')", "79 %")
+    assert them.ask(f"{live}.classList.contains('nepOld')") is True
+    assert them.ask(path) == before
+    view.set_live_values({"Pepper/battery": "100 %"})
+    them.wait_for(f"{path} != {before!r} && !{live}.classList.contains('nepOld')")

@@ -107,13 +107,13 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
         fields = tuple((field.title or field.name, field.name) for field in sensor.fields)
         return Block(
             type=type_of(robot.model, "get", sensor.name),
-            text=f"{parts.text} %FIELD",
+            text=f"{parts.text} %FIELD %LIVE",
             shape="value",
             style="sensors",
             icon=sensor.icon or "eye",
             tooltip=f"What the robot tells: {sensor.title}.",
             python="robot(%ROBOT).get(%X_NAME, %FIELD)",
-            arguments=(robots, ChoiceField("FIELD", fields)),
+            arguments=(robots, ChoiceField("FIELD", fields), LiveField("LIVE")),
             constants={"X_NAME": sensor.name},
             robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
         )

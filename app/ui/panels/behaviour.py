@@ -12,9 +12,9 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 from app.ui.behaviour_tab import TabFacts
 from app.ui.behaviour_title import BehaviourTitle
 from app.ui.editor import Editor, blockly
+from app.ui.live_words import live_words
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.program_view import ProgramView
-from app.ui.sensor_words import reading_of
 from app.ui.widgets import EmptyAction, EmptyState
 
 if TYPE_CHECKING:
@@ -164,14 +164,9 @@ class BehaviourPanel(PanelWidget):
 
     def _show_live(self) -> None:
         """What sensor blocks say now: "84 %" on the battery."""
-        words = {}
-        for robot, name in self._sensors:
-            link = self.session.fleet.link(robot)
-            sensor = link.robot.sensor(name) if link is not None else None
-            if link is not None and sensor is not None and link.state != "away":
-                words[f"{robot}/{name}"] = reading_of(sensor, link.values.get(name)).value
         if self.editor is not None:
-            self.editor.set_live_values(words)
+            words, old = live_words(self.session.fleet, self._sensors)
+            self.editor.set_live_values(words, old)
 
     def _show_empty(self) -> None:
         """Over the empty workspace, while there is no robot to build for."""

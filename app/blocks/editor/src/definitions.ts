@@ -22,6 +22,13 @@ export interface BlockDefinition {
 
 const known = new Map<string, {definition: BlockDefinition; key: string}>();
 
+/** The types whose blocks show a live value. */
+export function sensorTypes(): ReadonlySet<string> {
+  return live;
+}
+
+const live = new Set<string>();
+
 export function definitionOf(type: string): BlockDefinition | null {
   return known.get(type)?.definition ?? null;
 }
@@ -61,6 +68,7 @@ export function define(definitions: BlockDefinition[]): {changed: Set<string>; s
     if (known.get(definition.type)?.key === key) continue;
     known.set(definition.type, {definition, key});
     changed.add(definition.type);
+    if (argsOf(definition).some((arg) => arg.type === 'field_live')) live.add(definition.type);
     register(withQuotes(definition));
   }
   return {changed, sources};

@@ -74,11 +74,15 @@ export class FieldButton extends Blockly.FieldImage {
 export class FieldLive extends Blockly.FieldLabel {
   override SERIALIZABLE = false;
 
-  /** Shows the text; costs nothing when it is the same. Fires no event. */
-  show(text: string): void {
+  /** Shows the text; costs nothing when it is the same, little when it is as wide. Fires no event. */
+  show(text: string, old = false): void {
+    this.fieldGroup_?.classList.toggle('nepOld', old);
     if (text === this.value_) return;
+    const wide = (words: string) => words.replace(/\d/g, '0');
+    const fits = wide(text) === wide(String(this.value_ ?? ''));  // figures are all as wide
     this.value_ = text;
-    this.forceRerender();
+    if (fits && this.textContent_) this.textContent_.nodeValue = this.getDisplayText_();
+    else this.forceRerender();
   }
 
   override initView(): void {

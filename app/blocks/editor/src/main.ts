@@ -83,7 +83,7 @@ class Editor {
     stopped: (ids: string[]) => this.shown.states.markStopped(ids),
     errors: (errors: Record<string, string>) => this.shown.states.setErrors(errors),
     absent: (ids: string[]) => this.shown.states.setAbsent(ids),
-    live: (values: Record<string, string>) => this.shown.states.setLive(values),
+    live: (it: {values: Record<string, string>; old: string[]}) => this.shown.states.setLive(it.values, it.old),
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
     change: (state: Record<string, unknown>) => this.shown.change(state),
     undo: () => this.shown.program.undo(false),

@@ -108,6 +108,15 @@ export function pathOf(block: Blockly.BlockSvg): StatePath | null {
   return block.pathObject instanceof StatePath ? block.pathObject : null;
 }
 
+/** Enter on a block with one field opens it: a text's quotation marks are no reason to go inside first. */
+const act = Blockly.BlockSvg.prototype.performAction;
+Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, event?: KeyboardEvent) {
+  const fields = [...this.getFields()].filter((field) => field.isClickable());
+  const [only] = fields;
+  if (!this.workspace.isFlyout && this.outputConnection && fields.length === 1 && only) only.showEditor(event);
+  else act.call(this, event);
+};
+
 /** Blockly asks for the drawn shape of a connection by this name, wherever it needs one. */
 interface Finds {
   findHighlightSvg(this: Blockly.RenderedConnection): SVGPathElement | null;

@@ -1,6 +1,6 @@
 // What the blocks show while a program runs: glow, outlines, sentences, absent robots, live values.
 import * as Blockly from 'blockly/core';
-import {definitionOf} from './definitions';
+import {definitionOf, sensorTypes} from './definitions';
 import {FieldLive} from './fields';
 import {drawIcon} from './icons';
 import {isKept} from './kept';
@@ -19,6 +19,7 @@ export class States {
   private errors = new Map<string, string>();
   private absent = new Set<string>();
   private live = new Map<string, string>();
+  private old = new Set<string>();
   private readonly outlined = new Set<string>();
   private readonly bubbles = new Map<string, SVGGElement>();
   private placing = 0;
@@ -56,9 +57,10 @@ export class States {
     this.dress();
   }
 
-  /** Keys: a block's id, or `<robot>/<property>` for every block that reads this sensor. */
-  setLive(values: Record<string, string>): void {
+  /** Keys: a block's id, or `<robot>/<property>` and perhaps `/<field>` for every block that reads this sensor. */
+  setLive(values: Record<string, string>, old: string[]): void {
     this.live = new Map(Object.entries(values));
+    this.old = new Set(old);
     this.showLive();
   }
 
@@ -122,12 +124,21 @@ export class States {
     }
   }
 
-  private showLive(): void {
-    const flyout = this.workspace.getFlyout()?.getWorkspace().getAllBlocks(false) ?? [];
-    for (const block of [...this.workspace.getAllBlocks(false), ...flyout]) {
-      for (const field of block.getFields()) {
-        if (field instanceof FieldLive) field.show(this.live.get(block.id) ?? this.live.get(sensorKey(block)) ?? '');
+  /** Five times a second: only blocks of sensors are looked at, and only new words are drawn. */
+  showLive(): void {
+    const flyout = this.workspace.getFlyout()?.getWorkspace();
+    for (const workspace of flyout ? [this.workspace, flyout] : [this.workspace]) {
+      for (const type of sensorTypes()) {
+        for (const block of workspace.getBlocksByType(type, false)) this.showLiveOn(block);
       }
+    }
+  }
+
+  private showLiveOn(block: Blockly.Block): void {
+    for (const field of block.getFields()) {
+      if (!(field instanceof FieldLive)) continue;
+      const key = this.live.has(block.id) ? block.id : sensorKey(block);
+      field.show(this.live.get(key) ?? '', this.old.has(key));
     }
   }
 
@@ -198,7 +209,8 @@ function bubblePath(width: number, height: number): string {
 
 function sensorKey(block: Blockly.Block): string {
   const property = block.type.split('_get_')[1] ?? '';
-  return `${String(block.getFieldValue('ROBOT') ?? '')}/${property}`;
+  const part = block.getFieldValue('FIELD');
+  return `${String(block.getFieldValue('ROBOT') ?? '')}/${property}${typeof part === 'string' ? `/${part}` : ''}`;
 }
 
 function absentSentence(block: Blockly.Block): string {

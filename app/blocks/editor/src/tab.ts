@@ -48,6 +48,8 @@ export class Tab {
     });
     this.states = new States(this.workspace);
     this.functions = new Functions(this.workspace);
+    const toolbox = this.workspace.getToolbox();
+    if (toolbox instanceof Toolbox) toolbox.onFound = () => this.states.showLive();
     this.workspace.registerButtonCallback('CREATE_VARIABLE', (button) =>
       Blockly.Variables.createVariableButtonHandler(button.getTargetWorkspace()));
   }

@@ -99,6 +99,8 @@ export class Toolbox extends Blockly.Toolbox {
   /** What each category was made of; Blockly writes into the contents it is given. */
   private made = new Map<string, string>();
   private given: Def[] = [];
+  /** What to do when other blocks are shown than those of a category. */
+  onFound = (): void => undefined;
 
   /** Every block of every category, each once. */
   allEntries(): Def[] {
@@ -121,6 +123,7 @@ export class Toolbox extends Blockly.Toolbox {
     const flyout = this.getFlyout();
     if (entries) flyout?.show(entries as Blockly.utils.toolbox.FlyoutItemInfoArray);
     else flyout?.hide();
+    this.onFound();
   }
 
   /** The keys go to the first block that was found; with a key press it is taken at once. */
