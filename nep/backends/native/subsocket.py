@@ -11,6 +11,7 @@ from typing import Any
 
 import zmq
 
+from nep.addresses import host_of
 from nep.backends.base import SubscriberSpec
 from nep.backends.native.readable import Into
 from nep.backends.native.refusals import Refusals
@@ -93,7 +94,7 @@ class SubSocket:
         source.is_lapsed = False
         source.ends_at = None
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
-        if endpoint and endpoint != source.endpoint:
+        if endpoint and host_of(endpoint) != host_of(source.endpoint):  # another port is for others
             if source.endpoint:  # its computer has another address now
                 self._disconnect(source.endpoint)
                 source.has_echoed = False
