@@ -175,3 +175,11 @@ def test_a_gap_that_is_not_there_is_not_missed() -> None:
 def test_an_empty_gap_of_a_new_list_is_said() -> None:
     run = play(workspace(started(write(list_of() | {"extraState": {"items": 2}}))))
     assert run.program.problems[0].sentence == "list of needs a value. Put one into the gap."
+
+
+def test_a_list_that_was_put_in_is_a_copy_however_deep() -> None:
+    inner: list[object] = [1]
+    outer = lists.new_list([inner])
+    lists.add_item(outer, [[inner]])
+    inner.append(2)
+    assert outer == [[[1]], [[[1]]]]

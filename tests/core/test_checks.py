@@ -122,3 +122,15 @@ def test_nothing_is_counted_twice_or_not_at_all_between_threads() -> None:
     for thread in threads:
         thread.join()
     assert counted == 2 * 300 * 2
+
+
+def test_a_topic_that_was_well_for_long_is_no_suspect_any_more() -> None:
+    clock = Clock()
+    checks = Checks(clock, Clock(step_s=0.01))
+    checks.look("/a", messages(BAD))
+    clock.now += module.SUSPECT_S - 1
+    checks.look("/a", messages(*[GOOD] * 500))
+    suspect = checks.take()["/a"].checked
+    clock.now += module.SUSPECT_S + 20
+    checks.look("/a", messages(*[GOOD] * 500))
+    assert checks.take()["/a"].checked < suspect - module.RESERVE_S / 0.01 / 2

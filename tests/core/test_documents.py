@@ -9,7 +9,7 @@ import pytest
 
 from app.core.behaviour_file import BehaviourFile, write_file
 from app.core.document import Document
-from app.core.documents import Documents
+from app.core.documents import CLOSED_KEPT, Documents
 from app.core.journal import Journal, left_behind
 from app.errors import DocumentError
 from app.robots import rize
@@ -222,3 +222,28 @@ def test_closing_leaves_no_journal_of_what_is_saved(documents, journals, tmp_pat
     documents.close(documents.current)
     documents.end()
     assert list(journals.glob("*")) == []
+
+
+def test_unsaved_work_put_back_beside_newer_work_replaces_none(documents, journals, tmp_path) -> None:
+    path = file(tmp_path, "A")
+    documents.open(path)
+    documents.current.edited(OTHER)
+    as_if_dead(journals)
+    after = opened(journals)
+    left = left_behind(journals)
+    after.open(path)
+    newer = {"blocks": {"blocks": [{"type": "events_started", "id": "newer"}]}}
+    after.current.edited(newer)
+    after.recover(left[0])
+    assert [document.workspace for document in after] == [newer, OTHER]
+    assert all(document.dirty for document in after)
+
+
+def test_only_so_many_closed_tabs_are_remembered(documents, tmp_path) -> None:
+    for number in range(CLOSED_KEPT + 2):
+        documents.open(file(tmp_path, f"F{number}"))
+        documents.close(documents.current)
+    again = 0
+    while documents.reopen() is not None:
+        again += 1
+    assert again == CLOSED_KEPT

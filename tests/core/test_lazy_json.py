@@ -70,7 +70,7 @@ def test_a_value_that_is_no_json_says_so_and_the_others_can_be_read() -> None:
     assert isinstance(root["none"], Unreadable)
 
 
-@pytest.mark.parametrize("broken", ["[1, 2", "]", '["a]', "", "{]]", "[" * 1001 + "]" * 1001])
+@pytest.mark.parametrize("broken", ["[1, 2", "]", "][", '["a]', "", "{]]", "[" * 1001 + "]" * 1001])
 def test_brackets_that_do_not_match_are_an_error(broken: str) -> None:
     with pytest.raises(ValueError, match=r"match|end|nested"):
         index(broken)

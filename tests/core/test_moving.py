@@ -98,3 +98,12 @@ def test_a_program_that_hides_what_it_does_may_do_anything(rover, source) -> Non
 
 def test_the_error_names_the_robots() -> None:
     assert "Rover and Tim may not move yet" in str(MayNotMoveError(["Rover", "Tim"]))
+
+
+def test_one_yes_counts_for_all_robots_of_the_question(rover) -> None:
+    moving, other = Moving(), replace(rover, name="Other")
+    assert not moving.permits([(rover, ["move"]), (other, ["turn"])], lambda: None)
+    assert moving.question is not None
+    assert moving.question.title == "Let Rover and Other move?"
+    moving.answer(let=True)
+    assert moving.permits([(rover, ["move"]), (other, ["turn"])], pytest.fail)

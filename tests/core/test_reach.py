@@ -99,8 +99,32 @@ def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
 
 
 def test_the_master_of_another_computer_is_not_told(make, world):
+    near, _alerts = make()
+    near.let_in(["192.168.1.20"])  # kept, for the master of this computer
+    world.answer(near)
+    world.asked.clear()
+    near.close()
     reach, _alerts = make("192.168.1.9:7780")
     assert not reach.is_near
     assert reach.master_host == "192.168.1.9"
     reach.follow(GraphView(epoch=1, revision=1, listens=("192.168.1.9",)))
+    reach.close()
     assert not world.asked
+
+
+def test_the_last_wish_is_told_last_however_long_the_first_takes(world, make, monkeypatch):
+    may_go_on, told = threading.Event(), []
+
+    def slow(hosts, _address):
+        if hosts:
+            assert may_go_on.wait(5.0)
+        told.append(tuple(hosts))
+
+    monkeypatch.setattr(world, "ask", slow)
+    reach, _alerts = make()
+    reach.let_in(["192.168.1.20"])
+    reach.let_in([])
+    assert told == []
+    may_go_on.set()
+    reach.close()
+    assert told == [("192.168.1.20",), ()]

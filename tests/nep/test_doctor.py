@@ -129,6 +129,8 @@ def test_the_original_package_beside_ours_is_an_error_with_the_command():
     assert "nep 0.5.4.8" in one.sentence
     assert one.command.startswith("pip uninstall -y nep")
     assert "package" not in found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),))
+    both = found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),), strange_files=("publisher.py",))
+    assert "package:files" not in both, "the first mend cures both"
     left = found(strange_files=("publisher.py", "master.py"))["package:files"]
     assert "publisher.py, master.py" in left.sentence
     assert found(shadow="/home/me/nep.py")["package:shadow"].severity == "warning"
@@ -155,6 +157,8 @@ def test_a_node_with_nearly_all_sockets_is_told():
         for number in range(900)
     }
     assert "900 publishers" in found(view=view(node("Pepper"), topics=many))["sockets:Pepper"].sentence
+    # the sockets of originals are their own, not in one context of ours
+    assert "sockets:Pepper" not in found(view=view(node("Pepper", "0.5.4.8"), topics=many))
 
 
 def test_originals_are_named_and_those_that_cannot_be_served_are_errors():

@@ -170,3 +170,48 @@ def test_logging_needs_no_master_and_does_not_hold_up_the_end(monkeypatch):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     with nep.node("alone", wait_s=0.05) as node:
         node.log.error("nobody hears this")
+
+
+def test_a_long_silence_saves_up_no_more_than_one_burst(kept):
+    now = [0.0]
+    handler = LogHandler("robot", kept.open, rate_hz=10, burst=3, clock=lambda: now[0])
+    now[0] = 3600.0
+    for number in range(10):
+        handler.logger.info("%d", number)
+    handler.close()
+    assert [text for text in kept.texts if "left out" not in text] == ["0", "1", "2"]
+
+
+def test_what_publishing_itself_logs_is_not_published():
+    kept = Kept()
+
+    class Chatty:
+        def publish(self, payload):
+            kept.publish(payload)
+            logging.getLogger("wire").error("I publish")
+
+    handler, root = LogHandler("robot", Chatty, burst=50), logging.getLogger()
+    root.addHandler(handler)
+    try:
+        handler.logger.info("once")
+        eventually(lambda: kept.texts)
+        handler.close()
+    finally:
+        root.removeHandler(handler)
+    assert kept.texts == ["once"]
+
+
+def test_without_a_master_no_more_records_wait_than_fit():
+    came, kept = threading.Event(), Kept()
+
+    def open_late():
+        assert came.wait(10.0)
+        return kept
+
+    handler = LogHandler("robot", open_late, burst=5_000)
+    for number in range(3_000):
+        handler.logger.info("%d", number)
+    came.set()
+    handler.close(10.0)
+    assert len([text for text in kept.texts if "left out" not in text]) == 1_000
+    assert any(text.startswith("2000 log records were left out") for text in kept.texts)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
 import sys
 import threading
+import types
 
 import pytest
 import zmq
@@ -11,7 +13,7 @@ import zmq
 import nep
 from nep.backends.native import link
 from nep.bodies import decode_answer, encode_request
-from nep.errors import NepError, RequestRefusedError
+from nep.errors import AddressInUseError, NepError, RequestRefusedError
 from nep.listening import check_hosts
 from nep.masters import Master
 from nep.network import ANY, OwnAddress, has_address, nearest, own_addresses
@@ -196,6 +198,44 @@ def test_the_loss_of_a_served_address_is_an_alert_until_it_is_back():
     here[0] = HERE[:1]
     assert listening.follow() == ()
     assert bound == ["tcp://192.168.1.20:7780"]
+
+
+def test_when_one_address_can_not_be_bound_none_is():
+    bound = []
+
+    class Router:
+        def bind(self, endpoint):
+            if bound:
+                raise zmq.ZMQError(zmq.EADDRINUSE)
+            bound.append(endpoint)
+
+        def unbind(self, endpoint):
+            bound.remove(endpoint)
+
+    listening = nep.listening.Listening(Router(), 7780, lambda: HERE)
+    with pytest.raises(AddressInUseError):
+        listening.serve([own.host for own in HERE])
+    assert (bound, listening.hosts) == ([], ())
+
+
+def test_addresses_that_nobody_can_reach_are_not_offered(monkeypatch):
+    def address(host):
+        return types.SimpleNamespace(family=socket.AF_INET, address=host)
+
+    found = {
+        "lo": "127.0.0.1",
+        "eth1": "169.254.7.7",
+        "eth0": "192.168.1.20",
+        "down0": "10.0.0.9",
+        "tun0": "10.8.0.2",
+    }
+    monkeypatch.setattr(
+        "psutil.net_if_addrs", lambda: {name: [address(host)] for name, host in found.items()}
+    )
+    monkeypatch.setattr(
+        "psutil.net_if_stats", lambda: {name: types.SimpleNamespace(isup=name != "down0") for name in found}
+    )
+    assert own_addresses() == (OwnAddress("192.168.1.20", "eth0"), OwnAddress("10.8.0.2", "tun0"))
 
 
 def test_a_taken_port_is_a_sentence(master):
