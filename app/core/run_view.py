@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from app.core.stopping import RobotStop, StopReport
 
 STOPPING_SHOWN_AFTER_S = 0.1
+NOTHING = "Take “when started” from Events and hang blocks below it"
 
 
 @dataclass(slots=True)
@@ -34,6 +35,7 @@ class RunState:
     finished: bool = False
     dashed: bool = False
     errors: Mapping[str, str] = field(default_factory=dict)
+    nothing_in: object = None  # the program that Run was pressed for and that had nothing to run
     last_words: str = ""
 
     def elapsed(self, now: float) -> float:
@@ -113,11 +115,12 @@ def _view(run: RunState, connected: Sequence[str], now: float) -> RunView:
     }
     if run.state in views:
         return views[run.state](run, now)
+    title = "Nothing to run yet" if run.nothing_in else "Ready"
     return RunView(
         "ready",
-        "Ready",
-        connected_words(connected),
-        "Ready",
+        title,
+        NOTHING if run.nothing_in else connected_words(connected),
+        title,
         can_run=True,
         can_step=True,
         stop_filled=bool(connected),

@@ -45,8 +45,7 @@ class Runs:
         self._runner: Runner | None = None
         self._used: tuple[str, ...] = ()
         self._program_id: str | None = None  # the last one's: robots refuse what still comes from it
-        self.kept: frozenset[str] = frozenset()
-        """Robots that the program used, until proven to stand still; a stop reaches them also when away."""
+        self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
         self._labels: Mapping[str, str] = {}
         self._run = RunState()
         self._stop_number = 0
@@ -66,6 +65,8 @@ class Runs:
     def view(self) -> RunView:
         """What the run bar says now."""
         names = [link.name for link in self._fleet.connected]
+        if self._run.nothing_in and self._run.nothing_in is not self._documents.current.newest():
+            self._run.nothing_in = None  # another behaviour shows, or this one was edited
         elsewhere = self.document not in {None, self._documents.current}
         return view_of(self._run, names, self._clock(), elsewhere=elsewhere, slow=self.pace_s > 0)
 
@@ -161,8 +162,6 @@ class Runs:
                 self._console.add("info", run.name, event.text)
             case "ended":
                 self._on_end(event)
-            case _:
-                pass
 
     def on_stop(self, event: StopDone | RobotAnswered | OneStopped) -> None:
         """Take over what robots answered to the newest stop."""
@@ -176,8 +175,7 @@ class Runs:
         if isinstance(event, RobotAnswered):
             run.answered.append(event.robot)
             return
-        words, good = result_words(event.report)
-        run.report, run.last_words = event.report, words
+        run.report, (run.last_words, good) = event.report, result_words(event.report)
         self.kept = frozenset(event.report.silent)
         run.state = "proven" if good else "unanswered"
         run.dashed = bool(self.stopped_blocks)
@@ -196,6 +194,9 @@ class Runs:
             wrong = {p.block_id: p.sentence for p in program.problems if p.severity == "error" and p.block_id}
             if wrong:
                 self._set_errors(wrong)
+                return
+            if not program.starts:
+                self._run = RunState(nothing_in=program, last_words=self._run.last_words)
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
             wanted = wanted_by(program.runnable, used)

@@ -40,6 +40,7 @@ WORDS = {"critical": "fatal"}
 """Words that fit into the column of levels."""
 ROW = {"compact": 22, "comfortable": 30}
 ICON = 14
+MESSAGE = 24  # letters of the text that should be seen
 _ROOT = QModelIndex()
 
 
@@ -54,7 +55,8 @@ def line_of(record: LogRecord) -> str:
 def tip_of(record: LogRecord) -> str:
     """What is known of a record beside its text: where in the program it was logged."""
     where = "  ".join(part for part in (record.logger, record.place) if part)
-    return f"{record.text}\n{where}" if where else record.text
+    said = f"{record.text}\n{time.strftime('%H:%M:%S', time.localtime(record.stamp_s))} {record.level}"
+    return f"{said}  {record.origin}\n{where}" if where else f"{said}  {record.origin}"
 
 
 def first_line(text: str) -> str:
@@ -170,30 +172,53 @@ class LineDelegate(QStyledItemDelegate):
             painter.fillRect(box, theme.colour("selected"))
         rect = QRectF(box).adjusted(10, 0, -8, 0)
         small = theme.font("code")
-        clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
-        paint.words(painter, rect, clock, small, theme.colour("textTertiary"))
-        rect.setLeft(rect.left() + paint.width_of(small, "00:00:00") + 14)
+        shown = self.columns(record, rect.width())
+        if "time" in shown:
+            clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
+            paint.words(painter, rect, clock, small, theme.colour("textTertiary"))
+            rect.setLeft(rect.left() + shown["time"])
         icon, role = LEVELS.get(record.level, LEVELS["info"])
         square = QRectF(rect.left(), rect.center().y() - ICON / 2, ICON, ICON)
         paint_icon(painter, square, icon, theme.colour(role))
-        rect.setLeft(rect.left() + ICON + 4)
-        level = WORDS.get(record.level, record.level)
-        paint.words(painter, rect, level, font, theme.colour(role))
-        # one column for every level, as wide as the widest
-        rect.setLeft(rect.left() + max(paint.width_of(font, word) for word in ("debug", "error")) + 10)
-        for words, colour, most in self._parts(record):
+        rect.setLeft(rect.left() + shown["icon"])
+        if "level" in shown:
+            level = WORDS.get(record.level, record.level)
+            paint.words(painter, rect, level, font, theme.colour(role))
+            rect.setLeft(rect.left() + shown["level"])
+        for words, colour, most in self._parts(record, logger="logger" in shown):
             part = QRectF(rect)
             part.setWidth(min(paint.width_of(font, words) + 1, rect.width() * most))
             paint.words(painter, part, words, font, theme.colour(colour))
             rect.setLeft(part.right() + 7)
 
+    def columns(self, record: LogRecord, width: float) -> dict[str, float]:
+        """What stands before the text, with its width, in a row of that width.
+
+        Where little is left for the text, first the logger goes, then the level's word (its icon says it
+        too), then the time; who says it stays. All of it is in the row's tooltip.
+        """
+        font = self._font()
+        text = MESSAGE * paint.width_of(font, "n")
+        shown = {
+            "time": paint.width_of(self._theme.font("code"), "00:00:00") + 14,
+            "icon": float(ICON + 4),
+            "level": max(paint.width_of(font, word) for word in ("debug", "error")) + 10,
+            "origin": min(paint.width_of(font, record.origin), 0.3 * width) + 7,
+            "logger": paint.width_of(font, record.logger.rpartition(".")[2]),
+        }
+        for name in ("logger", "level", "time"):
+            if width - sum(shown.values()) >= text:
+                break
+            del shown[name]
+        return shown
+
     @staticmethod
-    def _parts(record: LogRecord) -> list[tuple[str, str, float]]:
+    def _parts(record: LogRecord, *, logger: bool) -> list[tuple[str, str, float]]:
         """What stands in the rest of a row: words, their colour, how much of what is left they may take."""
         parts = [(record.origin, "textTertiary", 0.4), (first_line(record.text), "text", 1.0)]
-        logger = record.logger.rpartition(".")[2]
-        if logger:
-            parts.insert(1, (logger, "textDisabled", 0.3))
+        name = record.logger.rpartition(".")[2] if logger else ""
+        if name:
+            parts.insert(1, (name, "textDisabled", 0.3))
         return parts
 
 

@@ -132,8 +132,8 @@ class Habits:
                 dock.panel.choose(name)
         elif kind == "layout":
             self._use_layout(name)
-        elif kind == "file":
-            self._files.open(Path(name))
+        elif kind in {"file", "example"}:
+            (self._files.open if kind == "file" else self._files.example)(Path(name))
 
     def open_shortcuts(self) -> None:
         """Open the table of shortcuts."""

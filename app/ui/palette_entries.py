@@ -20,6 +20,7 @@ TITLES = {
     "robot": "Robots",
     "layout": "Layouts",
     "file": "Recent files",
+    "example": "Examples",
 }
 TOPIC_ICONS = {"json": "braces", "string": "type", "bytes": "binary", "image": "image"}
 HIDDEN = {"palette.open", *(f"panel.{number}" for number in range(1, 10))}
@@ -41,6 +42,7 @@ class Offers:
             *self._robots(),
             *self._layouts(),
             *self._files(),
+            *self._examples(),
             *self._of_topics(),
         ]
 
@@ -80,6 +82,10 @@ class Offers:
             reason = "" if file.there else f"Not in {file.path.parent.name} any more"
             made.append(Entry(f"file:{file.path}", file.name, "file", when, reason=reason))
         return made
+
+    def _examples(self) -> list[Entry]:
+        examples = self._window.start.examples
+        return [Entry(f"example:{each.path}", each.name, "blocks", each.text) for each in examples]
 
     def _of_topics(self) -> list[Entry]:
         topics = self._window.session.topics

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 
 WHOLE, WORD, INSIDE, SPREAD = 100.0, 80.0, 55.0, 40.0
-LEAST_SPREAD = 0.6  # share of the letters that begin a word or follow the letter before
+LEAST_SPREAD = 0.8  # share of the letters that begin a word or follow the letter before
 PER_LETTER = 0.05
 MANY = 400  # entries of a kind that are all looked at letter by letter
 LATER = 5.0  # what can't be done now stands below what fits as well
@@ -36,7 +36,7 @@ class Entry:
 
     @property
     def kind(self) -> str:
-        """What it is: "command", "panel", "topic", "robot" or "file"."""
+        """What it is: "command", "panel", "topic", "robot", "file" or "example"."""
         return self.id.partition(":")[0]
 
     @property

@@ -66,7 +66,7 @@ class StartPage(QWidget):
 
     def __init__(self, theme: Theme, examples: Sequence[Example]) -> None:
         super().__init__()
-        self._theme = theme
+        self._theme, self.examples = theme, tuple(examples)
         self.setAccessibleName("Start")
         self._use = Button(theme, "Use the virtual robot", "bot", kind="primary", size="large")
         self._use.clicked.connect(self.virtual_robot)

@@ -1,4 +1,4 @@
-"""A stop reaches the robots at once, before the program has ended, and again when it has."""
+"""Run says when there is nothing to run; a stop reaches the robots at once, and again after the end."""
 
 from __future__ import annotations
 
@@ -41,3 +41,22 @@ def test_robots_are_told_before_the_program_has_ended_and_asked_after(session: S
     steps = Steps()
     session.runs._stop_all(1, cast("Runner", steps), cast("RobotStopper", steps), None, "p1")
     assert steps.done == [("told", "p1"), ("program ended", None), ("asked", "p1")]
+
+
+def test_with_nothing_to_run_the_bar_says_what_to_do_until_something_changes(session: Session) -> None:
+    runs = session.runs
+    assert runs.view().title == "Ready"
+    runs.run()
+    assert not runs.active
+    assert (runs.view().state, runs.view().title) == ("ready", "Nothing to run yet")
+    assert "when started" in runs.view().detail
+    session.document.edited({"blocks": {"blocks": [{"type": "events_started", "id": "a"}]}})
+    assert runs.view().title == "Ready"
+
+
+def test_another_behaviour_takes_the_hint_away(session: Session) -> None:
+    session.runs.step()
+    assert session.runs.view().title == "Nothing to run yet"
+    session.document.edited({"blocks": {"blocks": []}})
+    session.documents.new()
+    assert session.runs.view().title == "Ready"

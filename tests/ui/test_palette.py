@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from app.core.document import Document
 from app.core.settings import RecentFile
 from app.core.topics import Topic
 from app.ui.commands import Commands
@@ -17,6 +18,7 @@ from app.ui.entry_list import Heading
 from app.ui.main_window import MainWindow
 from app.ui.palette import Palette
 from app.ui.palette_match import Entry, Finder, Found, match
+from app.ui.start_page import Example
 from tests.ui.shell_parts import PlainPanel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -52,6 +54,7 @@ def test_what_does_not_fit_is_not_found(query: str) -> None:
 
 def test_scattered_letters_do_not_fit() -> None:
     assert found("Show the inside of every panel that is open", query="hif") == []
+    assert found("Close the behaviour", query="tour") == []  # it would close a tab on Enter
 
 
 def test_of_very_many_whole_pieces_are_found_and_all_are_counted() -> None:
@@ -230,6 +233,20 @@ def test_panels_topics_and_files_are_found(palette: Palette, window: MainWindow,
     dock = window.panel_focus.dock()
     assert dock is not None
     assert dock.description.name == "console"
+
+
+def test_examples_are_found_and_open_as_new_behaviours(palette, window: MainWindow, tmp_path: Path) -> None:
+    path = tmp_path / "Tour.nepb"
+    Document().save(path)
+    window.start.examples = (Example(path, "Tour guide", "Shows the room", ()),)
+    palette.shut()
+    palette.open()
+    QTest.keyClicks(palette.field, "tour g")
+    rows = [each.entry.words for each in palette.rows.lines.lines if isinstance(each, Found)]
+    assert (rows, headings(palette)) == (["Tour guide"], ["Examples"])
+    QTest.keyClick(palette.field, Qt.Key.Key_Return)
+    assert window.session.document.name == "Tour"
+    assert window.session.document.path is None
 
 
 def test_what_cant_be_done_says_why_and_is_not_done(palette: Palette, window: MainWindow) -> None:

@@ -8,8 +8,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy
 
 from app.core.console import Console
-from app.ui.console_list import first_line, tip_of
+from app.ui.console_list import MESSAGE, LineDelegate, first_line, tip_of
 from app.ui.panels.console import PANEL, ConsolePanel
+from app.ui.widgets import paint
 from nep.logs import LOG_TOPIC, LOG_TYPE
 from nep.message import Message
 from tests.ui.fakes import Session
@@ -125,9 +126,27 @@ def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
     panel.refresh()
     assert lines(panel)[0] == "warn Pepper [app.robots.tasks] its stop broke off"
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
-    assert tip_of(record) == "its stop broke off\napp.robots.tasks  tasks.py:272"
+    said, level, place = tip_of(record).split("\n")
+    assert (said, place) == ("its stop broke off", "app.robots.tasks  tasks.py:272")
+    assert level.endswith(" warn  Pepper")
     panel.set_level("debug")
     assert lines(panel)[0].startswith("debug Pepper")
+
+
+@pytest.mark.parametrize(("percent", "width"), [(100, 446), (200, 446), (200, 700), (200, 1200)])
+def test_large_text_leaves_the_message_its_place(panel, window, percent: int, width: int) -> None:
+    logged(window, "warning", "its stop broke off")
+    panel.refresh()
+    record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
+    window.theme.set_text_percent(percent)
+    delegate = LineDelegate(window.theme, lambda: "compact", panel.text_font)
+    shown = delegate.columns(record, width)
+    assert {"icon", "origin"} <= shown.keys()
+    letter = paint.width_of(panel.text_font(), "n")
+    if len(shown) > 2:  # nothing more could go
+        assert width - sum(shown.values()) >= MESSAGE * letter
+    if percent == 100 or width == 1200:
+        assert {"time", "level"} <= shown.keys()
 
 
 def test_nothing_is_decoded_while_nobody_looks(window) -> None:
