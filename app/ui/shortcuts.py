@@ -156,11 +156,16 @@ class Shortcuts(QObject):
         self._keep()
 
     def reset(self, name: str) -> None:
-        """Give a command the key of the table; another command that had got it loses it."""
+        """Give a command the key of the table; another command that had got it loses it.
+
+        It has its own of the table again, unless somebody else has that: no swap leaves one without a key.
+        """
         self._own.pop(name, None)
         for key in self.default(name):
-            for other in [each for each in self._own if each != name]:
+            for other in [each for each in self._own if each != name and key in self._own[each]]:
                 self._own[other] = tuple(each for each in self._own[other] if each != key)
+                if not self._own[other] and not any(map(self.holder, self.default(other))):
+                    del self._own[other]
         self._keep()
 
     def reset_all(self) -> None:

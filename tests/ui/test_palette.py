@@ -52,6 +52,11 @@ def test_what_does_not_fit_is_not_found(query: str) -> None:
     assert found("Save", "Keyboard shortcuts", "Stop the program", query=query) == []
 
 
+def test_what_can_be_done_now_stands_above_what_can_not() -> None:
+    entries = [Entry("command:a", "Go on", reason="Nothing is paused"), Entry("command:b", "Go up")]
+    assert [each.entry.words for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Go on"]
+
+
 def test_scattered_letters_do_not_fit() -> None:
     assert found("Show the inside of every panel that is open", query="hif") == []
     assert found("Close the behaviour", query="tour") == []  # it would close a tab on Enter

@@ -57,7 +57,12 @@ def test_two_commands_swap(keys: Shortcuts) -> None:
 def test_one_or_all_are_reset(keys: Shortcuts, tmp_path: Path) -> None:
     keys.swap("file.open", "Ctrl+S")
     keys.reset("file.open")
+    assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
+    keys.swap("file.open", "Ctrl+S")
+    keys.give("file.new", "Ctrl+S")  # "Open" has none now, and "Save" that of "Open"
+    keys.reset("file.open")
     assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+O",), ())
+    assert keys.of("file.new") == ("Ctrl+S",)
     keys.reset_all()
     assert keys.of("file.save") == ("Ctrl+S",)
     assert Settings(tmp_path).get("shortcuts", {"not": "kept"}) == {}

@@ -1,0 +1,106 @@
+"""Who goes first, who waits, who is ended: the deciding of one robot's tasks, without a network."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from app.robots.calls import Canceled, MonotonicClock
+from app.robots.task import Answer, Task
+from app.robots.tasks import Tasks
+from tests.robots.conftest import eventually
+
+
+class World:
+    """Tasks of a robot that end when they are let go, and what was answered to each."""
+
+    def __init__(self) -> None:
+        self.began: list[str] = []
+        self.answers: dict[str, list[Answer]] = {}
+        self.let_go: dict[str, threading.Event] = {}
+        self.tasks = Tasks("Bot", lambda: None, MonotonicClock(), within_s=0.1, watchdog_s=None)
+        self.tasks.start()
+
+    def ask(self, name: str, uses: tuple[str, ...], *, obeys: bool = True, **more: Any) -> None:
+        """Ask for an action that runs until it is let go or, if it obeys, told to end."""
+        gone = self.let_go[name] = threading.Event()
+        told = self.answers[name] = []
+
+        def run(call: Any) -> None:
+            self.began.append(name)
+            while not gone.wait(0.002):
+                if obeys and call.canceled:
+                    raise Canceled
+
+        task = Task(name, name, run, told.append, uses, **more)
+        self.tasks.call_soon(lambda: self.tasks.submit(task))
+        eventually(lambda: told)
+
+    def states(self, name: str) -> list[str]:
+        return [answer.state for answer in self.answers[name]]
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    made = World()
+    yield made
+    for gone in made.let_go.values():
+        gone.set()
+    made.tasks.close()
+
+
+def ran(world: World, *names: str) -> Callable[[], bool]:
+    return lambda: world.began == [*names]
+
+
+def test_nobody_overtakes_who_waits_for_more(world: World) -> None:
+    world.ask("wave", ("arm",))
+    eventually(ran(world, "wave"))
+    world.ask("dance", ("arm", "legs"))
+    world.ask("walk", ("legs",))  # the legs are free, but "dance" waits for them
+    assert world.states("walk") == ["accepted"]
+    world.ask("blink", ("eyes",))
+    eventually(ran(world, "wave", "blink"))
+    world.let_go["wave"].set()
+    eventually(ran(world, "wave", "blink", "dance"))
+    assert world.states("walk") == ["accepted"]
+    world.let_go["dance"].set()
+    eventually(ran(world, "wave", "blink", "dance", "walk"))
+
+
+def test_what_can_not_be_canceled_is_not_replaced(world: World) -> None:
+    world.ask("kick", ("legs",), cancellable=False)
+    eventually(ran(world, "kick"))
+    world.ask("walk", ("legs",), on_busy="replace")
+    (accepted,) = world.answers["walk"]
+    assert (accepted.waits_for, accepted.replaces) == (("kick",), ())
+    world.let_go["kick"].set()
+    eventually(ran(world, "kick", "walk"))
+    assert world.states("kick") == ["accepted", "running", "succeeded"]
+
+
+def test_a_queue_that_is_full_refuses_with_a_sentence(world: World) -> None:
+    world.ask("first", ("arm",))
+    eventually(ran(world, "first"))
+    for number in range(50):
+        world.ask(f"n{number}", ("arm",))
+    world.ask("last", ("arm",))
+    assert world.states("last") == ["failed"]
+    assert world.answers["last"][0].error == "last: 50 other actions are waiting already"
+    assert world.states("n49") == ["accepted"]
+
+
+def test_a_stop_is_answered_when_nothing_runs_any_more(world: World) -> None:
+    world.ask("kick", ("legs",), cancellable=False, obeys=False)
+    eventually(ran(world, "kick"))
+    stopped: list[Answer] = []
+    world.tasks.call_soon(lambda: world.tasks.stop(stopped.append))
+    world.ask("after", ("arm",))
+    eventually(lambda: world.states("after")[-1] in {"failed", "accepted", "running"})
+    assert stopped == []
+    world.let_go["kick"].set()
+    eventually(lambda: stopped)
+    assert stopped[0].state == "succeeded"
