@@ -17,14 +17,18 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
 from PySide6.QtCore import QTimer
 
 from app.core.session import Session
 from app.ui.application import Options, make_application, make_window
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
+from app.ui.palette import Palette
 from app.ui.self_drive import SelfDrive, Step
 from nep.masters import is_running
+from tools.small_png import shrink
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "images"
@@ -141,14 +145,18 @@ class Pictures(SelfDrive):
             Step("the virtual robot", self._begin, self._robot_there, 40, settle_s=2.5),
             *self._run_to(TOUCH),
             *self._stop(),
-            *self._run_to(TOUCH, "behaviour-light", settle_s=0.25),
+            *self._run_to(TOUCH, "behaviour-light", settle_s=0.5),
             *self._stop("theme.dark", "behaviour-dark"),
             Step("the topics", lambda: run("layout.developer"), lambda: len(session.topics) > 3, 20),
             Step("a message", self._inspect, lambda: True, settle_s=1.0),
             *self._run_to(TURN, "developer-dark", settle_s=0.4),
-            *self._stop("theme.light"),
+            *self._stop(),
+            Step("the palette", self._find, lambda: True, picture="palette", settle_s=1.0),
+            Step("the palette closed", lambda: run("palette.open"), lambda: True),
+            Step("light", lambda: run("theme.light"), lambda: True),
             *self._run_to(TURN, "developer-light", settle_s=0.4),
             *self._stop(),
+            Step("its actions", self._robots, self._robot_there, picture="robots", settle_s=1.5),
         ]
 
     def _run_to(self, block: str, picture: str = "", settle_s: float = 0.6) -> list[Step]:
@@ -186,6 +194,17 @@ class Pictures(SelfDrive):
         self._commands.run("robots.virtual")
         self._commands.files.open(self._behaviour)
 
+    def _find(self) -> None:
+        """The palette with what fits "rob"."""
+        self._commands.run("palette.open")
+        for palette in self._window.findChildren(Palette):
+            palette.field.setText("rob")
+
+    def _robots(self) -> None:
+        self._reset()
+        self._commands.run("layout.behaviour")
+        self._commands.run("panel:robots")
+
     def _inspect(self) -> None:
         self._window.open_topic("/Pepper/camera")
         self._commands.run("inspect:/Pepper/state")
@@ -206,6 +225,8 @@ def take(folder: Path) -> int:
         window.begin()
         pictures = Pictures(window, commands, folder, behaviour)
         application.exec()
+    for picture in pictures.pictures:
+        shrink(picture)
     return 0 if pictures.well else 1
 
 

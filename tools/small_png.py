@@ -1,0 +1,68 @@
+"""Make pictures of windows small: 256 colours, chosen so that flat surfaces and text keep theirs exactly.
+
+python tools/small_png.py PICTURE.png ...
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PySide6.QtGui import QImage
+
+EXACT, FOUND = 112, 144  # colours taken as they are, since they are frequent; colours found for the rest
+SAMPLE, ROUNDS = 40_000, 12
+
+
+def shrink(path: Path) -> int:
+    """Write the picture again with at most 256 colours; its size in bytes now."""
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise OSError(f"{path} is no picture")
+    packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
+    colours, place, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
+    table = _table(colours, counts)
+    index = _nearest(_channels(colours), table)[place].astype(np.uint8).reshape(packed.shape)
+    height, width = index.shape
+    made = QImage(index.tobytes(), width, height, width, QImage.Format.Format_Indexed8)
+    made.setColorTable([0xFF000000 | (r << 16) | (g << 8) | b for b, g, r in table.astype(int).tolist()])
+    if not made.save(str(path), "PNG", 0):
+        raise OSError(f"{path} can't be written")
+    return path.stat().st_size
+
+
+def _channels(colours: np.ndarray) -> np.ndarray:
+    """Packed colours as rows of blue, green, red."""
+    return np.stack([colours & 255, colours >> 8 & 255, colours >> 16 & 255], axis=1).astype(np.float32)
+
+
+def _table(colours: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """The most frequent colours, and the middles of what the others gather around."""
+    order = np.argsort(counts)[::-1]
+    exact, rest = order[:EXACT], order[EXACT:]
+    table = _channels(colours[exact])
+    if len(rest) <= FOUND:
+        return np.vstack([table, _channels(colours[rest])])
+    chance = np.random.default_rng(7)  # the same picture gives the same file
+    share = counts[rest] / counts[rest].sum()
+    sample = _channels(colours[chance.choice(rest, SAMPLE, p=share)])
+    cv2.setRNGSeed(7)
+    ends = (cv2.TERM_CRITERIA_MAX_ITER, ROUNDS, 0.0)
+    _, _, middles = cv2.kmeans(sample, FOUND, np.zeros(0, np.int32), ends, 1, cv2.KMEANS_PP_CENTERS)
+    return np.vstack([table, np.rint(middles)])
+
+
+def _nearest(colours: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """For each colour the place of the nearest one in the table."""
+    found = np.empty(len(colours), np.int64)
+    for begin in range(0, len(colours), 4096):
+        some = colours[begin : begin + 4096]
+        found[begin : begin + 4096] = ((some[:, None, :] - table[None]) ** 2).sum(axis=2).argmin(axis=1)
+    return found
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        sys.stdout.write(f"{shrink(Path(name))} bytes  {name}\n")
