@@ -28,7 +28,7 @@ def shrink(path: Path) -> int:
     height, width = index.shape
     made = QImage(index.tobytes(), width, height, width, QImage.Format.Format_Indexed8)
     made.setColorTable([0xFF000000 | (r << 16) | (g << 8) | b for b, g, r in table.astype(int).tolist()])
-    if not made.save(str(path), "PNG", 0):
+    if not made.save(str(path), quality=0):
         raise OSError(f"{path} can't be written")
     return path.stat().st_size
 
