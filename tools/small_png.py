@@ -21,11 +21,11 @@ def shrink(path: Path) -> int:
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture")
+    height, width = picture.shape[:2]
     packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
     colours, place, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
     table = _table(colours, counts)
-    index = _nearest(_channels(colours), table)[place].astype(np.uint8).reshape(packed.shape)
-    height, width = index.shape
+    index = _nearest(_channels(colours), table)[place].astype(np.uint8).reshape(height, width)
     made = QImage(index.tobytes(), width, height, width, QImage.Format.Format_Indexed8)
     made.setColorTable([0xFF000000 | (r << 16) | (g << 8) | b for b, g, r in table.astype(int).tolist()])
     if not made.save(str(path), quality=0):
