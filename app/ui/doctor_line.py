@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.ui.start_parts import LinkButton
 from app.ui.theme import Theme
-from app.ui.widgets import Button, Elided, Line
+from app.ui.widgets import Elided, Line
 
 COMMAND = "help.doctor"
 
@@ -20,12 +21,12 @@ class DoctorLine(QWidget):
         super().__init__()
         words = Elided("small", "textSecondary")
         words.setText("Expected to see something?")
-        self.button = Button(theme, "Open the connection doctor", kind="ghost", size="small")
-        self.button.let_shrink()
+        self.button = LinkButton(theme, "Open the connection doctor")
+        self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.button.clicked.connect(lambda: run(COMMAND))
         row = QHBoxLayout()
         row.setContentsMargins(12, 3, 12, 3)
-        row.setSpacing(2)
+        row.setSpacing(6)
         row.addStretch(1)
         row.addWidget(words)
         row.addWidget(self.button)
