@@ -181,23 +181,29 @@ class Subscriber:
 
         Raises `ClosedError`.
         """
-        try:
-            return self._ready.popleft()  # read already
-        except IndexError:
-            pass
-        if timeout_s == 0.0 or self._inlet.is_closed:
+        if self._ready:  # read already
+            try:
+                return self._ready.popleft()
+            except IndexError:  # another thread took it
+                pass
+        if self._inlet.is_closed or (timeout_s is not None and timeout_s <= 0.0):
             return self._poll()
+        wait_s = SLICE_S if timeout_s is None or timeout_s > SLICE_S else timeout_s
+        message = self._inlet.receive(wait_s)
+        return message or self._receive_on(None if timeout_s is None else timeout_s - wait_s)
+
+    def _receive_on(self, timeout_s: float | None) -> Message | None:
+        """After the first slice."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        left = SLICE_S if timeout_s is None else min(SLICE_S, timeout_s)
-        while left > 0.0:
+        while True:
+            if self._inlet.is_closed:
+                raise ClosedError(f"subscriber '{self.topic}'")
+            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+            if left <= 0.0:
+                return None
             message = self._inlet.receive(left)
             if message is not None:
                 return message
-            if self._inlet.is_closed:
-                raise ClosedError(f"subscriber '{self.topic}'")
-            if deadline is not None:
-                left = min(SLICE_S, deadline - time.monotonic())
-        return None
 
     def _poll(self) -> Message | None:
         if self._inlet.is_closed:

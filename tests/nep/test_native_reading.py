@@ -200,3 +200,15 @@ def test_a_publisher_of_large_messages_listens_on_another_port_as_well(node: nep
         assert letters[-1] == ord("y")
     assert pub.subscribers == 2
     assert first.lost == second.lost == 0  # nobody left the first port for it
+
+
+def test_a_stream_of_large_messages_goes_on_and_on(node: nep.Node, master: Master) -> None:
+    """More than the first high-water mark, over several renewals: nothing that happens then may stop it."""
+    with nep.node("other", master=master.address) as other:
+        pub, sub = node.new_pub("on", "bytes"), other.new_sub("on", "bytes")
+        data = os.urandom(20_000)
+        started = monotonic()
+        while pub.count < 8000 or monotonic() - started < 2.5:
+            pub.publish(data)
+            assert sub.receive(2.0) is not None, f"message {pub.count} did not come"
+        assert sub.lost == 0

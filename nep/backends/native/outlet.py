@@ -48,8 +48,6 @@ _LOOK_NS = 500_000
 """Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
 after it, because sending may have swallowed the descriptor's signal."""
 _SERVE_S = 0.02
-_CALM_S = 0.5
-"""Nobody has come or gone for so long."""
 _BYE_AGAIN_S = 0.05
 
 
@@ -81,7 +79,6 @@ class NativeOutlet:
         self._waited: set[int] = set()
         self._latched: tuple[Part, ...] | None = None
         self._looked_ns = 0
-        self._changed_at = 0.0
         self._io_comes = False
         self._served = 0
         self._id = spec.id
@@ -131,15 +128,15 @@ class NativeOutlet:
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Be reached at these addresses of this computer from now on; the endpoints. See `Places.move`."""
         with self._lock:
-            if self.wants_ports and not self._socket.closed:
-                self._mark.lower()
+            if self._mark.is_lowered:
+                self._mark.is_lowered = False
                 self._places.move_on()
             return () if self._socket.closed else self._places.move(hosts)
 
     @property
     def wants_ports(self) -> bool:
         """Whether to `move`, though to the same addresses: see `SendMark`."""
-        return self._mark.is_to_lower and time.monotonic() - self._changed_at > _CALM_S
+        return self._mark.is_lowered
 
     # ---- sending
 
@@ -227,7 +224,6 @@ class NativeOutlet:
             else:
                 self._seen.pop(hello[0], None)
                 self.subscribers = len(self._seen)
-            self._changed_at = time.monotonic()
             self._changed.notify_all()
 
     def _refuse(self, event: bytes) -> None:

@@ -46,11 +46,13 @@ _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)
 class SendMark:
     """Keeps what is queued for each subscriber within bytes, though libzmq counts messages only.
 
-    The high-water mark is chosen at the first message, for streams of messages like it: 256 MB, with room for
-    four times its size. A connection has the mark of when the socket was bound. Setting another on a socket
-    that has connections ends the program when one of them is just closing (libzmq 4.3.5 tells the mark to the
-    other end, which may be gone). So it is done once, in a calm moment, and only when the first mark would
-    allow four times as much; for whoever comes later ports have to be bound anew.
+    The high-water mark is chosen once, at the first message, for streams of messages like it: 256 MB, with
+    room for four times its size. It cannot be lowered later: libzmq tells the sender of what was read in
+    portions of half a mark, and a sender whose new mark is below what is still untold waits for ever. And
+    libzmq 4.3.5 ends the program when the mark is set while one of the socket's connections is just closing,
+    because it tells the other end, which may be gone. So it is set once, and only when the first one would
+    allow four times as much. A connection has the mark of when its port was bound: for whoever comes later,
+    ports have to be bound anew.
     """
 
     def __init__(self, owner: Socket, codec: str) -> None:
@@ -58,21 +60,17 @@ class SendMark:
         self._mark = 2 * _LEAST if codec == "image" else _MOST
         self.is_set = False
         """Whether the mark was chosen."""
-        self.is_to_lower = False
-        """Whether it is too high."""
+        self.is_lowered = False
+        """Whether ports that were bound before have a higher one."""
         owner.setsockopt(zmq.SNDHWM, self._mark)
 
     def sending(self, size_bytes: int) -> None:
         """The first message has this size and is about to be sent."""
         self.is_set = True
         mark = max(_LEAST, _QUEUE_BYTES // (4 * size_bytes + 1))
-        self.is_to_lower = 4 * mark < self._mark
-        self._mark = min(mark, self._mark)
-
-    def lower(self) -> None:
-        """Lower it, for all connections and for ports that are bound after this."""
-        self.is_to_lower = False
-        self._owner.setsockopt(zmq.SNDHWM, self._mark)
+        if 4 * mark < self._mark:
+            self._owner.setsockopt(zmq.SNDHWM, mark)
+            self.is_lowered = True
 
 
 def receive_mark(codec: str) -> int:
