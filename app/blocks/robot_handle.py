@@ -134,7 +134,7 @@ class RobotHandle:
     def _await(self, robot: Robot, action: Action, call: Call, words: str) -> None:
         scheduler = self._runtime.scheduler
         if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
-            raise BehaviourError(f"{self._name} does not answer. Check that it is on and in the same Wi-Fi.")
+            raise BehaviourError(f"{self._name} does not answer. {_check(robot)}")
         can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or LONGEST_S
         until = time.monotonic() + limit + MARGIN_S
@@ -166,7 +166,7 @@ class RobotHandle:
         silence = time.monotonic() - call.heard_s
         if silence <= max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s):
             return None
-        return f"{self._name} has stopped answering. Check that it is on and in the same Wi-Fi."
+        return f"{self._name} has stopped answering. {_check(robot)}"
 
     def _hold(self, call: Call) -> None:
         """The pause takes the command back; a robot that does not end it is no longer under control."""
@@ -222,3 +222,10 @@ def _as_kind(parameter: Parameter, value: object) -> object:
 
 def _ended(words: str) -> str:
     return words if words.endswith((".", "!", "?", "”")) else f"{words}."
+
+
+def _check(robot: Robot) -> str:
+    """What a person does about a robot that is silent."""
+    if robot.virtual:
+        return "Start the virtual robot again."
+    return "Check that it is on and in the same Wi-Fi."

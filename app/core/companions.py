@@ -54,6 +54,8 @@ class Companions:
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+        self.ended: frozenset[str] = frozenset()
+        """The virtual robots started here whose processes have ended by themselves."""
         self._master = MasterStart(
             address,
             lambda why: post_event(CompanionFailed("master", "The master can't be started.", why, False)),
@@ -116,6 +118,7 @@ class Companions:
                 )
                 return
             self._robots[name] = (process, log)
+            self.ended -= {name}
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
         """Start it anew; a process of it that still lives but hangs is killed."""
@@ -141,6 +144,7 @@ class Companions:
             ended = [name for name, (process, _) in self._robots.items() if process.poll() is not None]
             for name in ended:
                 _, log = self._robots.pop(name)
+                self.ended |= {name}
                 self._post_event(CompanionFailed(name, f"The virtual robot {name} has ended.", _tail(log)))
                 log.close()
 

@@ -16,6 +16,9 @@ SILENT_S = 3.0
 CURE_S = 1.0
 ASK_DOCTOR = "Open the connection doctor"
 
+REAL = "Check that it is on and in the same Wi-Fi."
+VIRTUAL = "Start the virtual robot again."
+
 
 @dataclass(slots=True)
 class _Bad:
@@ -76,7 +79,7 @@ class Health:
                 f"robot:{link.name}",
                 "error",
                 f"{link.name} does not answer.",
-                "The behaviour uses it. Check that it is on and in the same Wi-Fi.",
+                f"The behaviour uses it. {VIRTUAL if link.virtual else REAL}",
                 button="Stop",
                 action="run.stop",
                 count=0,

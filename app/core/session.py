@@ -153,6 +153,8 @@ class Session:
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
             self._health.check(self.runs.kept if self.runs.active else ())
+            if self.runs.kept and self.companions.ended >= self.runs.kept:
+                self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
             self._health.journal(self.documents.journal_error)
             if self.master.kind == "none" and self._start_companions:
                 self.companions.keep_master()

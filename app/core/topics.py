@@ -80,16 +80,17 @@ class Topics:
         self._seen = (-1, -1)
         self._view: GraphView | None = None
         self._aged = 0
+        self._past: set[str] = set()  # vanished long ago, but somebody still looks at them
         self.revision = 0
         self.values_revision = 0
 
     def __iter__(self) -> Iterator[Topic]:
         """Every topic, the vanished ones too for ten seconds."""
-        return iter(self._topics.values())
+        return (topic for topic in self._topics.values() if topic.name not in self._past)
 
     def __len__(self) -> int:
         """How many `__iter__` gives."""
-        return len(self._topics)
+        return len(self._topics) - len(self._past)
 
     def __getitem__(self, name: str) -> Topic:
         """The topic of that name; KeyError when there is none."""
@@ -169,11 +170,20 @@ class Topics:
         for topic in some:
             if topic.gone_since is not None:
                 topic.gone_s = now - topic.gone_since
-                if topic.gone_s >= GONE_SHOWN_S and not topic.watched:
-                    del self._topics[topic.name]
-                    self.revision += 1
+                if topic.gone_s >= GONE_SHOWN_S:
+                    self._leave(topic)
             else:
                 topic.age_s = _age(topic, now, now_ns)
+
+    def _leave(self, topic: Topic) -> None:
+        """It vanished ten seconds ago; one that somebody still looks at only leaves the lists."""
+        listed = topic.name not in self._past
+        if topic.watched:
+            self._past.add(topic.name)
+        else:
+            self._past.discard(topic.name)
+            del self._topics[topic.name]
+        self.revision += listed
 
     def add(self, name: str, batch: Batch, now: float) -> None:
         """Take over what arrived on a watched topic."""
@@ -227,6 +237,7 @@ class Topics:
         topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
         topic.publisher_nodes = _names(info, view)
         topic.gone_since = topic.gone_s = None
+        self._past.discard(topic.name)
         _take_figures(topic, info)
         if topic.facts() != before:
             self.revision += 1

@@ -93,7 +93,7 @@ def test_a_robot_that_does_not_answer_is_named(monkeypatch):
     run = play(workspace(started(say("Hi") | {"id": "x"})), link)
     assert run.runtime.error is not None
     assert run.runtime.error.block == "x"
-    assert run.runtime.error.sentence == "Pepper does not answer. Check that it is on and in the same Wi-Fi."
+    assert run.runtime.error.sentence == "Pepper does not answer. Start the virtual robot again."
 
 
 def test_an_action_that_never_ends_is_canceled(monkeypatch):

@@ -97,9 +97,7 @@ def runs(session: Session) -> None:
 
 def says_so_at_the_block(session: Session) -> None:
     tick_until(session, lambda: session.runs.block_errors, SAID_S)
-    assert session.runs.block_errors == {
-        "x": "Turtle has stopped answering. Check that it is on and in the same Wi-Fi."
-    }
+    assert session.runs.block_errors == {"x": "Turtle has stopped answering. Start the virtual robot again."}
 
 
 def well_again(session: Session) -> None:

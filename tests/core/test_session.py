@@ -217,6 +217,21 @@ def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
     assert session.runs.view().state == "proven"
 
 
+def test_a_virtual_robot_whose_process_is_gone_needs_no_hand_to_switch_it_off(session: Session) -> None:
+    session.companions.start_virtual_robot("Pepper")
+    tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots, 20)
+    session.document.example(EXAMPLES / "1-greeting.nepb")
+    session.runs.run()
+    tick_until(session, lambda: session.runs.running_blocks)
+    session.companions._robots["Pepper"][0].kill()
+    tick_until(session, lambda: not session.runs.active, 20)
+    tick_until(session, lambda: session.runs.view().can_run, 20)
+    assert not session.alerts.has("stop")
+    assert session.alerts.has("companion:Pepper")
+    session.companions.start_virtual_robot("Pepper")
+    assert session.companions.ended == frozenset()
+
+
 def test_a_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:
     block = {"type": "control_wait", "id": "w", "inputs": {}}
     started = {"type": "events_started", "id": "s", "next": {"block": block}}

@@ -65,6 +65,25 @@ def test_a_vanished_topic_stays_ten_seconds_and_its_figures_are_unknown() -> Non
     assert len(topics) == 0
 
 
+def test_a_vanished_topic_that_is_watched_leaves_the_lists_too_and_comes_back() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    topics["/a"].watched = True
+    topics.update(view(), 5)
+    topics.age(5 + GONE_SHOWN_S, 0)
+    before = topics.revision
+    topics.age(6 + GONE_SHOWN_S, 0)
+    assert (len(topics), list(topics), topics.revision) == (0, [], before)
+    assert topics.get("/a") is not None, "whoever looks at it keeps it"
+    topics.update(view(info("/a")), 30)
+    assert [topic.name for topic in topics] == ["/a"]
+    topics.update(view(), 40)
+    topics.age(40 + GONE_SHOWN_S, 0)
+    topics.unwatch("/a")
+    topics.age(41 + GONE_SHOWN_S, 0)
+    assert (len(topics), topics.get("/a")) == (0, None)
+
+
 def test_looking_at_a_topic_does_not_keep_it() -> None:
     topics = Topics(own=("here", 77))
     looking = NodeInfo("n2", "studio", "here", 77, "python", "native", 0)
