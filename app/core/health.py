@@ -14,6 +14,8 @@ from nep.views import GraphView
 
 SILENT_S = 3.0
 CURE_S = 1.0
+AWAY_S = 5.0
+"""A driver that is started again is back by then."""
 ASK_DOCTOR = "Open the connection doctor"
 
 REAL = "Check that it is on and in the same Wi-Fi."
@@ -38,6 +40,7 @@ class Health:
         self._topics, self._fleet, self._alerts, self._clock = topics, fleet, alerts, clock
         self._from_graph: set[str] = set()
         self._bad: dict[str, _Bad] = {}
+        self._away: dict[str, float] = {}
 
     def look(self, found: Mapping[str, Checked]) -> None:
         """Tell which topics send what can't be read: one alert each, with the exact count.
@@ -62,28 +65,32 @@ class Health:
         self._bad.pop(topic, None)
         self._alerts.cure(f"message:{topic}")
 
-    def check(self, used: Container[str] = ()) -> None:
+    def check(self, used: Container[str] = (), started: Container[str] = ()) -> None:
         """Once a second: which topics are well again, which robots' pictures have stopped, who has gone.
 
-        ``used`` are the names of the robots that a program uses.
+        ``used`` are the names of the robots that a program uses, ``started`` those of the virtual robots
+        whose processes were started here and still run.
         """
         now = self._clock()
         for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= CURE_S]:
             self.forget(topic)
         for link in self._fleet.links:
             self._check_camera(link)
-            if link.connected or link.name not in used:
+            if link.connected:
+                self._away.pop(link.name, None)
                 self._alerts.cure(f"robot:{link.name}")
-                continue
-            self._alerts.put(
-                f"robot:{link.name}",
-                "error",
-                f"{link.name} does not answer.",
-                f"The behaviour uses it. {VIRTUAL if link.virtual else REAL}",
-                button="Stop",
-                action="run.stop",
-                count=0,
-            )
+            elif link.name in used:
+                self._alerts.put(
+                    f"robot:{link.name}",
+                    "error",
+                    f"{link.name} does not answer.",
+                    f"The behaviour uses it. {VIRTUAL if link.virtual else REAL}",
+                    button="Stop",
+                    action="run.stop",
+                    count=0,
+                )
+            else:
+                self._check_presence(link, now, runs_here=link.name in started)
 
     def journal(self, sentence: str | None) -> None:
         """Whether unsaved work is kept: the sentence that says why not, or None."""
@@ -131,6 +138,22 @@ class Health:
             button="Look at it",
             action=f"inspect:{topic}",
             count=checked.bad,
+        )
+
+    def _check_presence(self, link: RobotLink, now: float, *, runs_here: bool) -> None:
+        """Tell of a robot that was there and is no more: a real one, or a virtual one that hangs."""
+        since = self._away.setdefault(link.name, now)
+        if now - since < AWAY_S or (link.virtual and not runs_here):
+            self._alerts.cure(f"robot:{link.name}")
+            return
+        self._alerts.put(
+            f"robot:{link.name}",
+            "warn",
+            f"{link.name} does not answer." if link.virtual else f"{link.name} has gone.",
+            VIRTUAL if link.virtual else REAL,
+            button="Start it again" if link.virtual else ASK_DOCTOR,
+            action=f"connect:{link.name}" if link.virtual else "help.doctor",
+            count=0,
         )
 
     def _check_camera(self, link: RobotLink) -> None:

@@ -152,7 +152,7 @@ class Session:
             self.companions.check()
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
-            self._health.check(self.runs.kept if self.runs.active else ())
+            self._health.check(self.runs.kept if self.runs.active else (), self.companions.virtual_robots)
             if self.runs.kept and self.companions.ended >= self.runs.kept:
                 self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
             self._health.journal(self.documents.journal_error)

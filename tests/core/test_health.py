@@ -10,7 +10,7 @@ import pytest
 from app.core.alerts import Alert, Alerts
 from app.core.checks import Checked
 from app.core.fleet import Fleet
-from app.core.health import CURE_S, Health
+from app.core.health import AWAY_S, CURE_S, Health
 from app.core.topics import Topics
 from nep import graph
 
@@ -21,7 +21,8 @@ class Case:
     def __init__(self) -> None:
         self.now = 50.0
         self.alerts = Alerts()
-        fleet = cast("Fleet", SimpleNamespace(links=[]))
+        self.links: list[SimpleNamespace] = []
+        fleet = cast("Fleet", SimpleNamespace(links=self.links))
         self.health = Health(Topics(), fleet, self.alerts, lambda: self.now)
 
     def look(self, bad: int, good: int = 0, *, unchecked: int = 0, last_good: bool = False) -> None:
@@ -102,3 +103,41 @@ def test_a_taken_port_leads_to_the_doctor_and_other_notes_of_the_master_do_not(c
     assert steps == {"port:7000": ("Open the connection doctor", "help.doctor"), "name:x": (None, None)}
     case.health.graph_alerts(graph.GraphView(1, 2))
     assert not case.alerts.active
+
+
+def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
+    shown = SimpleNamespace(sensors=())
+    return SimpleNamespace(name="Rover", virtual=virtual, connected=connected, silent=None, robot=shown)
+
+
+def test_a_real_robot_that_has_gone_is_told_after_a_while_and_cured_when_it_is_back(case: Case) -> None:
+    case.links.append(robot(virtual=False))
+    case.health.check()
+    assert case.alert() is None, "its driver may be starting again"
+    case.now += AWAY_S
+    case.health.check()
+    alert = case.alert()
+    assert alert is not None
+    assert (alert.id, alert.title, alert.action) == ("robot:Rover", "Rover has gone.", "help.doctor")
+    case.health.check(used={"Rover"})
+    used = case.alert()
+    assert used is not None
+    assert (used.severity, used.action) == ("error", "run.stop")
+    case.links[0].connected = True
+    case.health.check()
+    assert case.alert() is None
+    case.links[0].connected = False
+    case.health.check()
+    assert case.alert() is None, "the time begins anew"
+
+
+def test_a_virtual_robot_is_told_of_only_while_its_process_runs_here(case: Case) -> None:
+    case.links.append(robot(virtual=True))
+    case.health.check()
+    case.now += AWAY_S
+    case.health.check()
+    assert case.alert() is None, "it was ended, or belongs to somebody else"
+    case.health.check(started={"Rover"})
+    alert = case.alert()
+    assert alert is not None
+    assert (alert.title, alert.action) == ("Rover does not answer.", "connect:Rover")
