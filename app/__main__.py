@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import importlib
 import runpy
 import sys
 from collections.abc import Sequence
@@ -65,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return run_behaviour(given[1:])
     options = window_parser().parse_intermixed_args(given)
     gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.garbage`)
+    # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
+    importlib.import_module("app.core.session")
     from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
     return run(

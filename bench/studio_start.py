@@ -46,7 +46,8 @@ app.exec()
 STUDIO = """
 import gc, json, sys, time
 at = {"python": time.time()}
-gc.disable()  # as `app.__main__` does
+gc.disable()  # this and the next line as `app.__main__` does
+import app.core.session
 from app.ui import application as module
 from PySide6.QtCore import QEvent, QObject, QTimer
 at["imports"] = time.time()
@@ -80,13 +81,15 @@ def look():
         at["editor"] = time.time()
     if "master" in at and "usable" in at and ("editor" in at or sys.argv[1] != "editor"):
         print(json.dumps(at), flush=True)
+        looking.stop()
         window.close()
-        app.quit()
 looking = QTimer()
 looking.timeout.connect(look)
 looking.start(10)
+window.on_shut = lambda: QTimer.singleShot(0, app.quit)
+soon = module.AfterFirstPaint(window, module.steps_after(window))
+soon.put_first([window.begin])
 window.show()
-window.begin()
 app.exec()
 """
 

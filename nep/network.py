@@ -5,11 +5,15 @@ from __future__ import annotations
 import ipaddress
 import socket
 from collections.abc import Sequence
-from typing import NamedTuple
-
-import psutil
+from typing import TYPE_CHECKING, NamedTuple
 
 from nep.addresses import host_of, is_loopback
+from nep.later import later
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
 
 __all__ = ["ANY", "OwnAddress", "has_address", "nearest", "own_addresses"]
 

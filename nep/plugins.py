@@ -6,10 +6,15 @@ import importlib
 import logging
 import pkgutil
 from collections.abc import Mapping
-from importlib.metadata import entry_points
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from nep.errors import PluginsMissingError
+from nep.later import later
+
+if TYPE_CHECKING:
+    from importlib import metadata
+else:
+    metadata = later("importlib.metadata")
 
 __all__ = ["Named", "discover", "discover_own"]
 
@@ -51,7 +56,7 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
     that forgot it), `TypeError` when a module binds something else.
     """
     found = dict(discover_own(package, attribute, kind))
-    for point in entry_points(group=package):
+    for point in metadata.entry_points(group=package):
         try:
             bound = point.load()
         except Exception:

@@ -7,15 +7,21 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import psutil
 import zmq
 
 from nep.addresses import endpoint_of, master_address
 from nep.bodies import decode_answer, encode_request
 from nep.errors import MasterUnreachable, RequestRefusedError, WireError
+from nep.later import later
 from nep.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
 from nep.views import GraphView
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
 
 __all__ = ["Owner", "is_running", "listen", "look", "start_process"]
 

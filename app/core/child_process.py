@@ -10,10 +10,15 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-
-import psutil
+from typing import TYPE_CHECKING
 
 from app.errors import RunnerError
+from nep.later import later
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
 
 MOST_BYTES = 1_000_000_000
 """How much memory a program may use, together with what it starts."""

@@ -6,8 +6,14 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from nep.doctor import Finding, findings, gather
+from nep.later import later
+
+if TYPE_CHECKING:
+    from nep import doctor
+else:
+    doctor = later("nep.doctor")
 
 JOIN_S = 4.0
 
@@ -15,11 +21,13 @@ JOIN_S = 4.0
 class Doctor:
     """Looks when it is asked. One thread uses it (the window's); the looking happens in another."""
 
-    def __init__(self, look: Callable[[], Sequence[Finding]], clock: Callable[[], float] = time.time) -> None:
+    def __init__(
+        self, look: Callable[[], Sequence[doctor.Finding]], clock: Callable[[], float] = time.time
+    ) -> None:
         """``look`` may take some seconds; ``clock`` gives epoch seconds."""
         self._look, self._clock = look, clock
         self._thread: threading.Thread | None = None
-        self._found: tuple[Finding, ...] = ()
+        self._found: tuple[doctor.Finding, ...] = ()
         self._looked_s: float | None = None
         self.revision = 0
 
@@ -29,7 +37,7 @@ class Doctor:
         return self._thread is not None and self._thread.is_alive()
 
     @property
-    def findings(self) -> Sequence[Finding]:
+    def findings(self) -> Sequence[doctor.Finding]:
         """What was found last, the worst first."""
         return self._found
 
@@ -56,7 +64,7 @@ class Doctor:
             found = tuple(self._look())
         except Exception as error:  # noqa: BLE001  a doctor that breaks off must say so, not vanish
             words = f"The doctor could not finish: {type(error).__name__}: {error}."
-            found = (Finding("doctor", "error", words, "Tell the people who make NEP Studio."),)
+            found = (doctor.Finding("doctor", "error", words, "Tell the people who make NEP Studio."),)
         self._found, self._looked_s = found, self._clock()
         self.revision += 1
 
@@ -64,4 +72,4 @@ class Doctor:
 def doctor_of(address: str, folder: Path) -> Doctor:
     """A doctor for the master at this address, who also looks at Studio's own folder."""
     folders = [("Settings and unsaved work", folder)]
-    return Doctor(lambda: findings(gather(address, folders=folders)))
+    return Doctor(lambda: doctor.findings(doctor.gather(address, folders=folders)))

@@ -14,12 +14,17 @@ import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import psutil
+from typing import TYPE_CHECKING
 
 from app.core import deep_json
 from app.core.files import write_atomically
 from app.core.settings import home
+from nep.later import later
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,16 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from nep.doctor import hindrance
 from nep.errors import NepError
+from nep.later import later
 from nep.masters import is_running, start_process
+
+if TYPE_CHECKING:
+    from nep import doctor
+else:
+    doctor = later("nep.doctor")
 
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """After how long a master that could not be started is tried again: twice as long each time."""
@@ -69,7 +75,7 @@ class MasterStart:
         """Start it; "" when there is one now."""
         if is_running(self._address, timeout_s=0.5):
             return ""
-        hindered = hindrance(self._address)
+        hindered = doctor.hindrance(self._address)
         if hindered is not None:
             return f"{hindered.sentence} {hindered.mend}"
         try:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, Qt, QTimer
@@ -18,17 +20,16 @@ from app.core.journal import left_behind
 from app.core.session import Session
 from app.core.settings import home
 from app.ui import fonts, messages, single_window
-from app.ui.blockly_scheme import register_scheme
 from app.ui.commands import Commands
+from app.ui.first_paint import AfterFirstPaint
 from app.ui.incoming_files import IncomingFiles
 from app.ui.logo import LogoEngine
 from app.ui.main_window import MainWindow
-from app.ui.panels.base import Panel
+from app.ui.panel_shelf import PanelShelf
 from app.ui.self_drive import SelfDrive
 from app.ui.single_window import Asked
 from app.ui.start_page import read_examples
 from app.ui.theme import MODES, Theme
-from nep.plugins import discover
 
 LOG_EVERY_MS = 500
 
@@ -50,13 +51,12 @@ class Options:
 
 
 def make_application() -> QApplication:
-    """The one QApplication, with the editor's scheme, our name and our fonts."""
+    """The one QApplication, with our name and our fonts."""
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontShowIconsInMenus)
-    register_scheme()
     application = QApplication(sys.argv[:1])
     application.setApplicationName("nep-studio")
     application.setApplicationDisplayName("NEP Studio")
@@ -67,15 +67,16 @@ def make_application() -> QApplication:
     return application
 
 
-def find_panels() -> Mapping[str, Panel]:
-    """Every panel of Studio and of installed plug-ins, by name."""
-    return discover("app.ui.panels", "PANEL", Panel)
+def steps_after(window: MainWindow) -> list[Callable[[], object]]:
+    """What a person needs a moment later: the panels, and the editor, which has then only to be started."""
+    panels = window.panels.steps() if isinstance(window.panels, PanelShelf) else ()
+    return [*panels, partial(importlib.import_module, "app.ui.blockly_view")]
 
 
 def make_window(session: Session, options: Options) -> tuple[MainWindow, Commands]:
     """The window with its commands, as it was left; nothing runs yet."""
     theme = Theme("light")
-    window = MainWindow(session, theme, find_panels(), read_examples(resources.folder() / "examples"))
+    window = MainWindow(session, theme, PanelShelf(), read_examples(resources.folder() / "examples"))
     window.state.apply_theme(theme)
     chosen = next((mode for mode in MODES if mode == options.theme), None)
     if chosen is not None:
@@ -105,11 +106,16 @@ def run(options: Options) -> int:
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.take(session.console.add))
     hearing.start(LOG_EVERY_MS)
+    soon = AfterFirstPaint(window, steps_after(window))
     window.show()
-    window.begin()
-    commands.do_asked(Asked(options.files, options.demo))
+    first: list[Callable[[], object]] = [window.begin]
+    if options.files or options.demo or options.self_drive is not None:
+        window.begin()
+        commands.do_asked(Asked(options.files, options.demo))
+        first = []
     if not options.alone:
-        single_window.Meeting(meeting_place, commands.do_asked, window)
+        first.append(lambda: single_window.Meeting(meeting_place, commands.do_asked, window))
+    soon.put_first(first)
     incoming = IncomingFiles(window, commands.files.open_all)
     if sys.platform == "darwin":
         application.installEventFilter(incoming)  # the Finder tells the application, not its window

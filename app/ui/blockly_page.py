@@ -12,7 +12,7 @@ from PySide6.QtWebEngineWidgets import QWebEngineView
 from PySide6.QtWidgets import QWidget
 
 from app.ui.blockly_bridge import BlocklyBridge
-from app.ui.blockly_scheme import PAGE, SCHEME, Fence, SchemeHandler
+from app.ui.blockly_scheme import PAGE, SCHEME, Fence, SchemeHandler, register_scheme
 
 _log = logging.getLogger(__name__)
 _Attribute = QWebEngineSettings.WebAttribute
@@ -48,6 +48,7 @@ class BlocklyWeb:
     """A web view with its page, profile, channel and fence, all owned by one widget."""
 
     def __init__(self, bridge: BlocklyBridge, background: QColor, owner: QWidget) -> None:
+        register_scheme()
         self.view = QWebEngineView(owner)
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
         profile = QWebEngineProfile(None)

@@ -1,6 +1,7 @@
 """What the page of the block editor may read: ``app://blocks/…`` from the resources, and nothing else.
 
-`register_scheme` has to run before the QApplication is made; everything else may be imported later.
+`register_scheme` has to run before the first view or profile is made. Qt says "in general" before the
+QApplication; this module is not imported so early, because Qt WebEngine takes long to load.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ _WEIGHTS = {"Regular": 400, "Medium": 500, "SemiBold": 600, "Bold": 700}
 
 
 def register_scheme() -> None:
-    """Make ``app:`` a secure scheme of our own. Call before QApplication; calling it again does nothing."""
+    """Make ``app:`` a secure scheme of our own. Call before the first view; calling it again does nothing."""
     if QWebEngineUrlScheme.schemeByName(QByteArray(SCHEME)).name() == SCHEME:
         return
     scheme = QWebEngineUrlScheme(QByteArray(SCHEME))

@@ -11,9 +11,16 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
-from PySide6.QtNetwork import QLocalServer, QLocalSocket
+
+from nep.later import later
+
+if TYPE_CHECKING:
+    from PySide6 import QtNetwork
+else:
+    QtNetwork = later("PySide6.QtNetwork")
 
 CONNECT_MS = 300
 ANSWER_MS = 3000
@@ -41,7 +48,9 @@ def place(folder: Path) -> str:
 
 def hand_over(name: str, asked: Asked) -> bool:
     """Let the window that runs do it; False when none runs. Waits at most 3 s for its answer."""
-    socket = QLocalSocket()
+    if os.name == "posix" and Path(name).is_absolute() and not Path(name).exists():
+        return False  # without Qt's network, which takes its time to load
+    socket = QtNetwork.QLocalSocket()
     socket.connectToServer(name)
     if not socket.waitForConnected(CONNECT_MS):
         return False
@@ -62,23 +71,23 @@ class Meeting(QObject):
         """``do`` is called for each later start."""
         super().__init__(parent)
         self._do = do
-        self._heard: dict[QLocalSocket, bytes] = {}
-        self._server = QLocalServer(self)
-        self._server.setSocketOptions(QLocalServer.SocketOption.UserAccessOption)
+        self._heard: dict[QtNetwork.QLocalSocket, bytes] = {}
+        self._server = QtNetwork.QLocalServer(self)
+        self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
         self._server.newConnection.connect(self._come)
         self.open = self._listen(name)
         """Whether later starts can find it; without, each has a window of its own."""
 
     def _listen(self, name: str) -> bool:
         # On Unix a second listener takes the first one's place without a word: look first who is there.
-        probe = QLocalSocket()
+        probe = QtNetwork.QLocalSocket()
         probe.connectToServer(name)
         if probe.waitForConnected(CONNECT_MS):
             probe.disconnectFromServer()
             return False
         if self._server.listen(name):
             return True
-        QLocalServer.removeServer(name)  # what a Studio that was killed left behind
+        QtNetwork.QLocalServer.removeServer(name)  # what a Studio that was killed left behind
         return self._server.listen(name)
 
     def _come(self) -> None:
@@ -88,7 +97,7 @@ class Meeting(QObject):
             socket.disconnected.connect(lambda socket=socket: self._gone(socket))
             self._read(socket)
 
-    def _read(self, socket: QLocalSocket) -> None:
+    def _read(self, socket: QtNetwork.QLocalSocket) -> None:
         if socket not in self._heard:
             return
         self._heard[socket] += socket.readAll().data()
@@ -105,7 +114,7 @@ class Meeting(QObject):
             socket.flush()
             self._do(asked)
 
-    def _gone(self, socket: QLocalSocket) -> None:
+    def _gone(self, socket: QtNetwork.QLocalSocket) -> None:
         self._heard.pop(socket, None)
         socket.deleteLater()
 

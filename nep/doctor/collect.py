@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
 import platform
 import socket
@@ -11,8 +10,8 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import psutil
 import zmq
 
 import nep.errors
@@ -22,8 +21,16 @@ from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact
 from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
+from nep.later import later
 from nep.nodes import Node
 from nep.views import GraphView
+
+if TYPE_CHECKING:
+    from importlib import metadata
+
+    import psutil
+else:
+    metadata, psutil = later("importlib.metadata"), later("psutil")
 
 __all__ = ["PORTS", "gather", "hindrance", "loopback_problem"]
 
@@ -132,8 +139,8 @@ def loopback_problem() -> str:
 
 def _versions() -> dict[str, str]:
     try:
-        own = importlib.metadata.version("nep-studio")
-    except importlib.metadata.PackageNotFoundError:
+        own = metadata.version("nep-studio")
+    except metadata.PackageNotFoundError:
         own = "(not installed)"
     return {
         "NEP Studio": own,
@@ -145,7 +152,7 @@ def _versions() -> dict[str, str]:
 
 
 def _packages() -> Iterator[PackageFact]:
-    for found in importlib.metadata.distributions():
+    for found in metadata.distributions():
         name = found.metadata["Name"] or ""
         if name.lower().replace("_", "-") in {"nep", "nep-studio"}:
             yield PackageFact(name, found.version, str(found.locate_file("")))

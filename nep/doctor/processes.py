@@ -6,10 +6,15 @@ import itertools
 import socket
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
-
-import psutil
+from typing import TYPE_CHECKING
 
 from nep.doctor.facts import ProcessFact
+from nep.later import later
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
 
 __all__ = ["describe", "is_free", "is_master_command", "listening", "masters", "open_files"]
 

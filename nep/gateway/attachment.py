@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-
-import psutil
+from typing import TYPE_CHECKING
 
 from nep.errors import ClosedError, WaitTimeoutError
 from nep.gateway.desk import Ports
@@ -15,9 +14,15 @@ from nep.gateway.native import Native
 from nep.gateway.portmap import default_file
 from nep.gateway.processes import SystemProcesses
 from nep.graph import Alert, GraphView
+from nep.later import later
 from nep.masters import Master
 from nep.nodes import Node
 from nep.requests import Reply, ReportAlerts, Request
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
 
 _WANTED_FILES = 8192
 _WAIT_S = 3.0

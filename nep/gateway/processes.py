@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import PurePath
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-import psutil
-
+from nep.later import later
 from nep.load import CpuLoad
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
 
 
 class Processes(Protocol):

@@ -9,11 +9,12 @@ from pathlib import Path
 from textwrap import dedent
 
 import pytest
+from PySide6.QtWidgets import QMenu, QMenuBar
 
 from app.core.session import Session
-from app.ui.application import find_panels
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
+from app.ui.panel_shelf import PanelShelf
 from app.ui.theme import Theme
 from tests.ui.shell_parts import PANELS, Answers
 
@@ -61,14 +62,20 @@ def plug_in(tmp_path: Path) -> Iterator[None]:
         delattr(home, "counter")
 
 
+def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
+    """A menu of a bar or of a menu, by the words that a person reads."""
+    return next(menu for each in where.actions() if each.text() == name and (menu := each.menu()) is not None)
+
+
 def test_a_panel(qtbot, plug_in: None, theme: Theme, session: Session) -> None:
-    window = MainWindow(session, theme, {**PANELS, "counter": find_panels()["counter"]}, [])
+    window = MainWindow(session, theme, {**PANELS, "counter": PanelShelf()["counter"]}, [])
     qtbot.addWidget(window)
-    commands = Commands(window, Answers())
+    Commands(window, Answers())
     window.show_layout("developer")
     window.show()
-    commands._menus["View"].aboutToShow.emit()
-    entries = {action.text().replace("&", ""): action for action in commands._panels.actions()}
+    view = menu_named(window.bar.menus, "View")
+    view.aboutToShow.emit()
+    entries = {action.text().replace("&", ""): action for action in menu_named(view, "Panels").actions()}
     entries["Counter"].trigger()
     dock = window.bench.docks["counter"]
     assert dock is not None

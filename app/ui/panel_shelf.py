@@ -1,0 +1,34 @@
+"""Every panel of Studio and of installed plug-ins, by name: found when somebody asks for one."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
+
+from app.ui import panels
+from app.ui.panels.base import Panel
+from nep.plugins import discover
+
+
+class PanelShelf(Mapping[str, Panel]):
+    """The panels by name. The start page needs none of them, and they are many modules."""
+
+    @cached_property
+    def _found(self) -> Mapping[str, Panel]:
+        return discover(panels.__name__, "PANEL", Panel)
+
+    def steps(self) -> Sequence[Callable[[], object]]:
+        """What finds them, in steps of some milliseconds."""
+        names = [info.name for info in pkgutil.iter_modules(panels.__path__, f"{panels.__name__}.")]
+        return [*(partial(importlib.import_module, name) for name in names), lambda: self._found]
+
+    def __getitem__(self, name: str) -> Panel:
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)

@@ -1,0 +1,45 @@
+"""Modules that are imported when they are first used."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from nep.later import later
+
+
+def in_a_new_process(program: str) -> str:
+    """What a program prints: what was imported here before must not count."""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=50, check=True
+    )
+    return done.stdout.strip()
+
+
+def test_it_is_imported_when_something_of_it_is_used() -> None:
+    program = (
+        "import sys\n"
+        "from nep.later import later\n"
+        "colorsys = later('colorsys')\n"
+        "print('colorsys' in sys.modules, colorsys.rgb_to_hsv(0, 0, 0), 'colorsys' in sys.modules)\n"
+    )
+    assert in_a_new_process(program) == "False (0.0, 0.0, 0) True"
+
+
+def test_what_it_gives_is_that_of_the_module() -> None:
+    assert later("colorsys").__getattr__("rgb_to_hls") is sys.modules["colorsys"].rgb_to_hls
+
+
+def test_what_is_not_there_is_said_at_its_first_use() -> None:
+    absent = later("nep.no_such_module")
+    with pytest.raises(ModuleNotFoundError, match="no_such_module"):
+        absent.__getattr__("something")
+    with pytest.raises(AttributeError, match="nothing_of_this_name"):
+        later("colorsys").__getattr__("nothing_of_this_name")
+
+
+def test_nep_loads_without_what_it_seldom_needs() -> None:
+    program = "import sys, nep\nprint([n for n in ('psutil', 'importlib.metadata') if n in sys.modules])"
+    assert in_a_new_process(program) == "[]"
