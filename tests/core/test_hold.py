@@ -118,6 +118,7 @@ def test_a_step_does_the_rest_of_what_was_held(master, pepper, node) -> None:
         runner.step()
         pose.until(lambda: pose.far() > 0.39, 20)
         heard.until("paused")
+        threading.Event().wait(0.3)  # the pose is told eight times a second: the last one of the first block
         before = pose.far()
         threading.Event().wait(0.5)  # the second block must wait for its own step
         assert pose.far() == pytest.approx(before, abs=0.002)
