@@ -108,6 +108,7 @@ def run(options: Options) -> int:
     hearing.start(LOG_EVERY_MS)
     soon = AfterFirstPaint(window, steps_after(window))
     window.show()
+    window.activateWindow()  # keys go there at once, also where no window manager sees to it
     first: list[Callable[[], object]] = [window.begin]
     if options.files or options.demo or options.self_drive is not None:
         window.begin()
