@@ -31,6 +31,13 @@ def _listening() -> set[tuple[str, int]]:
     return {each.laddr for each in connections if each.status == psutil.CONN_LISTEN}
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of one file stay in one process; so do all that bind fixed ports, which exist once."""
+    for item in items:
+        group = "ports" if item.get_closest_marker("ports") is not None else str(item.path)
+        item.add_marker(pytest.mark.xdist_group(group))
+
+
 @pytest.fixture(autouse=True)
 def _nothing_is_left() -> Iterator[None]:
     """Fails a test that leaves a thread of ours, or a listening socket, behind."""

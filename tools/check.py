@@ -10,6 +10,7 @@ Everything runs, also after a failure; the exit code is 1 if anything failed.
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import sysconfig
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
+MOST_WORKERS = 4
 
 
 class Check(NamedTuple):
@@ -45,9 +47,18 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
         Check("ruff format", (python, "-m", "ruff", "format", "--check", ".")),
         Check("mypy", (python, "-m", "mypy")),
         Check("lint-imports", (lint_imports, "--no-logo", "--cache-dir", "build/import-linter")),
-        Check("pytest", (python, "-m", "pytest", *pytest_arguments)),
+        Check("pytest", (python, "-m", "pytest", *side_by_side(), *pytest_arguments)),
     )
     return found[:-1] if fast else found
+
+
+def side_by_side() -> tuple[str, ...]:
+    """Options of pytest-xdist: a process for each processor, four at most; tests/conftest.py groups tests.
+
+    Most tests wait for processes and windows, so one process would leave a computer idle half of the time.
+    """
+    workers = max(1, min(MOST_WORKERS, os.cpu_count() or 1))
+    return ("-n", str(workers), "--dist", "loadgroup")
 
 
 def run(check: Check) -> Outcome:

@@ -32,7 +32,7 @@ def scene():
     known, processes = PortMap(None), FakeProcesses()
     known.give(LINE, 9000)
     pair = SimpleNamespace(
-        ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0
+        ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0, unserved={}
     )
     census = Census(known, processes, lambda line: pair if line == LINE else None)
     return SimpleNamespace(known=known, processes=processes, pair=pair, census=census)
@@ -144,3 +144,18 @@ def test_the_broadcast_is_told_who_asked_for_what(scene):
         7,
     )
     assert scene.census.languages() == {LINE: frozenset({"python"})}
+
+
+def test_a_version_that_cannot_be_served_is_shown_when_one_program_alone_can_be_meant(scene):
+    register(scene)
+    scene.pair.connections["subscriber"] = 1
+    scene.processes.joined = {(7, 9001)}
+    scene.pair.unserved["subscriber"] = "0.5.4.6"
+    scene.census.look()
+    (program,) = scene.census.programs()
+    assert program.generation == "0.5.4.6"
+    assert scene.census.names(LINE, "subscriber") == (program.name,)
+    register(scene, pid=8, node="m")
+    scene.processes.joined.add((8, 9001))
+    scene.census.look()
+    assert {program.generation for program in scene.census.programs()} == {"A"}
