@@ -3,7 +3,8 @@
     python bench/studio_start.py [--times 7] [--imports]
 
 Each start is a process of its own, on a home of its own, and its times are counted from the moment the
-process was asked for. "window" is the first paint of the window, "usable" the first turn of its event loop
+process was asked for; "own work" is the processor time of the process itself, which other programs stretch
+less. "window" is the first paint of the window, "usable" the first turn of its event loop
 after it (a click is answered from then on), "master" the first answer of a master that Studio started itself,
 "editor" the block editor's page, up with its blocks. "plain" is a Qt window with one label, and "plain again"
 tells how far to trust the rest. --imports lists what takes longest to import.
@@ -26,6 +27,7 @@ import psutil
 
 ROOT = Path(__file__).resolve().parents[1]
 USABLE_S, EDITOR_S, TRUSTED = 0.8, 1.5, 0.1
+Stages = dict[str, tuple[float, float]]
 STAGES = ("python", "imports", "application", "session", "built", "window", "usable", "master", "editor")
 
 PLAIN = """
@@ -35,7 +37,10 @@ from PySide6.QtWidgets import QApplication, QLabel
 class Label(QLabel):
     def paintEvent(self, event):
         super().paintEvent(event)
-        QTimer.singleShot(0, lambda: (print(json.dumps({"usable": time.time()}), flush=True), app.quit()))
+        QTimer.singleShot(0, tell)
+def tell():
+    print(json.dumps({"usable": (time.time(), time.process_time())}), flush=True)
+    app.quit()
 app = QApplication([])
 label = Label("Studio")
 label.resize(1440, 900)
@@ -45,40 +50,42 @@ app.exec()
 
 STUDIO = """
 import gc, json, sys, time
-at = {"python": time.time()}
+def now():
+    return time.time(), time.process_time()
+at = {"python": now()}
 gc.disable()  # this and the next line as `app.__main__` does
 import app.core.session
 from app.ui import application as module
 from PySide6.QtCore import QEvent, QObject, QTimer
-at["imports"] = time.time()
+at["imports"] = now()
 module.messages.listen()
 app = module.make_application()
-at["application"] = time.time()
+at["application"] = now()
 session = module.Session()
-at["session"] = time.time()
+at["session"] = now()
 window, commands = module.make_window(session, module.Options(new_window=True))
-at["built"] = time.time()
+at["built"] = now()
 class Eyes(QObject):
     def eventFilter(self, watched, event):
         if event.type() == QEvent.Type.Paint and "window" not in at and watched is window:
-            at["window"] = time.time()
+            at["window"] = now()
             QTimer.singleShot(0, usable)
         return False
 eyes = Eyes()
 window.installEventFilter(eyes)
 def usable():
-    at["usable"] = time.time()
+    at["usable"] = now()
     window.removeEventFilter(eyes)
     if sys.argv[1] == "editor":
         commands.run("layout.behaviour")
 def look():
     if "master" not in at and session.master.kind == "connected":
-        at["master"] = time.time()
+        at["master"] = now()
     bench = window.benches.get("behaviour")
     panel = bench.docks["behaviour"].panel if bench is not None else None
     editor = getattr(panel, "editor", None)
     if editor is not None and "editor" not in at and editor.is_ready:
-        at["editor"] = time.time()
+        at["editor"] = now()
     if "master" in at and "usable" in at and ("editor" in at or sys.argv[1] != "editor"):
         print(json.dumps(at), flush=True)
         looking.stop()
@@ -103,8 +110,8 @@ def environ_with(compiled: str) -> dict[str, str]:
     return environ
 
 
-def once(compiled: str, program: str, *arguments: str) -> dict[str, float]:
-    """One start; the stages in seconds after the process was asked for."""
+def once(compiled: str, program: str, *arguments: str) -> Stages:
+    """One start: for each stage the seconds after the process was asked for, and those it worked itself."""
     with socket.socket() as probe, tempfile.TemporaryDirectory(prefix="nep-start-") as home:
         probe.bind(("127.0.0.1", 0))
         environ = {
@@ -127,12 +134,19 @@ def once(compiled: str, program: str, *arguments: str) -> dict[str, float]:
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if not lines:
         raise SystemExit(f"a start failed:\n{done.stderr[-2000:]}")
-    return {stage: moment - began for stage, moment in json.loads(lines[-1]).items()}
+    return {stage: (moment - began, work) for stage, (moment, work) in json.loads(lines[-1]).items()}
 
 
-def medians(starts: list[dict[str, float]]) -> dict[str, float]:
-    """The median of each stage."""
-    return {stage: statistics.median(each[stage] for each in starts) for stage in starts[0]}
+def medians(starts: list[Stages], which: int) -> dict[str, float]:
+    """The median of each stage: of the seconds that passed (0), or of those of work (1)."""
+    return {stage: statistics.median(each[stage][which] for each in starts) for stage in starts[0]}
+
+
+def table(title: str, rows: dict[str, dict[str, float]]) -> None:
+    """Print the stages of each kind of start."""
+    print(f"{title:>18} " + " ".join(f"{stage:>11}" for stage in STAGES))
+    for name, row in rows.items():
+        print(f"{name:>18} " + " ".join(f"{row[s]:>11.2f}" if s in row else f"{'':>11}" for s in STAGES))
 
 
 def imports() -> None:
@@ -162,17 +176,16 @@ def main() -> int:
     if arguments.imports:
         imports()
         return 0
-    taken: dict[str, list[dict[str, float]]] = {"plain": [], "plain again": [], "window": [], "editor": []}
+    taken: dict[str, list[Stages]] = {name: [] for name in ("plain", "plain again", "window", "editor")}
     with tempfile.TemporaryDirectory(prefix="nep-pyc-") as compiled:
         once(compiled, STUDIO, "editor")  # the first start compiles, and reads everything from the disk
         for _ in range(arguments.times):
             for name, starts in taken.items():
                 plain = name.startswith("plain")
                 starts.append(once(compiled, PLAIN) if plain else once(compiled, STUDIO, name))
-    found = {name: medians(starts) for name, starts in taken.items()}
-    print(f"{'s after the start':>18} " + " ".join(f"{stage:>11}" for stage in STAGES))
-    for name, row in found.items():
-        print(f"{name:>18} " + " ".join(f"{row[s]:>11.2f}" if s in row else f"{'':>11}" for s in STAGES))
+    found = {name: medians(starts, 0) for name, starts in taken.items()}
+    table("s after the start", found)
+    table("of these, own work", {name: medians(starts, 1) for name, starts in taken.items()})
     usable, editor = found["window"]["usable"], found["editor"]["editor"]
     again = found["plain again"]["usable"] / found["plain"]["usable"]
     counts = abs(again - 1.0) <= TRUSTED

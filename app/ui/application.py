@@ -32,6 +32,8 @@ from app.ui.start_page import read_examples
 from app.ui.theme import MODES, Theme
 
 LOG_EVERY_MS = 500
+SOON = ("app.ui.palette", "app.ui.blockly_view", "app.ui.settings_sheet", "app.ui.shortcut_sheet")
+"""Imported after the first paint, though nobody has asked for them yet."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def make_application() -> QApplication:
 def steps_after(window: MainWindow) -> list[Callable[[], object]]:
     """What a person needs a moment later: the panels, and the editor, which has then only to be started."""
     panels = window.panels.steps() if isinstance(window.panels, PanelShelf) else ()
-    return [*panels, partial(importlib.import_module, "app.ui.blockly_view")]
+    return [*panels, *(partial(importlib.import_module, name) for name in SOON)]
 
 
 def make_window(session: Session, options: Options) -> tuple[MainWindow, Commands]:

@@ -57,6 +57,7 @@ class DockTitle(QWidget):
     def __init__(self, theme: Theme, panel: PanelWidget, density: Density) -> None:
         super().__init__()
         self._theme, self._panel, self._density = theme, panel, density
+        self._least = theme.size("panelTitle", density)  # asked thousands of times while panels are arranged
         self._whole = panel.replaces_title()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name = Elided("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
@@ -91,8 +92,7 @@ class DockTitle(QWidget):
         self._row.addWidget(self.more)
 
     def sizeHint(self) -> QSize:
-        least = self._theme.size("panelTitle", self._density)
-        return QSize(120, max(least, self._row.sizeHint().height()))
+        return QSize(120, max(self._least, self._row.sizeHint().height()))
 
     def minimumSizeHint(self) -> QSize:
         return QSize(80, self.sizeHint().height())

@@ -6,7 +6,7 @@ Everything that opens over the window is made when it is first asked for, so tha
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from app.core.settings import RecentFile
 from app.errors import SettingsError
@@ -14,16 +14,19 @@ from app.ui.actions import Actions, Handler
 from app.ui.files import Files
 from app.ui.main_window import MainWindow
 from app.ui.menu_lists import MenuLists
-from app.ui.name_sheet import NameSheet
-from app.ui.palette import Palette
 from app.ui.palette_entries import Offers
 from app.ui.palette_match import Entry
-from app.ui.settings_sheet import SettingsSheet
-from app.ui.shortcut_sheet import ShortcutSheet
 from app.ui.shortcuts import Shortcuts
 from app.ui.theme import Mode
 from app.ui.theme_system import Wish
 from app.ui.widgets.menus import Menu
+from nep.later import later
+
+if TYPE_CHECKING:
+    from app.ui import name_sheet, palette, settings_sheet, shortcut_sheet
+else:
+    palette, name_sheet = later("app.ui.palette"), later("app.ui.name_sheet")
+    settings_sheet, shortcut_sheet = later("app.ui.settings_sheet"), later("app.ui.shortcut_sheet")
 
 TEXT_STEP = 25
 PANEL_KEYS = range(1, 10)
@@ -45,10 +48,10 @@ class Habits:
         self._window, self._files, self._session = window, files, window.session
         self.shortcuts = Shortcuts(window.session.settings, window.complain)
         self._offers = Offers(window, self.shortcuts)
-        self._palette: Palette | None = None
-        self._shortcut_sheet: ShortcutSheet | None = None
-        self._name_sheet: NameSheet | None = None
-        self._settings_sheet: SettingsSheet | None = None
+        self._palette: palette.Palette | None = None
+        self._shortcut_sheet: shortcut_sheet.ShortcutSheet | None = None
+        self._name_sheet: name_sheet.NameSheet | None = None
+        self._settings_sheet: settings_sheet.SettingsSheet | None = None
 
     def handlers(self) -> dict[str, Handler]:
         """What the commands of the table do."""
@@ -107,7 +110,7 @@ class Habits:
         """Open the command palette, or close it."""
         if self._palette is None:
             window = self._window
-            self._palette = Palette(window.theme, window, self._offers.all, self.do, self._rebind)
+            self._palette = palette.Palette(window.theme, window, self._offers.all, self.do, self._rebind)
             kept: list[object] = self._session.settings.get("palette_last", [])
             self._palette.last = [id for id in kept if isinstance(id, str)]
             self._palette.on_last = lambda ids: window.state.keep("palette_last", list(ids))
@@ -139,9 +142,11 @@ class Habits:
         """Open the table of shortcuts."""
         self._sheet_of_shortcuts().open()
 
-    def _sheet_of_shortcuts(self) -> ShortcutSheet:
+    def _sheet_of_shortcuts(self) -> shortcut_sheet.ShortcutSheet:
         if self._shortcut_sheet is None:
-            self._shortcut_sheet = ShortcutSheet(self._window.theme, self._window, self.shortcuts)
+            self._shortcut_sheet = shortcut_sheet.ShortcutSheet(
+                self._window.theme, self._window, self.shortcuts
+            )
         return self._shortcut_sheet
 
     def _rebind(self, command: str) -> None:
@@ -151,7 +156,9 @@ class Habits:
         """Open the settings."""
         if self._settings_sheet is None:
             window = self._window
-            self._settings_sheet = SettingsSheet(window.theme, window, window.state, self._session.settings)
+            self._settings_sheet = settings_sheet.SettingsSheet(
+                window.theme, window, window.state, self._session.settings
+            )
             self._settings_sheet.shortcuts.clicked.connect(self.open_shortcuts)
         self._settings_sheet.open()
 
@@ -178,9 +185,9 @@ class Habits:
         if self._window.bench is not None:
             self._window.bench.arrange()
 
-    def _ask_name(self) -> NameSheet:
+    def _ask_name(self) -> name_sheet.NameSheet:
         if self._name_sheet is None:
-            self._name_sheet = NameSheet(self._window.theme, self._window)
+            self._name_sheet = name_sheet.NameSheet(self._window.theme, self._window)
         return self._name_sheet
 
     def _keep_layout(self) -> None:
