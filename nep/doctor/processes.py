@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import socket
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
@@ -59,6 +60,8 @@ class _Owned:
 def is_free(port: int) -> bool:
     """Whether a program could listen on the port now. It is taken for a moment to see."""
     with socket.socket() as probe:
+        if sys.platform != "win32":  # elsewhere the connections of one that was killed hold its port a while
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("127.0.0.1", port))
         except OSError:

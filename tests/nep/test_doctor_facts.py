@@ -136,3 +136,13 @@ def test_what_hinders_a_master_is_one_finding(foreign, master):
         probe.bind(("127.0.0.1", 0))
         free = probe.getsockname()[1]
     assert hindrance(f"127.0.0.1:{free}") is None
+
+
+def test_connections_that_a_killed_program_left_do_not_hold_its_port():
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.socket() as client:
+        address = server.getsockname()
+        client.connect(address)
+        accepted, _ = server.accept()
+        accepted.close()  # from here on its end of the connection waits for the other to close
+        server.close()
+        assert processes.is_free(address[1])
