@@ -81,6 +81,9 @@ class Outlet(Protocol):
     def count(self) -> int:
         """Messages published so far."""
 
+    def weigh(self, size_bytes: int) -> None:
+        """Nobody listens yet, and the messages will be of this size: choose how many may be queued."""
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
 

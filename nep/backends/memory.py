@@ -91,6 +91,9 @@ class MemoryOutlet:
         """How many inlets there are on the topic."""
         return len(self.hub.inlets.get(self.spec.topic, ()))
 
+    def weigh(self, size_bytes: int) -> None:
+        """Nothing is ever queued here."""
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self.hub.lock:

@@ -16,15 +16,16 @@ class Ahead:
     def __init__(self, max_messages: int) -> None:
         self._most = max(1, min(_MOST, max_messages))
         self._now = 1
-        self._read_at = 0.0
+        self.span_s = _BRISK_S
+        """Whoever comes back sooner than this is brisk."""
 
-    def count(self, now: float) -> int:
-        """How many messages to read at `now`, 1 or more."""
-        is_brisk = now - self._read_at < self._now * _BRISK_S
-        self._read_at = now
-        self._now = min(2 * self._now, self._most) if is_brisk else 1
+    def more(self) -> int:
+        """How many messages to read for a brisk reader."""
+        self._now = min(2 * self._now, self._most)
+        self.span_s = self._now * _BRISK_S
         return self._now
 
     def begin(self) -> None:
-        """There were not as many: begin with one again."""
+        """There were not as many, or the reader takes its time: begin with one again."""
         self._now = 1
+        self.span_s = _BRISK_S

@@ -76,6 +76,12 @@ class OriginalOutlet:
         with self._changed:
             wait_until(self._changed, lambda: self._filters > 0, timeout_s)
 
+    def weigh(self, size_bytes: int) -> None:
+        """Messages will be of this size. Better before anybody connects: see `SendMark`."""
+        with self._changed:
+            if not self._mark.is_set and not self._socket.closed:
+                self._mark.sending(size_bytes)
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._changed:

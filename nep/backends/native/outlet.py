@@ -140,6 +140,12 @@ class NativeOutlet:
 
     # ---- sending
 
+    def weigh(self, size_bytes: int) -> None:
+        """Messages will be of this size. Better before anybody connects: see `SendMark`."""
+        with self._lock:
+            if not self._mark.is_set and not self._socket.closed:
+                self._mark.sending(size_bytes)
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._lock:

@@ -67,6 +67,7 @@ class SocketInlet(Reporting[R]):
         self.ready: deque[Message] = deque()
         """What was read ahead, in front of the inbox; anybody may take from its left without the lock."""
         self._ahead = Ahead(spec.max_messages)
+        self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
         self._io_comes_at = _NEVER
@@ -93,7 +94,8 @@ class SocketInlet(Reporting[R]):
         with self._lock:
             if self.is_closed:
                 return None
-            message = self._next(self._is_brisk and not self._wanted and timeout_s >= SHORT_WAIT_S)
+            may_wait = self._is_brisk and not self._wanted and timeout_s >= SHORT_WAIT_S
+            message = self._next(may_wait=may_wait)
             if message is not None:
                 self._is_brisk = True
                 return message
@@ -228,7 +230,7 @@ class SocketInlet(Reporting[R]):
 
     # ---- with the lock held
 
-    def _next(self, may_wait: bool = False) -> Message | None:
+    def _next(self, *, may_wait: bool = False) -> Message | None:
         now = time.monotonic()
         self._leased_until = now + LEASE_S
         if self._io_comes_at > now + _LATE_S:
@@ -236,18 +238,19 @@ class SocketInlet(Reporting[R]):
             # the node's thread has to look when the lease is over. It is asked once for many reads.
             self._io_comes_at = self._leased_until
             self._io.serve_soon(self)
+        if self._keeps_all and not self.ready and not self._inbox.messages:
+            span, self._read_at = now - self._read_at, now
+            if span > self._ahead.span_s:
+                self._ahead.begin()
+                return self._read(may_wait=may_wait)
+            most = self._ahead.more()
+            if self._read_into(self.ready, most, ROOM_BYTES, may_wait=may_wait) < most:
+                self._ahead.begin()
         if self.ready:
             return self.ready.popleft()
         if not self._keeps_all:
             self._fill()
-        if self._inbox.messages or not self._keeps_all:
-            return self._inbox.take()
-        most = self._ahead.count(now)
-        if most == 1:
-            return self._read(may_wait=may_wait)
-        if self._read_into(self.ready, most, ROOM_BYTES, may_wait=may_wait) < most:
-            self._ahead.begin()
-        return self.ready.popleft() if self.ready else None
+        return self._inbox.take()
 
     def _fill(self, most: int = _BATCH_MESSAGES) -> int:
         """Read into the inbox until the socket has nothing more, or a batch is full; how many."""

@@ -50,9 +50,9 @@ class SendMark:
     room for four times its size. It cannot be lowered later: libzmq tells the sender of what was read in
     portions of half a mark, and a sender whose new mark is below what is still untold waits for ever. And
     libzmq 4.3.5 ends the program when the mark is set while one of the socket's connections is just closing,
-    because it tells the other end, which may be gone. So it is set once, and only when the first one would
-    allow four times as much. A connection has the mark of when its port was bound: for whoever comes later,
-    ports have to be bound anew.
+    because it tells the other end, which may be gone. So it is set once, only when the first one would allow
+    four times as much, and if possible before anybody connects. A connection has the mark of when its port
+    was bound: for whoever comes later, ports have to be bound anew.
     """
 
     def __init__(self, owner: Socket, codec: str) -> None:
@@ -150,9 +150,9 @@ def sendable(data: bytes | memoryview) -> Part:
     """What can be sent as it lies: a received message itself; of what can still change a copy."""
     if isinstance(data, bytes):
         return data
-    origin = data.obj
-    if isinstance(origin, zmq.Frame) and data.nbytes == len(origin) and data.readonly:
-        return origin
     if not (data.readonly and data.c_contiguous):
         return bytes(data)
+    origin: object = data.obj
+    if isinstance(origin, zmq.Frame) and data.nbytes == len(origin):
+        return origin
     return data if data.itemsize == data.ndim == 1 else data.cast("B")

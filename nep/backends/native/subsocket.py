@@ -38,7 +38,8 @@ from nep.wire import (
 
 __all__ = ["SubSocket"]
 
-_NO_COPY_BYTES = 65_536
+_NO_COPY_BYTES = 8_192
+"""Larger ones libzmq receives into memory of their own: a kept view of one keeps nothing else alive."""
 _DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
 _EVENTS = int(zmq.EVENTS)
 _RCVMORE = int(zmq.RCVMORE)
@@ -191,10 +192,15 @@ class SubSocket:
             return None
         if len(data) != size:
             return self._read_on(first, head, data)
-        source.last = seq
         self.sources.received += 1
-        raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
-        return arrived(source.kind, raw, stamp_ns, seq, publisher)
+        message = new_message(Message)
+        message.kind = source.kind
+        message.raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
+        message.stamp_ns = stamp_ns
+        message.seq = source.last = seq
+        message.publisher, message.extension = publisher, NOTHING
+        message.decoded = UNDECODED
+        return message
 
     def _read_on(self, first: bytes, *got: bytes | zmq.Frame | None) -> Message | None:
         """The next message that can be understood, beginning with these parts."""
