@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.robots.description import Action
 from app.ui.controls import Pictures
+from app.ui.flow import Flow
 from app.ui.forms import ActionForm
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
@@ -68,7 +69,7 @@ class ActionCard(Card):
         self._folded = False
         self.form = ActionForm(theme, action, options, pictures)
         self.form.changed.connect(self._say_summary)
-        self.title = label(action.title[:1].upper() + action.title[1:], "card")
+        self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
         self.summary = Elided("bodyLarge", "textSecondary")
         self.risk = Chip(theme, RISKS.get(action.risk or "", ""), "warn")
         self.words = Elided("body", "textSecondary", 60)
@@ -94,16 +95,15 @@ class ActionCard(Card):
         self.show_invocation(None)
 
     def _lay_out(self, theme: Theme) -> None:
-        head = QHBoxLayout()
-        head.setSpacing(10)
+        head = Flow()
         before: tuple[QWidget, ...] = (Tile(theme, self.action.icon), self.title, self.risk)
         after: tuple[QWidget, ...] = (self.left, self.result, self.past, self.try_button, self.fold)
         below: tuple[QWidget, ...] = (self.form, self.error, self.progress, self.tries)
         for widget in before:
             head.addWidget(widget)
-        head.addWidget(self.summary)
-        head.addStretch(1)
-        head.addWidget(self.words)
+        head.add_elastic(self.summary)
+        head.push()
+        head.add_elastic(self.words)
         for widget in after:
             head.addWidget(widget)
         column = QVBoxLayout(self)

@@ -6,10 +6,11 @@ import re
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QLinearGradient, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description import Parameter
 from app.ui.control import Control, connect, line_field
+from app.ui.flow import Flow
 from app.ui.theme import Theme
 from app.ui.widgets import Button, ColourSwatches, label
 
@@ -133,18 +134,14 @@ class ColourChoice(QWidget):
         self.field.editingFinished.connect(lambda: self._typed(final=True))
 
     def _lay_out(self) -> None:
-        first = QHBoxLayout()
-        first.setContentsMargins(0, 0, 0, 0)
+        first = Flow(gap=6)
         first.addWidget(self.swatches)
         first.addWidget(self.other)
-        first.addStretch(1)
         self._more = QWidget()
-        second = QHBoxLayout(self._more)
+        second = Flow(self._more)
         second.setContentsMargins(4, 0, 0, 0)
-        second.setSpacing(10)
         second.addWidget(self.strip)
         second.addWidget(self.field)
-        second.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.robots.description import Parameter
 from app.ui.angle_dial import AngleDial
 from app.ui.control import VALUE_WIDTH, Control, Tell, connect
+from app.ui.flow import Flow
 from app.ui.theme import Theme
 from app.ui.widgets import NumberField, SliderWithUnit, label
 from app.ui.widgets.slider import decimals_of
@@ -116,11 +117,9 @@ def _dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDi
 def _beside(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
     row = QWidget()
     row.setAccessibleName(name)
-    inner = QHBoxLayout(row)
-    inner.setContentsMargins(0, 0, 0, 0)
-    inner.setSpacing(10)
+    inner = Flow(row)
     inner.addWidget(dial)
-    inner.addWidget(slider, 1)
+    inner.add_elastic(slider, greedy=True)
     return row
 
 

@@ -21,10 +21,11 @@ from PySide6.QtGui import (
     QPainterPath,
     QPaintEvent,
 )
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description import Parameter
 from app.ui.control import Control, connect, line_field
+from app.ui.flow import Flow
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import Button, label, paint
@@ -171,11 +172,9 @@ class PictureChoice(QWidget):
         self.camera.clicked.connect(self._offer)
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(10)
+        row = Flow()
         row.addWidget(self.thumbnail)
-        row.addWidget(self.field, 1)
+        row.add_elastic(self.field, greedy=True)
         row.addWidget(self.choose)
         row.addWidget(self.camera)
         column = QVBoxLayout(self)

@@ -50,6 +50,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
             check=True,
             size="form",
             name=parameter.title,
+            wraps=True,
         )
         made = Control(
             segments,

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from app.robots.description import Action, Parameter
 from app.robots.inputs import wrong_value
+from app.ui.control_colour import ColourChoice
 from app.ui.controls import ROW_HEIGHT, Control, Pictures, control_for, sentence_case
 from app.ui.input_words import input_words
 from app.ui.long_text import LongText
 from app.ui.theme import Theme
-from app.ui.widgets import Button, label
+from app.ui.widgets import Button, Segments, label
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
@@ -38,6 +40,8 @@ class ActionForm(QWidget):
         self.controls: dict[str, Control] = {}
         self._sentences: dict[str, QLabel] = {}
         self._rows: dict[str, tuple[QWidget, QWidget]] = {}
+        self._heights: dict[QWidget, int] = {}
+        self._stacked = False
         self._theme, self._pictures = theme, pictures
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
@@ -63,7 +67,6 @@ class ActionForm(QWidget):
         self._show_advanced(False)
 
     def _add(self, parameter: Parameter, options: Sequence[str]) -> None:
-        row = self._grid.rowCount()
         control = control_for(self._theme, parameter, options, self._pictures)
         name = label(sentence_case(parameter.title), "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
@@ -76,17 +79,51 @@ class ActionForm(QWidget):
         inside.addWidget(control.widget)
         inside.addWidget(wrong)
         control.widget.setMinimumHeight(ROW_HEIGHT)
-        name.setMinimumHeight(max(ROW_HEIGHT, min(TALL_ROW, control.widget.sizeHint().height())))
-        self._grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
-        self._grid.addWidget(cell, row, 1)
+        self._heights[name] = max(ROW_HEIGHT, min(TALL_ROW, control.widget.sizeHint().height()))
+        self._put(2 * len(self._rows), name, cell)
         self.controls[parameter.name] = control
         self._sentences[parameter.name] = wrong
         self._rows[parameter.name] = (name, cell)
         control.changed(self._told)
         control.finished(lambda: self._left(parameter))
 
+    # -- its rows ---------------------------------------------------------------------------------
+
     def _fit(self) -> None:
-        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
+        """Names beside their controls where every control has its room there, else above them."""
+        beside = round(self._theme.scaled(LABEL_WIDTH))
+        stacked = self.width() < beside + self._grid.horizontalSpacing() + self._control_width()
+        self._grid.setColumnMinimumWidth(0, 0 if stacked else beside)
+        if stacked != self._stacked:
+            self._stacked = stacked
+            for place, (name, cell) in enumerate(self._rows.values()):
+                self._put(2 * place, name, cell)
+
+    def _control_width(self) -> int:
+        """The room that the widest control wants; those that can have several rows want one."""
+        each = [one.widget for one in self.controls.values()]
+        in_one_row = (one.sizeHint().width() for one in each if isinstance(one, Segments | ColourChoice))
+        return max((*in_one_row, *(one.minimumSizeHint().width() for one in each)), default=0)
+
+    def _put(self, row: int, name: QWidget, cell: QWidget) -> None:
+        for widget in (name, cell):
+            self._grid.removeWidget(widget)
+        name.setMinimumHeight(0 if self._stacked else self._heights[name])
+        if self._stacked:
+            self._grid.addWidget(name, row, 0, 1, 2)
+            self._grid.addWidget(cell, row + 1, 0, 1, 2)
+        else:
+            self._grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
+            self._grid.addWidget(cell, row, 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def minimumSizeHint(self) -> QSize:
+        """As wide as the widest control alone: names can stand above."""
+        least = max((cell.minimumSizeHint().width() for _, cell in self._rows.values()), default=0)
+        return QSize(least, super().minimumSizeHint().height())
 
     def _told(self) -> None:
         self.show_problems(())

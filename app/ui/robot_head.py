@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.ui.flow import Flow
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Chip, Elided, SearchField, label
 
@@ -25,16 +26,17 @@ class RobotHead(QWidget):
         self.finder.setMinimumHeight(theme.size("control", "form"))
         self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
         self.stop.fill_icon = True
-        about = QVBoxLayout()
+        facts = QWidget()
+        about = QVBoxLayout(facts)
+        about.setContentsMargins(0, 0, 0, 0)
         about.setSpacing(0)
         about.addWidget(self.about)
         about.addWidget(self.health)
-        row = QHBoxLayout(self)
+        row = Flow(self)
         row.setContentsMargins(16, 7, 16, 8)
-        row.setSpacing(10)
         row.addWidget(self.name)
         row.addWidget(self.chip)
-        row.addLayout(about)
-        row.addStretch(1)
+        row.add_elastic(facts)
+        row.push()
         row.addWidget(self.finder)
         row.addWidget(self.stop)

@@ -57,6 +57,17 @@ def clipped(root: QWidget) -> list[str]:
     return [fault for widget in shown(root) for fault in _faults(widget, root)]
 
 
+def sideways(root: QWidget) -> list[str]:
+    """What has a bar to scroll it sideways, one sentence each."""
+    areas = [area for area in shown(root) if isinstance(area, QAbstractScrollArea) and area.accessibleName()]
+    never = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+    return [
+        f"{area.accessibleName()} is {area.horizontalScrollBar().maximum()} too wide"
+        for area in areas
+        if area.horizontalScrollBar().maximum() > 0 and area.horizontalScrollBarPolicy() != never
+    ]
+
+
 def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
     said = _name(widget)
     if isinstance(widget, Elided) or not said:

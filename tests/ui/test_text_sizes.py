@@ -14,12 +14,13 @@ from app.ui.commands import Commands
 from app.ui.docks import Dock
 from app.ui.main_window import MainWindow
 from app.ui.overlay import Overlay
+from app.ui.panels import robots
 from app.ui.panels.base import PanelContext
 from app.ui.start_page import read_examples
 from app.ui.status_bar import StatusBar
 from app.ui.theme import Theme
 from app.ui.widgets import StatusItem
-from tests.ui.clipping import clipped, lengthen
+from tests.ui.clipping import clipped, lengthen, sideways
 from tests.ui.fakes import Session as FakeSession
 from tests.ui.shell_parts import PANELS, Answers
 from tests.ui.show_panels import SIZES, prepare
@@ -110,6 +111,35 @@ def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, 
         widget.shut()
         dock.close()
     assert faults == []
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+@pytest.mark.parametrize("width", [384, 640])
+def test_an_action_is_read_and_tried_without_scrolling_sideways(
+    qtbot, theme: Theme, percent: int, width: int
+) -> None:
+    theme.set_text_percent(percent)
+    session = FakeSession.full()
+    panel = robots.PANEL
+    widget = panel.make(PanelContext(session, theme, str, str, str))  # type: ignore[arg-type]
+    dock = Dock(theme, panel, widget, "comfortable")  # type: ignore[arg-type]
+    qtbot.addWidget(dock)
+    dock.resize(width, 600)
+    dock.show()
+    dock.front = True
+    session.tick()
+    dock.refresh()
+    assert isinstance(widget, robots.RobotsPanel)
+    assert widget.cards
+    for card in widget.cards.values():
+        card.set_folded(False)
+        card.form.more.setChecked(True)
+    settle(qtbot, dock, longer=False)
+    assert sideways(dock) == []
+    assert clipped(dock) == []
+    for card in widget.cards.values():
+        assert card.try_button.mapTo(widget, card.try_button.rect().bottomRight()).x() < widget.width()
+    widget.shut()
 
 
 @pytest.fixture

@@ -160,6 +160,7 @@ class SensorsPanel(PanelWidget):
         fitting = max(1, room // height)
         below = room - fitting * height if fitting < len(self.rows) else 0
         self._frame.setContentsMargins(0, 0, 0, max(0, below))
+        self.pages.setMinimumHeight(height + self._column.contentsMargins().top())  # one whole row, always
         self._scroll.verticalScrollBar().setSingleStep(height)
 
     def resizeEvent(self, event: QResizeEvent) -> None:

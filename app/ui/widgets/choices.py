@@ -9,13 +9,13 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QComboBox,
-    QHBoxLayout,
     QLineEdit,
     QSizePolicy,
     QStyledItemDelegate,
     QWidget,
 )
 
+from app.ui.flow import Flow
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
@@ -138,18 +138,16 @@ class ColourSwatches(QWidget):
         self._names = {colour.lower(): words for colour, words in colours}
         self._value = ""
         self.setAccessibleName(name)
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(2)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+        row = Flow(self, gap=2)
         self._swatches: dict[str, _Swatch] = {}
         for colour, words in self._names.items():
             swatch = _Swatch(theme, colour, words)
             swatch.clicked.connect(lambda _on=False, colour=colour: self._choose(colour))
             self._swatches[colour] = swatch
             row.addWidget(swatch)
-        row.addSpacing(6)
         self._name = label("", "bodyLarge", role="textSecondary")
+        self._name.setContentsMargins(6, 0, 0, 0)
         row.addWidget(self._name)
         self._other = Button(theme, "Other", kind="ghost", size="small")
         self._field = QLineEdit()
@@ -161,7 +159,6 @@ class ColourSwatches(QWidget):
         self._field.hide()
         row.addWidget(self._other)
         row.addWidget(self._field)
-        row.addStretch(1)
         self._other.clicked.connect(self._ask)
         self._field.editingFinished.connect(self._typed)
         self.set_value(value)

@@ -7,8 +7,9 @@ from typing import Literal
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFont, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
+from app.ui.flow import Flow
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
@@ -94,15 +95,24 @@ class Segments(QWidget):
         check: bool = False,
         size: Literal["small", "normal", "form"] = "normal",
         name: str = "",
+        wraps: bool = False,
     ) -> None:
-        """Options are (value, label, icon or None); ``check`` puts a check mark before the chosen one."""
+        """Options are (value, label, icon or None); ``check`` puts a check mark before the chosen one.
+
+        With ``wraps`` they stand in several rows where there is too little room.
+        """
         super().__init__()
         self._theme = theme
         self.setAccessibleName(name)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        row = QHBoxLayout(self)
+        row: QLayout
+        if wraps:
+            self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
+            row = Flow(self, gap=1, row_gap=1)
+        else:
+            self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+            row = QHBoxLayout(self)
+            row.setSpacing(1)
         row.setContentsMargins(2, 2, 2, 2)
-        row.setSpacing(1)
         self._segments: dict[str, _Segment] = {}
         for key, words, icon in options:
             segment = _Segment(theme, words, icon, size, check)

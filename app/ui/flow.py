@@ -1,0 +1,161 @@
+"""A row that becomes several rows where there is too little room, so that nobody scrolls sideways."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from PySide6.QtCore import QRect, QSize, Qt
+from PySide6.QtWidgets import QLabel, QLayout, QLayoutItem, QWidget
+
+
+class Flow(QLayout):
+    """One row if all of it fits, else as many as are needed, each item in the middle of its row.
+
+    In one row the spare room stands where `push` was called, and what is elastic may be narrower than it asks
+    for. A label that wraps takes what is left of its row.
+    """
+
+    def __init__(self, parent: QWidget | None = None, *, gap: int = 10, row_gap: int = 6) -> None:
+        super().__init__(parent)
+        self._items: list[QLayoutItem] = []
+        self._gap, self._row_gap = gap, row_gap
+        self._push = -1
+        self._elastic: dict[QWidget, bool] = {}
+        self.setContentsMargins(0, 0, 0, 0)
+
+    def push(self) -> None:
+        """What is added from now on stands at the right end when all is in one row."""
+        self._push = len(self._items)
+
+    def add_elastic(self, widget: QWidget, *, greedy: bool = False) -> None:
+        """Add a widget that may be narrower than it asks for; a ``greedy`` one takes what is left."""
+        self._elastic[widget] = greedy
+        self.addWidget(widget)
+
+    # -- what Qt asks -------------------------------------------------------------------------------------
+
+    def addItem(self, item: QLayoutItem) -> None:
+        self._items.append(item)
+
+    def count(self) -> int:
+        return len(self._items)
+
+    def itemAt(self, index: int) -> QLayoutItem | None:
+        return self._items[index] if 0 <= index < len(self._items) else None
+
+    def takeAt(self, index: int) -> QLayoutItem | None:
+        return self._items.pop(index) if 0 <= index < len(self._items) else None
+
+    def expandingDirections(self) -> Qt.Orientation:
+        return Qt.Orientation(0)
+
+    def hasHeightForWidth(self) -> bool:
+        return True
+
+    def heightForWidth(self, width: int) -> int:
+        return self._arrange(QRect(0, 0, width, 0), move=False)
+
+    def sizeHint(self) -> QSize:
+        shown = [*self._shown()]
+        wide = sum(self._wanted(item) for item in shown) + self._gap * max(0, len(shown) - 1)
+        high = max((item.sizeHint().height() for item in shown), default=0)
+        return self._outside(QSize(wide, high))
+
+    def minimumSize(self) -> QSize:
+        shown = [*self._shown()]
+        wide = max((self._least(item) for item in shown), default=0)
+        high = max((item.minimumSize().height() for item in shown), default=0)
+        return self._outside(QSize(wide, high))
+
+    def setGeometry(self, rect: QRect) -> None:
+        super().setGeometry(rect)
+        self._arrange(rect, move=True)
+
+    # -- where things go ----------------------------------------------------------------------------------
+
+    def _shown(self) -> Iterator[QLayoutItem]:
+        return (item for item in self._items if not item.isEmpty())
+
+    def _outside(self, size: QSize) -> QSize:
+        edge = self.contentsMargins()
+        return size + QSize(edge.left() + edge.right(), edge.top() + edge.bottom())
+
+    def _wanted(self, item: QLayoutItem) -> int:
+        widget = item.widget()
+        if isinstance(widget, QLabel) and widget.wordWrap():  # Qt's own hint is for several lines
+            return widget.fontMetrics().horizontalAdvance(widget.text()) + 2
+        return item.sizeHint().width()
+
+    def _least(self, item: QLayoutItem) -> int:
+        bends = self._bends(item) or item.hasHeightForWidth()
+        return item.minimumSize().width() if bends else item.minimumSize().expandedTo(item.sizeHint()).width()
+
+    def _most(self, item: QLayoutItem, room: int) -> int:
+        widget = item.widget()
+        greedy = widget is not None and self._elastic.get(widget, False)
+        return room if greedy else self._wanted(item)
+
+    def _bends(self, item: QLayoutItem) -> bool:
+        widget = item.widget()
+        return widget in self._elastic
+
+    def _arrange(self, rect: QRect, *, move: bool) -> int:
+        """Place everything (with ``move``) and give the height that it takes."""
+        edge = self.contentsMargins()
+        room = rect.marginsRemoved(edge)
+        shown = [*self._shown()]
+        rows = [self._one_row(shown, room.width())] if shown else []
+        if rows and not rows[0]:
+            rows = self._rows(shown, room.width())
+        top = room.top()
+        for row in rows:
+            high = max(_height(item, wide) for item, _, wide in row)
+            for item, left, wide in row:
+                if move:
+                    height = min(high, _height(item, wide))
+                    item.setGeometry(QRect(room.left() + left, top + (high - height) // 2, wide, height))
+            top += high + self._row_gap
+        used = top - room.top() - (self._row_gap if rows else 0)
+        return used + edge.top() + edge.bottom()
+
+    def _one_row(self, items: list[QLayoutItem], room: int) -> list[tuple[QLayoutItem, int, int]]:
+        """Everything in one row as (item, left, width); empty when it does not fit."""
+        widths = [item.minimumSize().width() if self._bends(item) else self._wanted(item) for item in items]
+        spare = room - sum(widths) - self._gap * (len(items) - 1)
+        if spare < 0:
+            return []
+        for place, item in enumerate(items):
+            if self._bends(item):
+                more = max(0, min(spare, self._most(item, room) - widths[place]))
+                widths[place] += more
+                spare -= more
+        pushed = self._items[self._push :] if self._push >= 0 else []
+        first = next((place for place, item in enumerate(items) if item in pushed), len(items))
+        row, left = [], 0
+        for place, (item, wide) in enumerate(zip(items, widths, strict=True)):
+            left += spare if place == first else 0
+            row.append((item, left, wide))
+            left += wide + self._gap
+        return row
+
+    def _rows(self, items: list[QLayoutItem], room: int) -> list[list[tuple[QLayoutItem, int, int]]]:
+        """Several rows; what alone is wider than the room gets all of it."""
+        rows: list[list[tuple[QLayoutItem, int, int]]] = []
+        left = room + 1
+        for item in items:
+            wide = min(room, self._most(item, room))
+            rest = room - left
+            if wide > rest >= self._least(item):
+                wide = rest
+            if wide > rest:
+                rows.append([])
+                left = 0
+            rows[-1].append((item, left, wide))
+            left += wide + self._gap
+        return rows
+
+
+def _height(item: QLayoutItem, wide: int) -> int:
+    if item.hasHeightForWidth():
+        return max(item.heightForWidth(wide), item.minimumSize().height())
+    return item.sizeHint().expandedTo(item.minimumSize()).height()
