@@ -47,7 +47,7 @@ TABLE: tuple[Row, ...] = (
     Row("file.quit", "File", "Quit", "Ctrl+Q", above=True),
     Row("edit.undo", "Edit", "Undo", "Ctrl+Z", "rotate-ccw"),
     Row("edit.redo", "Edit", "Redo", "Ctrl+Shift+Z", "rotate-cw"),
-    Row("blocks.find", "Edit", "Find in the blocks", "", "search", above=True),
+    Row("blocks.find", "Edit", "Find in the blocks", "Ctrl+F", "search", above=True),
     Row("blocks.search", "Edit", "Find a block to add"),
     Row("palette.open", "View", "Find a command or panel", "Ctrl+K", "search"),
     Row("layout.behaviour", "View", "Behaviour layout", "Alt+1", "blocks", group="layout", above=True),

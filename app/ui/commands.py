@@ -161,6 +161,7 @@ class Commands:
         dock = self._open_in("developer", "inspector")
         if dock is not None:
             dock.panel.show_topic(topic)
+            self.habits.mark_topic(topic)
 
     def _show_block(self, block: str) -> None:
         self._show("behaviour")

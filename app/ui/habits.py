@@ -89,13 +89,19 @@ class Habits:
         self.shortcuts.changed.connect(self._show_keys)
         window.bench_made.connect(self.shortcuts.tell)
         window.theme.changed.connect(self._mark)
+        window.pages.currentChanged.connect(lambda _page: self._show_keys_here())
         self._show_keys()
         self._mark()
 
     def _show_keys(self) -> None:
-        self.actions.set_keys(self.shortcuts.of)
+        self._show_keys_here()
         self._window.bar.search.show_key(self.shortcuts.first("palette.open"))
         self.shortcuts.tell()
+
+    def _show_keys_here(self) -> None:
+        """Finding blocks has its key where blocks are seen; elsewhere it is the panels' own."""
+        here = self._window.pages.currentWidget() is self._window.benches.get("behaviour")
+        self.actions.set_keys(lambda name: self.shortcuts.of(name) if here or name != "blocks.find" else ())
 
     def _mark(self) -> None:
         """The marks in the menus say what is chosen."""
@@ -129,6 +135,7 @@ class Habits:
             if window.bench is None:
                 self.show_layout("developer")
             window.open_topic(name)
+            self.mark_topic(name)
         elif kind == "robot":
             dock = window.open_panel("robots")
             if dock is not None and isinstance(dock.panel, ChoosesRobot):
@@ -137,6 +144,12 @@ class Habits:
             self._use_layout(name)
         elif kind in {"file", "example"}:
             (self._files.open if kind == "file" else self._files.example)(Path(name))
+
+    def mark_topic(self, name: str) -> None:
+        """Choose a topic that was opened by command in the list of topics too, where that is open."""
+        bench = self._window.bench
+        if bench is not None and "topics" in bench.open_names():
+            bench.docks["topics"].panel.show_topic(name)
 
     def open_shortcuts(self) -> None:
         """Open the table of shortcuts."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 
 from app.ui.inspector_parts import plain_words
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from app.ui.theme import Theme
     from app.ui.tree import Node
     from nep.message import Message
+
+
+FIND = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)
 
 
 class InspectorActions(QObject):
@@ -44,6 +47,8 @@ class InspectorActions(QObject):
             ("Next one", "F3", "", lambda: body.finder.step(1)),
             ("Previous one", "Shift+F3", "", lambda: body.finder.step(-1)),
         )
+        self._find = find
+        panel.installEventFilter(self)
         self._actions: list[QAction] = []
         for words, key, icon, does in rows:
             action = QAction(words, panel)
@@ -54,6 +59,17 @@ class InspectorActions(QObject):
             action.triggered.connect(lambda _on=False, do=does: do())
             (body.tree if key.endswith("C") else panel).addAction(action)  # fields copy their own text
             self._actions.append(action)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Inside the panel its own Ctrl+F goes before the window's, which finds blocks."""
+        if isinstance(event, QKeyEvent) and event.keyCombination() == FIND:
+            if event.type() == QEvent.Type.ShortcutOverride:
+                event.accept()
+                return True
+            if event.type() == QEvent.Type.KeyPress:
+                self._find()
+                return True
+        return super().eventFilter(watched, event)
 
     def listed(self) -> list[QAction]:
         """All of them, for a menu."""

@@ -44,6 +44,7 @@ FIXED: tuple[Fixed, ...] = (
     Fixed("Tables and trees", "Row above or below", "Up, Down"),
     Fixed("Tables and trees", "Open the row", "Enter"),
     Fixed("Tables and trees", "Open or close what is inside", "Right, Left"),
+    Fixed("Inspector", "Find a key or value", "Ctrl+F"),
     Fixed("Inspector", "Copy the value", "Ctrl+C"),
     Fixed("Inspector", "Copy the path", "Ctrl+Shift+C"),
     Fixed("Sliders", "One step", "Left, Right"),
@@ -133,7 +134,8 @@ class Shortcuts(QObject):
         if not held and pressed.key() not in ALONE:
             return NEEDS_WITH
         for fixed in FIXED:
-            if key in [normal(each) for each in fixed.key.split(", ")] and held:
+            own = key in self.default(name)  # Ctrl+F finds in the Inspector there, else in the blocks
+            if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:
                 return f"{spoken_key(key)} stays “{fixed.words}” ({fixed.place})."
         return ""
 

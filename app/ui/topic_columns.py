@@ -132,11 +132,11 @@ COLUMNS: tuple[Column[Topic], ...] = (
         "subscribers", "Subscribers", 80, subscribers_cell, lambda t: t.subscribers, figures=True, off=True
     ),
     Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
-    Column("curve", "", 57, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
+    Column("curve", "", 50, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
     Column("rate", "Rate /s", 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
-    Column("bandwidth", "Bandwidth", 77, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
-    Column("age", "Age", 72, age_cell, lambda t: t.age_s, figures=True, yields=2),
-    Column("loss", "Loss", 75, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
+    Column("bandwidth", "Bandwidth", 75, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
+    Column("age", "Age", 58, age_cell, lambda t: t.age_s, figures=True, yields=2),
+    Column("loss", "Loss", 62, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
 )
 
 

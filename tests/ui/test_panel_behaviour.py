@@ -25,6 +25,7 @@ class Editor(QWidget):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self.is_ready = True
         self.told: list[tuple[object, ...]] = []
         self.late: dict[str, object] = {}
 

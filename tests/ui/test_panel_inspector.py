@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtTest import QTest
 
 from app.core import lazy_json
@@ -414,3 +414,20 @@ def test_a_topic_that_nobody_publishes_says_so_while_it_waits(panel, window) -> 
     window.session.topics["/odom"].publishers = 0
     panel.refresh()
     assert panel.body.empty._text.text().startswith("Nobody publishes it now.")
+
+
+def test_its_ctrl_f_goes_before_the_window_s(qtbot, panel, window) -> None:
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", blackboard())
+    panel.refresh()
+    panel.window().activateWindow()
+    qtbot.waitUntil(panel.window().isActiveWindow)
+    other = QAction("Find in the blocks", panel)
+    other.setShortcut(QKeySequence("Ctrl+F"))
+    asked: list[str] = []
+    other.triggered.connect(lambda: asked.append("other"))
+    panel.window().addAction(other)
+    panel.tree.setFocus()
+    QTest.keyClick(panel.tree, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
+    assert panel.finder.field.hasFocus()
+    assert asked == []

@@ -248,3 +248,21 @@ def test_an_empty_panel_leads_to_the_connection_doctor(qtbot, panel, window) -> 
     assert bare.doctor.isVisible()
     press(bare.doctor.button)
     assert empty.commands == ["help.doctor"]
+
+
+def test_a_topic_that_was_asked_for_is_chosen_as_soon_as_it_is_listed(panel, window) -> None:
+    panel.show_topic("/odom")
+    assert panel.table.currentIndex() == panel.model.index_of("/odom")
+    panel.show_topic("/later")
+    window.session.topics.put(Topic("/later"))
+    panel.refresh()
+    assert panel.model.index_of("/later").isValid()
+    assert panel.table.currentIndex() == panel.model.index_of("/later")
+    assert window.opened == []
+
+
+def test_a_name_of_twenty_letters_fits_at_the_usual_width(qtbot, panel) -> None:
+    panel.resize(640, 400)
+    qtbot.wait(10)
+    room = panel.table.columnWidth(place_of(panel, "topic"))
+    assert room >= panel.theme.font("mono").pixelSize() * 0.6 * len("/Pepper/head_touched")

@@ -244,3 +244,24 @@ def test_ctrl_enter_in_the_palette_leads_here(
     assert sheet.rows.entry.name == "file.save_as"
     press(sheet, Qt.Key.Key_F4)
     assert commands.habits.shortcuts.of("file.save_as") == ("F4",)
+
+
+def test_ctrl_f_finds_blocks_in_the_behaviour_layout_only(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    find = commands.actions["blocks.find"]
+    asked: list[str] = []
+    find.triggered.connect(lambda: asked.append("find"))
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    commands.run("layout.behaviour")
+    assert find.shortcut() == QKeySequence("Ctrl+F")
+    QTest.keyClick(window, Qt.Key.Key_F, CTRL)
+    assert asked == ["find"]
+    commands.run("layout.developer")
+    assert find.shortcut().isEmpty()
+    QTest.keyClick(window, Qt.Key.Key_F, CTRL)
+    assert asked == ["find"]
+    commands.run("layout.behaviour")
+    assert find.shortcut() == QKeySequence("Ctrl+F")

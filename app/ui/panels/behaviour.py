@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.behaviour_tab import TabFacts
 from app.ui.behaviour_title import BehaviourTitle
+from app.ui.blocks_wait import BlocksWait
 from app.ui.editor import Editor, blockly
 from app.ui.live_words import live_words
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -70,6 +71,7 @@ class BehaviourPanel(PanelWidget):
         )
         self.empty.setParent(self._place)
         self.empty.hide()
+        self.waiting = BlocksWait(self._place)
         self._shown: dict[str, object] = {}
         self._given: dict[str, tuple[int, int]] = {}
         self._watches: dict[str, Watch] = {}
@@ -102,6 +104,7 @@ class BehaviourPanel(PanelWidget):
             self.editor.set_errors(runs.block_errors if mine else {})
         if self._ticks % LIVE_EVERY == 0:
             self._show_live()
+        self.waiting.tell(ready=self.editor.is_ready)
         self._show_empty()
 
     def _show_blocks(self, editor: Editor) -> None:
@@ -170,9 +173,8 @@ class BehaviourPanel(PanelWidget):
 
     def _show_empty(self) -> None:
         """Over the empty workspace, while there is no robot to build for."""
-        wanted = (
-            self.mode == "blocks" and not self.session.fleet.connected and not _blocks(self.session.document)
-        )
+        building = self.mode == "blocks" and self.editor is not None and self.editor.is_ready
+        wanted = building and not self.session.fleet.connected and not _blocks(self.session.document)
         if wanted != self.empty.isVisibleTo(self._place):
             self.empty.setVisible(wanted)
         if wanted:

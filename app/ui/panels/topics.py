@@ -65,6 +65,7 @@ class TopicsPanel(PanelWidget):
         self._seen = (-1, -1, "")
         self._ours: tuple[str, ...] = ()
         self._ticks = 0
+        self._wanted = ""
 
     def _own(self, topic: Topic) -> bool:
         """Whether only virtual robots that Studio itself started publish it, or Studio."""
@@ -90,6 +91,8 @@ class TopicsPanel(PanelWidget):
         words = self.filter.text().casefold().split()
         rows = [topic for topic in topics if all(word in _haystack(topic) for word in words)]
         self.model.set_rows(self.table.order.sort(rows))
+        if self._wanted:
+            self.show_topic(self._wanted)
         self._say_counts(len(topics), len(rows) if words else None)
         self._show_empty(bool(rows), bool(words))
 
@@ -133,6 +136,7 @@ class TopicsPanel(PanelWidget):
         self.context.open_topic(name)
 
     def show_topic(self, name: str) -> None:
+        self._wanted = "" if self.model.index_of(name).isValid() else name  # its row may still come
         self.table.choose(name)
 
     def focus_filter(self) -> bool:
