@@ -1,0 +1,28 @@
+"""While the page of the blocks is not there, words say so; a quick page is not announced."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QWidget
+
+from app.ui.blocks_wait import PATIENCE_S, BlocksWait
+
+
+def test_words_come_late_and_go_with_the_page(qtbot) -> None:
+    place = QWidget()
+    qtbot.addWidget(place)
+    place.resize(600, 400)
+    now = [10.0]
+    wait = BlocksWait(place, lambda: now[0])
+    wait.tell(ready=False)
+    now[0] += PATIENCE_S - 0.01
+    wait.tell(ready=False)
+    assert wait.words.isHidden()
+    now[0] += 0.02
+    wait.tell(ready=False)
+    assert not wait.words.isHidden()
+    assert wait.words.text() == "Getting the blocks ready."
+    assert wait.words.geometry() == place.rect()
+    wait.tell(ready=True)
+    assert wait.words.isHidden()
+    wait.tell(ready=False)  # its process died: the patience begins anew
+    assert wait.words.isHidden()
