@@ -131,7 +131,9 @@ class NativeOutlet:
             if self._mark.is_lowered:
                 self._mark.is_lowered = False
                 self._places.move_on()
-            return () if self._socket.closed else self._places.move(hosts)
+            endpoints = () if self._socket.closed else self._places.move(hosts)
+            self._read_subscriptions()  # binding may have swallowed the descriptor's signal
+            return endpoints
 
     @property
     def wants_ports(self) -> bool:
