@@ -59,6 +59,19 @@ def test_a_table_has_a_head_and_a_row_for_each(capsys):
     assert any("[red]odd[/red]" in line for line in lines)
 
 
+def test_a_long_table_is_laid_out_as_straight_as_a_short_one(capsys):
+    columns = [Column("topic"), Column("rate", "right")]
+    rows = [(f"/robot{number}", f"{number}.0 /s") for number in range(1000)]
+    show_table(columns, rows)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1002
+    assert lines[0].split() == ["topic", "rate"]
+    assert lines[2].index("0.0 /s") == lines[11].index("9.0 /s")
+    assert lines[-1] == "/robot999   999.0 /s"
+    show_table(columns, [*rows, ("/two\nlines", "1.0 /s")])
+    assert "lines" in capsys.readouterr().out
+
+
 def test_topics_are_never_folded_on_a_narrow_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "72")
     monkeypatch.setenv("FORCE_COLOR", "1")
