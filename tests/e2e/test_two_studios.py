@@ -37,6 +37,7 @@ def test_both_work_both_stop_and_the_second_outlives_the_first(
     second.says("Pepper ready", 40)
     assert len(second.children("nep", "master")) == 1
     second.choose("Robots", "Use the virtual Pepper")
+    second.says("Pepper is connected")  # the blocks are shown: a menu that opens before would be closed
     second.choose("View", "Developer layout")
     second.find("Topics")
     second.screen.key("F12")
