@@ -17,9 +17,12 @@ from tests.blocks.samples import block, number, say, started, text, workspace, w
 from tests.blocks.wire_robot import WireRobot
 
 LONG_S = 15.0
-# The promise is 100 ms, which bench/stop.py measures. With more work than processors even a kill waits its
-# turn, and other tests run beside this one: here it is only told from the seconds that a hung program takes.
-STOP_WITHIN_S = 2.0
+
+
+def stop_within_s() -> float:
+    """The promise is 100 ms. On a machine with more work than processors even a kill waits for its turn."""
+    return 2.0 if os.getloadavg()[0] > (os.cpu_count() or 1) else 0.1
+
 
 HANGS = (sys.executable, "-c", "import time, sys; print('{}'); sys.stdout.flush(); time.sleep(60)")
 IGNORES_TEXT = """
@@ -145,7 +148,7 @@ def test_a_running_program_can_be_paused(runner, heard, master):
     assert made.state == "paused"
     made.go_on()
     assert made.state == "running"
-    assert timed_stop(made) < STOP_WITHIN_S
+    assert timed_stop(made) < stop_within_s()
     assert heard.until("ended").ok
 
 
@@ -153,7 +156,7 @@ def test_stop_ends_an_endless_program_at_once(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
     heard.until("running")
-    assert timed_stop(made) < STOP_WITHIN_S
+    assert timed_stop(made) < stop_within_s()
     assert not psutil.pid_exists(made.pid)
     assert made.wait(LONG_S)
     assert heard.events[-1].kind == "ended"
@@ -171,7 +174,7 @@ def test_stop_ends_one_block_that_computes_for_ever(runner, heard, master):
         made.start(program(begin, write(power)), [], master.address)
         # Nothing else can be heard of it: such a number keeps all its threads from running.
         assert subscriber.receive(LONG_S) is not None
-    assert timed_stop(made) < STOP_WITHIN_S
+    assert timed_stop(made) < stop_within_s()
     assert made.wait(LONG_S)
     assert heard.events[-1].ok  # it was stopped: that is no failure of its own
 
@@ -181,7 +184,7 @@ def test_a_child_that_hangs_is_killed(runner, heard, command):
     made = runner(command)
     huge = program(*(write(text("x" * 500)) for _ in range(400)))  # far more than a pipe holds
     made.start(huge, [], None)
-    assert timed_stop(made) < STOP_WITHIN_S
+    assert timed_stop(made) < stop_within_s()
     assert made.wait(LONG_S)
     assert heard.events[-1].kind == "ended"
 
@@ -192,7 +195,7 @@ def test_a_child_that_crashes_is_told(runner, heard):
     ended = heard.until("ended")
     assert not ended.ok
     assert ended.text == f"The program's process was killed (signal {signal.SIGABRT.value})."
-    assert timed_stop(made) < STOP_WITHIN_S
+    assert timed_stop(made) < stop_within_s()
 
 
 def test_a_child_that_fails_says_why(runner, heard):

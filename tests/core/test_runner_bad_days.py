@@ -12,7 +12,7 @@ import pytest
 
 from app.core.child_output import LONGEST_LINE, Gate, Output
 from app.core.runner import EVENTS_PER_S, Runner
-from tests.core.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, timed_stop
+from tests.core.test_runner import LONG_S, Heard, heard, program, stop_within_s, timed_stop
 
 __all__ = ["heard"]
 ENDED = 'print(\'{"is": "ended", "ok": true, "elapsed_s": 1.0}\', flush=True)'
@@ -80,7 +80,7 @@ def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) 
         pause.wait(0.01)
         late = max(late, time.monotonic() - began - 0.01)
     assert runner.state == "running"  # it is not through: its pipe makes it wait
-    assert timed_stop(runner) < STOP_WITHIN_S
+    assert timed_stop(runner) < stop_within_s()
     assert heard.until("ended").ok
     assert late < 0.25
     assert me.memory_info().rss - before < 60_000_000
@@ -96,7 +96,7 @@ def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:
     pause = threading.Event()
     while time.monotonic() - began < 2.2:
         pause.wait(0.05)
-    assert timed_stop(runner) < STOP_WITHIN_S
+    assert timed_stop(runner) < stop_within_s()
     assert runner.wait(LONG_S)
     seconds = time.monotonic() - began + 1
     assert printed(heard).count("x") <= EVENTS_PER_S * (seconds + 1)
@@ -147,7 +147,7 @@ def test_processes_that_it_started_end_with_it(started, heard, end) -> None:
     runner = started(FORKS.format(new=False, wait=60 if end == "stop" else 0.3))
     left = child_of(heard, runner)
     if end == "stop":
-        assert timed_stop(runner) < STOP_WITHIN_S
+        assert timed_stop(runner) < stop_within_s()
     heard.until("ended")  # although its child holds the pipe
     assert gone(left)
 
@@ -156,7 +156,7 @@ def test_processes_that_it_started_end_with_it(started, heard, end) -> None:
 def test_a_process_that_has_left_its_group_ends_too(started, heard) -> None:
     runner = started(FORKS.format(new=True, wait=60))
     left = child_of(heard, runner)
-    assert timed_stop(runner) < STOP_WITHIN_S + 0.1  # they are looked for first
+    assert timed_stop(runner) < stop_within_s() + 0.1  # they are looked for first
     heard.until("ended")
     assert gone(left)
 

@@ -189,15 +189,12 @@ def test_each_action_is_answered_exactly_once_and_can_be_canceled(bench) -> None
         if action.cancellable:
             bench.running(wanted)
             bench.ears.command(id=wanted, op="cancel")
-        answer = bench.ears.final(wanted)
-        ended = answer["state"]
+        ended = bench.ears.final(wanted)["state"]
         bench.stop()  # all answers have been given by now
         assert len(bench.finals(wanted)) == 1
         assert bench.ears.states(wanted)[:2] == ["accepted", "running"]
         # one that has nothing to do (to stand straight when it does) may be quicker than its cancel
-        # and one that finds nothing, such as a face to look at, may say so before its cancel comes
-        said_why = ended == "failed" and bool(answer["error"])
-        assert ended == "succeeded" or said_why or (ended == "canceled" and action.cancellable), action.name
+        assert ended == "succeeded" or (ended == "canceled" and action.cancellable), action.name
         canceled += [action.name] * (ended == "canceled")
     assert canceled
 
