@@ -33,18 +33,37 @@ class Output:
         """Lines that may be of the protocol, until the pipe's end."""
         held = b""
         while chunk := self._read():
-            *lines, held = (held + chunk).split(b"\n")
-            for line in lines:
-                if line.startswith(MARK) and len(line) <= LONGEST_LINE:
-                    self._rest(lines=1)
-                    yield line
-                elif line:
-                    self.strange_bytes += len(line) + 1
+            whole, end, held = (held + chunk).rpartition(b"\n")
+            yield from self._protocol(whole + end)
             if len(held) > LONGEST_LINE:  # no end of line for a long time: it is none of ours
                 self.strange_bytes += len(held)
                 held = b"-"  # and neither is its end
             self._rest(read=len(chunk))
         self.strange_bytes += len(held)
+
+    def _protocol(self, whole: bytes) -> Iterator[bytes]:
+        """The lines of the protocol in whole lines. The others are skipped in one piece, not looked at.
+
+        A loop over a flood of short lines would keep the interpreter from the thread that stops the program.
+        """
+        at = 0
+        while at < len(whole):
+            if whole.startswith(MARK, at):
+                end = whole.index(b"\n", at)
+                if end - at <= LONGEST_LINE:
+                    self._rest(lines=1)
+                    yield whole[at:end]
+                else:
+                    self.strange_bytes += end + 1 - at
+                at = end + 1
+                continue
+            found = whole.find(b"\n" + MARK, at)
+            end = len(whole) if found < 0 else found + 1
+            strange = whole[at:end]
+            while b"\n\n" in strange:  # empty lines say nothing
+                strange = strange.replace(b"\n\n", b"\n")
+            self.strange_bytes += len(strange.lstrip(b"\n"))
+            at = end
 
     def _read(self) -> bytes:
         try:
