@@ -97,10 +97,9 @@ def wrong_for(kind: str) -> object:
 
 
 @contextmanager
-def at_its_start(kind: Kind) -> Iterator[Bench]:
+def at_its_start(kind: Kind, name: str) -> Iterator[Bench]:
     """A driver of its own, in the world as it is when the robot starts."""
     clock = FakeClock()
-    name = f"The {kind.model}"
     with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
         ears = Ears(other, name.replace(" ", "_"))
         with Driver(kind, name, node, clock=clock) as driver:
@@ -109,7 +108,7 @@ def at_its_start(kind: Kind) -> Iterator[Bench]:
 
 @pytest.fixture(scope="module", params=KINDS, ids=lambda kind: kind.model)
 def shared(request) -> Iterator[Bench]:
-    with at_its_start(request.param) as bench:
+    with at_its_start(request.param, f"The {request.param.model}") as bench:
         yield bench
 
 
@@ -190,9 +189,8 @@ def test_a_stop_that_ends_a_program_refuses_what_it_sent_before(bench) -> None:
 def test_each_action_is_answered_exactly_once_and_can_be_canceled(shared) -> None:
     canceled = []
     for action in shared.actions():
-        with at_its_start(
-            shared.kind
-        ) as bench:  # what turned the robot away would take the face from the next
+        # What turned a robot away would take the face from its next action.
+        with at_its_start(shared.kind, f"Another {shared.kind.model}") as bench:
             wanted = bench.invoke(action)
             if action.cancellable:
                 bench.running(wanted)
