@@ -42,7 +42,8 @@ class Network:
         self._robots = {robot.name: robot for robot in robots}
         self._lock = threading.RLock()
         self._calls: dict[str, Call] = {}
-        self._stops: dict[str, str] = {}  # stop's id -> robot
+        self._stops: dict[str, str] = {}  # stop's id -> robot, until it has answered
+        self._own_stops: set[str] = set()
         self._newest: dict[str, Message] = {}
         self._told: dict[str, list[Told]] = {}
         self._subscribed: set[str] = set()
@@ -153,6 +154,7 @@ class Network:
     def _tell_stop(self, robot: Robot) -> None:
         id = new_id("stop")
         with self._arrived:
+            self._own_stops.add(id)
             self._stops[id] = robot.name
         self._send(robot, self._command(id, "stop", robot.safe_stop.action))
 
@@ -244,13 +246,15 @@ class Network:
         if answer.get("state") not in ("succeeded", "failed"):
             return
         id = str(answer.get("id"))
+        robots = [robot.name for robot in self._robots.values() if robot.topics.answer == topic]
         with self._arrived:
-            ours = self._stops.pop(id, None) if answer["state"] == "succeeded" else self._stops.get(id)
+            ours = id in self._own_stops  # also when it is answered twice
+            if answer["state"] == "succeeded" and self._stops.get(id) in robots:
+                del self._stops[id]
             self._arrived.notify_all()
-        if ours is None and not self._ending:
-            for robot in self._robots.values():
-                if robot.topics.answer == topic:
-                    self._stopped_outside(robot.name)
+        if not ours and not self._ending:
+            for name in robots:
+                self._stopped_outside(name)
 
     def _command(
         self, id: str, op: str, action: str = "", input: Mapping[str, object] | None = None

@@ -238,13 +238,16 @@ class RobotStopper:
             except NepError:
                 continue
             if isinstance(payload, Mapping) and payload.get("op") == "stop":
-                self._answer(payload)
+                self._answer(message.topic, payload)
 
-    def _answer(self, told: Mapping[str, object]) -> None:
+    def _answer(self, topic: str, told: Mapping[str, object]) -> None:
+        """Take a robot's own answer; one that answers for another proves nothing."""
         state = told.get("state")
         with self._changed:
             asked = self._asked.get(str(told.get("id")))
             if asked is None or asked.result is not None or state not in ("succeeded", "failed"):
+                return
+            if asked.line.robot.topics.answer != topic:
                 return
             elapsed_ms = (self._clock() - asked.sent_s) * 1000
             name = asked.line.robot.name

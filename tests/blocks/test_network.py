@@ -120,6 +120,34 @@ def test_stopping_waits_for_the_answers_and_names_who_is_silent(network, pepper)
     assert outside == []
 
 
+def test_a_stop_of_a_pause_that_is_answered_twice_is_still_ours(network, pepper, node):
+    pepper.slow = {"say"}
+    outside: list[str] = []
+    network.listen(lambda: None, outside.append)
+    network._rest(pepper.described)
+    until(lambda: not network._stops)
+    (stop,) = pepper.heard("stop")
+    answer = node.new_pub("/Pepper/answer", "robot/answer")
+    for state in ("succeeded", "failed", "succeeded"):
+        answer.publish({"id": stop["id"], "op": "stop", "state": state})
+    call = network.invoke("Pepper", "say", {"text": "Hi"})
+    answer.publish({"id": call.id, "op": "invoke", "state": "running", "feedback": {"read": "all before"}})
+    until(lambda: call.feedback == {"read": "all before"})
+    assert outside == []
+
+
+def test_a_robot_that_answers_a_stop_for_another_proves_nothing(network, pepper):
+    pepper.silent = {"stop"}
+    heard = network._send
+
+    def lies(robot, command):
+        heard(robot, command)
+        network._answer("/Other/answer", {"id": command["id"], "op": command["op"], "state": "succeeded"})
+
+    network._send = lies
+    assert network.stop_robots(0.3) == ("Pepper",)
+
+
 def test_a_stop_by_somebody_else_is_noticed(network, pepper, node):
     outside: list[str] = []
     network.listen(lambda: None, outside.append)

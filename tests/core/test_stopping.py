@@ -78,6 +78,23 @@ def test_a_stop_that_failed_is_told_with_the_robots_words(stopper, robots):
     assert report.robots[0].sentence == "Pepper: the brake is stuck."
 
 
+def test_a_robot_that_answers_for_another_or_twice_proves_nothing(stopper, robots):
+    pepper, turtle = robots
+    turtle.silent = {"stop"}
+    say_ = pepper._say
+
+    def lies(command, state, error=""):
+        """Pepper answers on its own topic: first what Turtle was asked, then twice what it was asked."""
+        assert turtle.heard("stop") or turtle.changed.wait_for(lambda: turtle.heard("stop"), LONG_S)
+        for asked in (turtle.heard("stop")[0], command, command):
+            say_(asked, state, error)
+
+    pepper._say = lies
+    report = stopper.stop_all(timeout_s=0.5)
+    assert [(robot.name, robot.answered) for robot in report.robots] == [("Pepper", True), ("Turtle", False)]
+    assert (report.proven, report.silent) == (False, ("Turtle",))
+
+
 def test_robots_come_and_go(stopper, robots):
     stopper.set_robots([robots[0].described])
     assert stopper.robots == ("Pepper",)
