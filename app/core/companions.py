@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO
@@ -17,6 +18,19 @@ END_WAIT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
 """The module of each model of virtual robot."""
 TAIL_BYTES = 2000
+KNOWN_WITHIN_S = 3.0
+"""How long a start waits until it is known who is there: a robot of that name may be."""
+WISH_KEPT_S = 4.0
+"""How long a wish is kept for a robot that is there: it may have died, which is noticed within 3.3 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """A person wants a virtual robot of this model; until when that is kept (monotonic seconds)."""
+
+    model: str
+    known_until: float
+    until: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +57,18 @@ class Companions:
         self,
         address: str,
         post_event: Callable[[object], None],
-        is_there: Callable[[str], bool] = lambda _name: False,
+        is_there: Callable[[str], bool | None] = lambda _name: False,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """``address`` is the master's; failures are posted as `CompanionFailed`.
 
-        ``is_there`` tells whether a robot of a name is connected, whoever started it.
+        ``is_there`` tells whether a robot of a name is there, whoever started it; None while that is not
+        known yet. ``clock`` gives monotonic seconds.
         """
         self._address = address
         self._is_there = is_there
+        self._clock = clock
+        self._wishes: dict[str, _Wish] = {}
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
@@ -83,10 +101,27 @@ class Companions:
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
         """Start a virtual robot of that name and model.
 
-        Nothing happens when one of that name runs already, also one that another Studio started.
+        One of that name that is there is used, also one that another Studio started. The wish is kept for
+        some seconds: `follow` starts a robot as soon as it is known that there is none, or none any more.
         """
-        if not self._is_there(name):
-            self._start_robot(name, model)
+        now = self._clock()
+        self._wishes[name] = _Wish(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
+        self.follow()
+
+    def follow(self) -> None:
+        """Start the robots that were wished and are not there (called by each of the session's ticks)."""
+        if not self._wishes:
+            return
+        now = self._clock()
+        for name, wish in list(self._wishes.items()):
+            there = self._is_there(name)
+            if there is None and now >= wish.known_until:
+                there = False
+            if there is False:
+                del self._wishes[name]
+                self._start_robot(name, wish.model)
+            elif now >= wish.until:
+                del self._wishes[name]
 
     def _start_robot(self, name: str, model: str) -> None:
         with self._lock:
@@ -122,6 +157,7 @@ class Companions:
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
         """Start it anew; a process of it that still lives but hangs is killed."""
+        self._wishes.pop(name, None)
         with self._lock:
             held = self._robots.pop(name, None)
         if held is not None:
@@ -131,7 +167,8 @@ class Companions:
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
-        """End a virtual robot that was started here."""
+        """End a virtual robot that was started here; it is not wished any more."""
+        self._wishes.pop(name, None)
         with self._lock:
             held = self._robots.pop(name, None)
         if held is not None:
@@ -150,6 +187,7 @@ class Companions:
 
     def close(self) -> None:
         """End the virtual robots. The master lives on while programs that are not ours are registered."""
+        self._wishes.clear()
         for name in list(self._robots):
             self.stop_virtual_robot(name)
         self._master.close()

@@ -12,13 +12,14 @@ from app.core.heartbeat import Heartbeat
 from app.core.mailbox import Batch
 from app.core.moving import MayNotMoveError, Moving
 from app.core.rize_names import RizeNames
-from app.core.robot_link import SENDER, Invocation, Payload, RobotLink
+from app.core.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.tries import Tries
 from app.core.watches import Watch, Watches
 from app.errors import AppError, DescriptionError, RobotInputError, RobotUnknownError
 from app.robots import rize
-from app.robots.description import Robot, parse
+from app.robots.description import Robot, parse, topic_of
 from nep.errors import NepError
+from nep.message import Message
 from nep.nodes import Node
 from nep.views import GraphView
 
@@ -52,6 +53,7 @@ class Fleet:
         self.moving = moving if moving is not None else Moving()
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
+        self._told = False
         self.revision = 0
 
     @property
@@ -64,10 +66,15 @@ class Fleet:
         """Those that are there now."""
         return tuple(link for link in self._links.values() if link.connected)
 
-    def is_connected(self, name: str) -> bool:
-        """Whether a robot of this name is there now."""
+    def is_there(self, name: str) -> bool | None:
+        """Whether a robot of this name is there now, also one that has not yet told what it can do.
+
+        None while nobody has told who is there.
+        """
         link = self._links.get(name)
-        return link is not None and link.connected
+        if (link is not None and link.connected) or topic_of(name, "description") in self._descriptions:
+            return True
+        return False if self._told else None
 
     def link(self, name: str) -> RobotLink | None:
         """The robot of that name, or None."""
@@ -95,7 +102,7 @@ class Fleet:
 
         Raises RobotUnknownError.
         """
-        return self._watches.open(_sensor_topics(self._get(name).robot))
+        return self._watches.open(topics_of(self._get(name).robot))
 
     def invoke(self, name: str, action: str, input: Payload) -> Invocation:
         """Try an action.
@@ -148,6 +155,7 @@ class Fleet:
 
     def update(self, view: GraphView) -> None:
         """Take over a new graph: robots come and go."""
+        self._told = True
         there = {
             name
             for name, info in view.topics.items()
@@ -279,20 +287,9 @@ class Fleet:
             link.drawing = _mapping(state.messages[-1]) or link.drawing
 
 
-def _sensor_topics(robot: Robot) -> list[str]:
-    topics = [sensor.topic for sensor in robot.sensors if sensor.topic and not sensor.is_image]
-    topics += [event.topic for event in robot.events if event.topic]
-    if robot.topics.state is not None:
-        topics.append(robot.topics.state)
-    return list(dict.fromkeys(topics))
-
-
-def _mapping(message: object) -> Payload | None:
+def _mapping(message: Message) -> Payload | None:
     try:
-        return _object(message.payload)  # type: ignore[attr-defined]  # a Message; decoding may fail
+        value = message.payload
     except NepError:
         return None
-
-
-def _object(value: object) -> Payload | None:
     return value if isinstance(value, Mapping) else None

@@ -117,3 +117,12 @@ class RobotLink:
         if self.connected and words == "silent":
             words = "does not answer" if self.mute else self.silent or words
         return f"virtual, {words}" if self.virtual else words
+
+
+def topics_of(robot: Robot) -> list[str]:
+    """Where it tells what happens to it: its sensors, events and state, no pictures."""
+    topics = [sensor.topic for sensor in robot.sensors if sensor.topic and not sensor.is_image]
+    topics += [event.topic for event in robot.events if event.topic]
+    if robot.topics.state is not None:
+        topics.append(robot.topics.state)
+    return list(dict.fromkeys(topics))

@@ -89,7 +89,7 @@ class Session:
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
-        self.companions = Companions(self.address, self._mailbox.post_event, self.fleet.is_connected)
+        self.companions = Companions(self.address, self._mailbox.post_event, self.fleet.is_there)
         self.doctor = doctor_of(self.address, self.settings.path.parent)
         self.runs = Runs(
             self.documents,
@@ -147,6 +147,7 @@ class Session:
         self.topics.age(now, now_ns)
         self.nodes.age(now)
         self._follow_robots()
+        self.companions.follow()
         if now >= self._next_check:
             self._next_check = now + CHECK_S
             self.companions.check()

@@ -49,13 +49,18 @@ def test_both_work_both_stop_and_the_second_outlives_the_first(
     assert len(robots(first)) == 1  # the second uses the one that is there
 
     second.choose("View", "Dark")
+    (firsts,) = robots(first)
     first.process.terminate()
     assert first.process.wait(10) == 0
-    until(lambda: not robots(second), "the first one's robot has ended with it")
-    assert len(second.children("nep", "master")) == 1
+    until(lambda: firsts not in robots(second), "the first one's robot has ended with it")
+    # at once: the second may not have noticed that the robot has gone, "Pepper ready" may still stand there
     second.choose("Robots", "Use the virtual Pepper")
+    until(lambda: robots(second), "another robot comes", 40)
     second.says("Pepper ready", 40)
+    with nep.node("listener", master=second.master) as node:
+        assert node.new_sub("/Pepper/state", "json").receive(20.0).payload["moving"] is False
     assert len(robots(second)) == 1
+    assert len(second.children("nep", "master")) == 1
     second.process.terminate()
     assert second.process.wait(10) == 0
     until(lambda: not second.children("nep", "master"), "the master ends with the last Studio", 20)

@@ -1,0 +1,148 @@
+"""The wish for a virtual robot: kept while it is not known who is there, and when the one there has ended."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+import pytest
+
+from app.core import companions
+from app.core.companions import KNOWN_WITHIN_S, WISH_KEPT_S, Companions
+from app.core.fleet import Fleet
+from app.core.watches import Watches
+from nep.views import GraphView, PublisherInfo, TopicInfo
+
+
+class Process:
+    """Lives until it is told otherwise."""
+
+    def __init__(self) -> None:
+        self.alive = True
+        self.pid = 1
+
+    def poll(self) -> int | None:
+        return None if self.alive else 1
+
+    def kill(self) -> None:
+        self.alive = False
+
+    terminate = kill
+
+    def wait(self, timeout: float | None = None) -> int:  # noqa: ARG002 - as Popen's
+        return 1
+
+
+class World:
+    """A clock, who is known to be there, and the processes that were started."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 100.0
+        self.there: bool | None = False
+        self.started: list[list[str]] = []
+        self.processes: list[Process] = []
+        self.events: list[object] = []
+        monkeypatch.setattr(companions.subprocess, "Popen", self._start)
+        monkeypatch.setattr(companions.tempfile, "TemporaryFile", io.BytesIO)
+        self.companions = Companions(
+            "127.0.0.1:1", self.events.append, lambda _name: self.there, lambda: self.now
+        )
+
+    def _start(self, command: list[str], **_more: object) -> Process:
+        self.started.append(command[2:5])
+        self.processes.append(Process())
+        return self.processes[-1]
+
+    def after(self, seconds: float) -> None:
+        self.now += seconds
+        self.companions.follow()
+
+
+@pytest.fixture
+def world(monkeypatch: pytest.MonkeyPatch) -> World:
+    return World(monkeypatch)
+
+
+def test_one_that_is_not_there_is_started_at_once(world: World) -> None:
+    world.companions.start_virtual_robot("Turtle", "diffdrive")
+    assert world.started == [["app.robots.turtle", "--name", "Turtle"]]
+    world.processes[0].alive = False
+    world.after(0.1)
+    assert len(world.started) == 1  # that it ended is another matter: it is told, not started again
+
+
+def test_one_that_was_there_and_has_ended_is_started_when_that_is_noticed(world: World) -> None:
+    world.there = True
+    world.companions.start_virtual_robot()
+    world.after(WISH_KEPT_S - 1)
+    assert not world.started
+    world.there = False
+    world.after(0.03)
+    assert world.started == [["app.robots.simulated", "--name", "Pepper"]]
+    world.after(0.03)
+    assert len(world.started) == 1
+
+
+def test_the_wish_is_forgotten_when_the_one_that_is_there_stays(world: World) -> None:
+    world.there = True
+    world.companions.start_virtual_robot()
+    world.after(WISH_KEPT_S)
+    world.there = False
+    world.after(0.03)
+    assert not world.started
+
+
+def test_it_waits_until_it_is_known_who_is_there(world: World) -> None:
+    world.there = None
+    world.companions.start_virtual_robot()
+    world.after(KNOWN_WITHIN_S - 0.1)
+    assert not world.started
+    world.there = True
+    world.after(1.0)
+    assert not world.started
+
+
+def test_it_does_not_wait_any_longer_than_some_seconds(world: World) -> None:
+    world.there = None
+    world.companions.start_virtual_robot()
+    world.after(KNOWN_WITHIN_S)
+    assert len(world.started) == 1
+
+
+@pytest.mark.parametrize("end", [Companions.stop_virtual_robot, lambda some, _name: some.close()])
+def test_what_was_taken_back_is_not_wished_any_more(
+    world: World, end: Callable[[Companions, str], None]
+) -> None:
+    world.there = True
+    world.companions.start_virtual_robot()
+    end(world.companions, "Pepper")
+    world.there = False
+    world.after(0.03)
+    assert not world.started
+
+
+def test_starting_it_anew_is_no_second_wish(world: World) -> None:
+    world.there = True
+    world.companions.start_virtual_robot()
+    world.companions.restart_virtual_robot("Pepper")
+    world.there = False
+    world.processes[0].alive = False
+    world.after(0.03)
+    assert len(world.started) == 1
+
+
+def test_the_fleet_tells_who_is_there_once_it_was_told() -> None:
+    fleet = Fleet(Watches(lambda _topic: None, lambda _topic: None), lambda _what, _job: None)
+    assert fleet.is_there("Pepper") is None
+    fleet.update(GraphView(1, 1))
+    assert fleet.is_there("Pepper") is False
+    fleet.update(GraphView(1, 2, topics={"/Pepper/description": _described()}))
+    assert fleet.is_there("Pepper") is True  # it has not told yet what it can do, but it will
+    assert fleet.is_there("Turtle") is False
+    fleet.update(GraphView(1, 3))
+    assert fleet.is_there("Pepper") is False
+
+
+def _described() -> TopicInfo:
+    publisher = PublisherInfo(1, "n1", ("tcp://127.0.0.1:2",), True, 1, 100, 1, None, None, None)
+    return TopicInfo("/Pepper/description", "robot/description", "json", (publisher,))
