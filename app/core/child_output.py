@@ -36,8 +36,8 @@ class Output:
             whole, end, held = (held + chunk).rpartition(b"\n")
             yield from self._protocol(whole + end)
             if len(held) > LONGEST_LINE:  # no end of line for a long time: it is none of ours
-                self.strange_bytes += len(held)
-                held = b"-"  # and neither is its end
+                self.strange_bytes += len(held) - 1
+                held = b"-"  # stands for a byte of it: neither is its end ours
             self._rest(read=len(chunk))
         self.strange_bytes += len(held)
 

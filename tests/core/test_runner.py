@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 import psutil
 import pytest
@@ -17,12 +19,8 @@ from tests.blocks.samples import block, number, say, started, text, workspace, w
 from tests.blocks.wire_robot import WireRobot
 
 LONG_S = 15.0
-
-
-def stop_within_s() -> float:
-    """The promise is 100 ms. On a machine with more work than processors even a kill waits for its turn."""
-    return 2.0 if os.getloadavg()[0] > (os.cpu_count() or 1) else 0.1
-
+STOP_WITHIN_S = 0.1
+TRIES = 6
 
 HANGS = (sys.executable, "-c", "import time, sys; print('{}'); sys.stdout.flush(); time.sleep(60)")
 IGNORES_TEXT = """
@@ -104,6 +102,23 @@ def timed_stop(runner: Runner) -> float:
     return time.monotonic() - began
 
 
+def quickest_stop(begin: Callable[[], Runner]) -> float:
+    """How long Stop takes, at best of a few programs that `begin` starts, each of which must end.
+
+    `STOP_WITHIN_S` is promised. Other work on this computer may keep one stop waiting, hardly all of them;
+    what the product itself waits for it waits for each time.
+    """
+    best = math.inf
+    for _ in range(TRIES):
+        made = begin()
+        best = min(best, timed_stop(made))
+        assert made.pid is not None
+        assert not psutil.pid_exists(made.pid)
+        if best < STOP_WITHIN_S:
+            break
+    return best
+
+
 def program(*blocks):
     return compile_behaviour(workspace(started(*blocks)), [])
 
@@ -148,44 +163,58 @@ def test_a_running_program_can_be_paused(runner, heard, master):
     assert made.state == "paused"
     made.go_on()
     assert made.state == "running"
-    assert timed_stop(made) < stop_within_s()
+    made.stop()
     assert heard.until("ended").ok
 
 
 def test_stop_ends_an_endless_program_at_once(runner, heard, master):
-    made = runner()
-    made.start(endless(), [], master.address)
-    heard.until("running")
-    assert timed_stop(made) < stop_within_s()
-    assert not psutil.pid_exists(made.pid)
-    assert made.wait(LONG_S)
-    assert heard.events[-1].kind == "ended"
-    assert [event.kind for event in heard.events].count("ended") == 1
+    begun: list[Runner] = []
+
+    def begin() -> Runner:
+        begun.append(runner())
+        begun[-1].start(endless(), [], master.address)
+        heard.until("running", run=begun[-1].run)
+        return begun[-1]
+
+    assert quickest_stop(begin) < STOP_WITHIN_S
+    for made in begun:
+        assert made.wait(LONG_S)
+        kinds = [event.kind for event in heard.events if event.run == made.run]
+        assert kinds[-1] == "ended"
+        assert kinds.count("ended") == 1
 
 
 def test_stop_ends_one_block_that_computes_for_ever(runner, heard, master):
-    made = runner()
     power = number(9)
     for _ in range(3):
         power = block("values_arithmetic", A=number(9), SIGN="**", B=power)
-    begin = block("messages_publish", VALUE=text("now"), TOPIC="/begin")
+    first = block("messages_publish", VALUE=text("now"), TOPIC="/begin")
     with nep.node("test", master=master.address) as node:
         subscriber = node.new_sub("/begin")
-        made.start(program(begin, write(power)), [], master.address)
-        # Nothing else can be heard of it: such a number keeps all its threads from running.
-        assert subscriber.receive(LONG_S) is not None
-    assert timed_stop(made) < stop_within_s()
-    assert made.wait(LONG_S)
-    assert heard.events[-1].ok  # it was stopped: that is no failure of its own
+
+        def begin() -> Runner:
+            made = runner()
+            made.start(program(first, write(power)), [], master.address)
+            # Nothing else can be heard of it: such a number keeps all its threads from running.
+            assert subscriber.receive(LONG_S) is not None
+            return made
+
+        assert quickest_stop(begin) < STOP_WITHIN_S
+    assert heard.until("ended").ok  # it was stopped: that is no failure of its own
 
 
 @pytest.mark.parametrize("command", [HANGS, IGNORES], ids=["hangs", "ignores everything"])
 def test_a_child_that_hangs_is_killed(runner, heard, command):
-    made = runner(command)
     huge = program(*(write(text("x" * 500)) for _ in range(400)))  # far more than a pipe holds
-    made.start(huge, [], None)
-    assert timed_stop(made) < stop_within_s()
-    assert made.wait(LONG_S)
+    begun: list[Runner] = []
+
+    def begin() -> Runner:
+        begun.append(runner(command))
+        begun[-1].start(huge, [], None)
+        return begun[-1]
+
+    assert quickest_stop(begin) < STOP_WITHIN_S
+    assert begun[-1].wait(LONG_S)
     assert heard.events[-1].kind == "ended"
 
 
@@ -195,7 +224,7 @@ def test_a_child_that_crashes_is_told(runner, heard):
     ended = heard.until("ended")
     assert not ended.ok
     assert ended.text == f"The program's process was killed (signal {signal.SIGABRT.value})."
-    assert timed_stop(made) < stop_within_s()
+    assert timed_stop(made) < STOP_WITHIN_S  # there is nothing to wait for
 
 
 def test_a_child_that_fails_says_why(runner, heard):

@@ -1,0 +1,108 @@
+"""What is read of a program's process: the lines of its protocol, at a bounded rate, in a bounded space."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import tracemalloc
+from collections.abc import Callable, Iterable
+
+import pytest
+
+from app.core.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, LONGEST_LINE, REST_S, Gate, Output
+
+LINE = b'{"is": "print", "text": "x"}\n'
+
+
+class Pipe:
+    """A pipe whose chunks a test chooses."""
+
+    def __init__(self, chunks: Iterable[bytes]) -> None:
+        self.chunks = iter(chunks)
+
+    def read1(self, _size: int) -> bytes:
+        return next(self.chunks, b"")
+
+
+class Rests(threading.Event):
+    """Counts how often somebody rests, and takes no time for it."""
+
+    count, seconds = 0, 0.0
+
+    def wait(self, timeout: float | None = None) -> bool:
+        self.count += 1
+        self.seconds += timeout or 0.0
+        return False
+
+
+def output(*chunks: bytes) -> Output:
+    return Output(Pipe(chunks), Rests())  # type: ignore[arg-type]
+
+
+def test_lines_are_put_together_and_the_rest_is_counted() -> None:
+    read = output(b'{"is": "re', b'ady"}\nnoise\n\n{"is": 1}', b"\n", b"tail")
+    assert list(read) == [b'{"is": "ready"}', b'{"is": 1}']
+    assert read.strange_bytes == len("noise\n") + len("tail")
+
+
+def test_what_follows_a_line_that_was_too_long_is_none_of_ours_until_its_end() -> None:
+    long = b'{"is"' + b"x" * LONGEST_LINE
+    assert list(output(long, b"x", b'{"is": 2}\n{"is": 3}\n')) == [b'{"is": 3}']
+    assert list(output(long + b'\n{"is": 3}\n')) == [b'{"is": 3}']
+
+
+@pytest.mark.parametrize(
+    ("chunk", "lines_in_it", "count"),
+    [
+        pytest.param(b"y\n" * (CHUNK // 2), 0, 600, id="short lines of no block"),
+        pytest.param(b"x" * CHUNK, 0, 600, id="no end of a line"),
+        pytest.param(b'{"is"' + b"x" * (CHUNK - 5), 0, 600, id="a line of the protocol without an end"),
+        pytest.param(LINE * (CHUNK // len(LINE)), CHUNK // len(LINE), 120, id="lines of the protocol"),
+    ],
+)
+def test_a_flood_is_counted_to_the_byte_and_takes_no_space(
+    chunk: bytes, lines_in_it: int, count: int
+) -> None:
+    read = output(*[chunk] * count)
+    tracemalloc.start()
+    try:
+        lines = sum(1 for _ in read)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert lines == lines_in_it * count
+    assert read.strange_bytes == (0 if lines_in_it else count * len(chunk))
+    assert peak < 5 * LONGEST_LINE
+
+
+def rested(chunks: Iterable[bytes], clock: Callable[[], float]) -> Rests:
+    rests = Rests()
+    for _ in Output(Pipe(chunks), rests, clock):  # type: ignore[arg-type]
+        pass
+    return rests
+
+
+def test_after_too_much_in_a_second_it_leaves_the_processor_to_others() -> None:
+    assert rested([LINE] * LINES_PER_S, lambda: 5.0).count == 0
+    tired = rested([LINE] * (LINES_PER_S + 3), lambda: 5.0)
+    assert tired.count >= 3
+    assert tired.seconds == pytest.approx(tired.count * REST_S)
+    assert rested([b"y" * CHUNK] * (BYTES_PER_S // CHUNK), lambda: 5.0).count == 0
+    assert rested([b"y" * CHUNK] * (BYTES_PER_S // CHUNK + 3), lambda: 5.0).count >= 2
+
+
+def test_in_the_next_second_it_reads_on_without_a_rest() -> None:
+    steps = itertools.count()
+    slow = 1.0 / LINES_PER_S  # the clock goes on with each look at it: fewer lines than may come in a second
+    assert rested([LINE] * (5 * LINES_PER_S), lambda: next(steps) * slow).count == 0
+
+
+def test_the_gate_lets_through_again_after_a_second() -> None:
+    now = [0.0]
+    gate = Gate(3, lambda: now[0])
+    assert [gate.passes() for _ in range(5)] == [True, True, True, False, False]
+    assert gate.take_kept_back() == 0  # not while it is shut
+    now[0] = 1.1
+    assert gate.passes()
+    assert gate.take_kept_back() == 2
+    assert gate.take_kept_back() == 0
