@@ -80,6 +80,7 @@ def test_the_count_is_exact_also_when_the_window_was_busy(session: Session, talk
         until(lambda: "/bad" in tried and tried["/bad"].checked == sent, "all arrive while nobody ticks")
         tick_until(session, lambda: session.topics["/bad"].received == sent)
         assert bad_count(session, "/bad") == sent
+        assert f"({sent} messages)" in session.alerts.active[0].title
         assert session.topics["/bad"].shown_of == (MESSAGES_PER_TOPIC, sent)  # the ring was full, and yet
 
 
