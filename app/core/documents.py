@@ -66,6 +66,15 @@ class Documents:
         """Open an example as a new behaviour in a tab. Raises DocumentError."""
         return self._filled(lambda document: document.example(path))
 
+    def copy(self, path: Path, name: str) -> Document:
+        """Open a file as a new behaviour of another name in a tab. Raises DocumentError."""
+
+        def fill(document: Document) -> None:
+            document.example(path)
+            document.name = name
+
+        return self._filled(fill)
+
     def recover(self, unsaved: Unsaved) -> Document:
         """Put back unsaved work: into the tab that has its file, else into a tab of its own."""
         there = self.with_path(unsaved.path) if unsaved.path is not None else None

@@ -1,8 +1,15 @@
-"""What a behaviour's file said before Studio wrote over it: kept aside, so that it can be put back."""
+"""What a behaviour's file said before Studio wrote over it: kept aside, to be put back or looked at.
+
+A copy's name says of which file it is, when that was written over, and (a mark made of its path) where it is;
+its time is that of the file then.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import os
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +20,17 @@ from app.core.files import write_atomically
 from app.core.settings import home
 from app.errors import DocumentError
 
-COPIES_KEPT = 100
+COPIES_KEPT = 300
+BYTES_KEPT = 500_000_000
+OF_ONE_FILE = 30
+NEWEST = 10
+"""So many of the newest of a file stay; of the others those go first that lie close together."""
+
+_STAMP = "%Y-%m-%d %H.%M.%S"
+_NAME = re.compile(
+    r"(?P<stem>.*), before (?P<stamp>\d{4}-\d\d-\d\d \d\d\.\d\d\.\d\d)(?: (?P<mark>[0-9a-f]{8}))?(?: \d+)?"
+    + re.escape(SUFFIX)
+)
 
 Stamp = tuple[int, int]
 
@@ -39,30 +56,64 @@ def keep_earlier(
 ) -> Earlier | None:
     """Keep what the file says now; None when there is no file, or nothing in it.
 
-    The copies are in ``folder`` (default: ``earlier`` in Studio's folder), the newest hundred of them. Raises
-    DocumentError when it can't be kept.
+    The copies are in ``folder`` (default: ``earlier`` in Studio's folder), the newest 300 of them, at most 30
+    of one file. What is kept already is not kept twice. Raises DocumentError when it can't be kept.
     """
-    where = folder if folder is not None else home() / "earlier"
+    where = _folder(folder)
     if not path.is_file() or not path.stat().st_size:
         return None
     try:
-        copy = free_path(where, f"{path.stem}, before", clock())
-        write_atomically(copy, path.read_bytes())
+        data, written = path.read_bytes(), path.stat()
+        newest = next(iter(versions_of(path, where)), None)
+        if (
+            newest is not None
+            and newest.copy.stat().st_size == len(data)
+            and newest.copy.read_bytes() == data
+        ):
+            return Earlier(path, newest.copy)
+        copy = free_path(where, f"{path.stem}, before", clock(), f" {_mark(path)}")
+        write_atomically(copy, data)
+        os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
         raise DocumentError(path, f"was not saved: what it said before can't be kept ({reason})") from error
-    _drop_oldest(where)
+    with contextlib.suppress(OSError):  # another Studio was quicker
+        _thin_out(where, _mark(path))
+        _drop_oldest(where)
     return Earlier(path, copy)
 
 
-def free_path(folder: Path, name: str, now_s: float) -> Path:
-    """A behaviour's file in ``folder`` that is not there yet: its name and when."""
-    plain = "".join(c if c.isalnum() or c in " -_," else "_" for c in name).strip() or "behaviour"
-    stamp = time.strftime("%Y-%m-%d %H.%M.%S", time.localtime(now_s))
-    path = folder / f"{plain} {stamp}{SUFFIX}"
+@dataclass(frozen=True)
+class Version:
+    """One copy: of which file (its name), when that was written, and when it was written over."""
+
+    copy: Path
+    name: str
+    written_s: float
+    replaced_s: float
+    mark: str
+
+
+def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
+    """The versions of a file that are kept, the newest first."""
+    mark = _mark(path)
+    return [each for each in _newest_first(_folder(folder)) if each.mark == mark]
+
+
+def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
+    """Versions of other files of that name, the newest first: of a file that was moved here, for example."""
+    mark, stem = _mark(path), _plain(path.stem)
+    return [each for each in _newest_first(_folder(folder)) if each.mark != mark and each.name == stem]
+
+
+def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
+    """A behaviour's file in ``folder`` that is not there yet: its name, when, and a mark."""
+    stamp = time.strftime(_STAMP, time.localtime(now_s))
+    stem = f"{_plain(name)} {stamp}{mark}"
+    path = folder / f"{stem}{SUFFIX}"
     number = 2
     while path.exists():
-        path = folder / f"{plain} {stamp} {number}{SUFFIX}"
+        path = folder / f"{stem} {number}{SUFFIX}"
         number += 1
     return path
 
@@ -76,8 +127,52 @@ def stamp_of(path: Path) -> Stamp | None:
     return found.st_mtime_ns, found.st_size
 
 
+def _folder(chosen: Path | None) -> Path:
+    return chosen if chosen is not None else home() / "earlier"
+
+
+def _plain(name: str) -> str:
+    return "".join(c if c.isalnum() or c in " -_," else "_" for c in name).strip() or "behaviour"
+
+
+def _mark(path: Path) -> str:
+    """Differs for files in different places."""
+    where = os.path.normcase(path.resolve())
+    return hashlib.sha256(where.encode("utf-8", "surrogateescape")).hexdigest()[:8]
+
+
+def _newest_first(folder: Path) -> list[Version]:
+    found = [_version(copy) for copy in folder.glob(f"*{SUFFIX}")] if folder.is_dir() else []
+    known = [each for each in found if each is not None]
+    return sorted(known, key=lambda each: (each.replaced_s, each.written_s), reverse=True)
+
+
+def _version(copy: Path) -> Version | None:
+    told = _NAME.fullmatch(copy.name)
+    if told is None:
+        return None
+    try:
+        written = copy.stat().st_mtime
+        replaced = time.mktime(time.strptime(told["stamp"], _STAMP))
+    except (OSError, ValueError, OverflowError):
+        return None
+    return Version(copy, told["stem"], written, replaced, told["mark"] or "")
+
+
+def _thin_out(folder: Path, mark: str) -> None:
+    """Of a file that has too many copies, the one goes that leaves the smallest gap."""
+    found = [each for each in _newest_first(folder) if each.mark == mark]
+    while len(found) > OF_ONE_FILE:
+        gaps = {
+            place: found[place - 1].replaced_s - found[place + 1].replaced_s
+            for place in range(NEWEST, len(found) - 1)
+        }
+        found.pop(min(gaps, key=lambda place: gaps[place])).copy.unlink(missing_ok=True)
+
+
 def _drop_oldest(folder: Path) -> None:
-    with contextlib.suppress(OSError):  # another Studio was quicker
-        copies = sorted(folder.glob(f"*{SUFFIX}"), key=lambda copy: copy.stat().st_mtime_ns)
-        for copy in copies[:-COPIES_KEPT]:
-            copy.unlink(missing_ok=True)
+    left = BYTES_KEPT
+    for number, each in enumerate(_newest_first(folder)):
+        left -= each.copy.stat().st_size
+        if number and (number >= COPIES_KEPT or left < 0):
+            each.copy.unlink(missing_ok=True)

@@ -39,6 +39,7 @@ TABLE: tuple[Row, ...] = (
     Row("file.open", "File", "Open a file", "Ctrl+O", "folder-open"),
     Row("file.save", "File", "Save", "Ctrl+S", "save", above=True),
     Row("file.save_as", "File", "Save as", "Ctrl+Shift+S"),
+    Row("file.earlier", "File", "Earlier versions"),
     Row("tab.close", "File", "Close the behaviour", "Ctrl+W", "x"),
     Row("tab.reopen", "File", "Open the closed one again", "Ctrl+Shift+T", "history"),
     Row("file.forget_recent", "", "Clear the list of recent files"),

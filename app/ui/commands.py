@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from PySide6.QtCore import Qt
 
@@ -20,6 +20,12 @@ from app.ui.others_sheet import OthersSheet
 from app.ui.popup import Sheet
 from app.ui.single_window import Asked
 from app.ui.tabs import Tabs
+from nep.later import later
+
+if TYPE_CHECKING:
+    from app.ui import earlier_sheet
+else:
+    earlier_sheet = later("app.ui.earlier_sheet")
 
 PACES = {"run.full_speed": 0.0, "run.slow": 0.5, "run.very_slow": 1.5}
 ABOUT = (
@@ -69,6 +75,7 @@ class Commands:
         self.tabs = Tabs(window.session, self.files, lambda: self._show("behaviour"))
         self.habits = Habits(window, self.files)
         self._others: OthersSheet | None = None
+        self._earlier: earlier_sheet.EarlierSheet | None = None
         handlers = self._handlers() | self.tabs.handlers() | self.habits.handlers()
         self.actions = Actions(window, window.theme, handlers)
         self._asked: dict[str, Callable[[str], object]] = {
@@ -94,6 +101,7 @@ class Commands:
             "file.open": files.ask_open,
             "file.save": files.save,
             "file.save_as": files.save_as,
+            "file.earlier": lambda: files.with_newest(self._earlier_versions),
             "file.start_page": window.show_start,
             "file.quit": window.close,
             "edit.undo": lambda: self._edit("undo"),
@@ -230,6 +238,12 @@ class Commands:
             self._open_in("developer", "doctor")
         else:
             self._window.open_panel("doctor")
+
+    def _earlier_versions(self) -> None:
+        window, document = self._window, self._session.document
+        if self._earlier is None:
+            self._earlier = earlier_sheet.EarlierSheet(window.theme, window, self.files.copy, self.files.save)
+        self._earlier.show_for(document.name, document.path, document.workspace)
 
     def _ask_about_others(self) -> None:
         window = self._window

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFont, QFontMetricsF, QPainter
@@ -43,6 +43,14 @@ class EntryModel(QAbstractListModel):
         self.beginResetModel()
         self.lines = lines
         self.endResetModel()
+
+    def tell(self, id: str, note: str, reason: str) -> None:
+        """Say something else beside an entry; it stays where it is."""
+        for row, line in enumerate(self.lines):
+            if isinstance(line, Found) and line.entry.id == id:
+                told = replace(line, entry=replace(line.entry, note=note, reason=reason))
+                self.lines = [*self.lines[:row], told, *self.lines[row + 1 :]]
+                self.dataChanged.emit(self.index(row), self.index(row))
 
     def rowCount(self, parent: Index | None = None) -> int:
         return 0 if parent is not None and parent.isValid() else len(self.lines)
@@ -199,6 +207,10 @@ class EntryList(QListView):
         self._choose(next(wanted, rows[0] if rows else -1))
         if not chosen:
             self.scrollToTop()
+
+    def tell(self, id: str, note: str, reason: str = "") -> None:
+        """Say something else beside an entry."""
+        self.lines.tell(id, note, reason)
 
     @property
     def entry(self) -> Entry | None:

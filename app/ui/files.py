@@ -17,6 +17,7 @@ from app.core.session import Session
 from app.core.settings import home
 from app.errors import AppError, DocumentError, SettingsError
 from app.ui.file_dialogs import Asks
+from app.ui.file_words import sentence_of, strange_words
 
 
 @runtime_checkable
@@ -88,6 +89,15 @@ class Files:
     def example(self, path: Path) -> None:
         """Open an example as a new behaviour."""
         self.with_newest(lambda: self._show(lambda: self._documents.example(path)))
+
+    def copy(self, path: Path, name: str) -> None:
+        """Open an earlier version as a new behaviour of that name; no file is written."""
+
+        def opened() -> None:
+            self._documents.copy(path, name)
+            self._say(f"Opened {name} as a copy")
+
+        self.with_newest(lambda: self._show(opened))
 
     def recover(self, left: Sequence[Unsaved]) -> None:
         """Put back what a Studio that died left behind, each in its tab."""
@@ -176,7 +186,7 @@ class Files:
     def _save(self, path: Path | None) -> None:
         document = self._session.document
         try:
-            earlier = self._foreign(document) if path is None else None
+            earlier, words = self._kept_before(document, path)
             document.save(path)
         except AppError as error:
             self._cant_save(error)
@@ -189,14 +199,26 @@ class Files:
         if earlier is None:
             self._say(f"Saved {document.name}")
             return
-        words = f"Saved {document.name}. Another program had changed the file; what it wrote is kept."
-        self._say(words, "Open that", lambda: self.open(earlier.copy))
+        then = f"{document.name}, before"
+        self._say(f"Saved {document.name}. {words}", "Open that", lambda: self.copy(earlier.copy, then))
 
-    def _foreign(self, document: Document) -> Earlier | None:
-        """What somebody else has written into its file meanwhile. Raises DocumentError."""
-        if document.path is None or not document.changed_outside:
-            return None
-        return keep_earlier(document.path)
+    def _kept_before(self, document: Document, path: Path | None) -> tuple[Earlier | None, str]:
+        """What of others the file says that is written over, and the words for it.
+
+        Raises DocumentError when that can't be kept. What Studio itself wrote there before is kept too, if it
+        can be, without words.
+        """
+        own = document.path
+        if path is not None and (own is None or path.resolve() != own.resolve()):
+            return keep_earlier(path), "The file that was there is kept."
+        if own is not None and document.changed_outside:
+            return keep_earlier(own), "Another program had changed the file; what it wrote is kept."
+        if own is not None and document.dirty:
+            try:
+                keep_earlier(own)
+            except DocumentError as error:
+                self._session.console.add("warn", "studio", f"No earlier version: {sentence_of(error)}")
+        return None, ""
 
     def _show(self, act: Callable[[], object]) -> None:
         """Show another tab."""
@@ -245,7 +267,8 @@ class Files:
             if each.earlier is None:
                 continue
             if stamp_of(each.earlier.path) != each.stamp:
-                self._documents.open(each.earlier.copy)  # somebody wrote the file meanwhile: it stays
+                name = f"{each.earlier.path.stem}, before"
+                self._documents.copy(each.earlier.copy, name)  # somebody wrote the file meanwhile: it stays
                 continue
             there = self._documents.with_path(each.earlier.path)  # opened again before "Undo" was pressed
             each.earlier.put_back()
@@ -267,19 +290,3 @@ class Files:
         what, _, then = sentence.partition("; ")
         detail = f"{then[:1].upper()}{then[1:]}." if then else ""
         self._session.alerts.put(alert, "error", f"{what}.", detail, button=button, action=action)
-
-
-def sentence_of(error: Exception) -> str:
-    """What is wrong with a file, beginning with its name."""
-    if isinstance(error, DocumentError) and error.path is not None:
-        return f"{error.path.name} {error.reason}"
-    words = str(error)
-    return words[:1].upper() + words[1:]
-
-
-def strange_words(paths: Sequence[Path]) -> str:
-    """What is wrong with files that are no behaviours."""
-    names = [path.name or str(path) for path in paths]
-    shown = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
-    are = "is no behaviour" if len(names) == 1 else "are no behaviours"
-    return f"{shown} {are}; behaviours are files ending in {SUFFIX}"

@@ -25,7 +25,13 @@ from app.ui.widgets.menus import round_region
 SHADOW_PX = 28
 SHADOW_DOWN = 10
 EDGE = 16
+BELOW_STOP = 5
 STOP_INSET = 4  # the button keeps that much free around its body for its ring
+
+
+def stops_in(window: QWidget) -> list[StopButton]:
+    """Each Stop that can be seen in a window."""
+    return [stop for stop in window.findChildren(StopButton) if stop.isVisible() and stop.window() is window]
 
 
 class Scrim(QWidget):
@@ -47,11 +53,10 @@ class Scrim(QWidget):
             return
         self.setGeometry(window.rect())
         whole = QRegion(self.rect())
-        for stop in window.findChildren(StopButton):
-            if stop.isVisible() and stop.window() is window:
-                body = stop.size() - QSize(2 * STOP_INSET, 2 * STOP_INSET)
-                hole = round_region(body, float(stop.property("focusRadius") or 0))
-                whole -= hole.translated(stop.mapTo(window, QPoint(STOP_INSET, STOP_INSET)))
+        for stop in stops_in(window):
+            body = stop.size() - QSize(2 * STOP_INSET, 2 * STOP_INSET)
+            hole = round_region(body, float(stop.property("focusRadius") or 0))
+            whole -= hole.translated(stop.mapTo(window, QPoint(STOP_INSET, STOP_INSET)))
         self.setMask(whole)
         self.update()
 
@@ -169,14 +174,21 @@ class Overlay(QWidget):
         return parent if parent is not None else self
 
     def place(self) -> None:
-        """Go to the middle of the window, `top` below its upper edge."""
+        """Go to the middle of the window, `top` below its upper edge, or lower so that no Stop is covered."""
         window = self.window_below()
-        room = QSize(window.width() - 2 * EDGE, window.height() - self.top - 2 * EDGE)
-        size = self.wanted_size(room)
-        place = QRect(QPoint((window.width() - size.width()) // 2, self.top), size)
+        place = self._placed(self.top)
+        stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
+        covered = [stop for stop in stops if stop.intersects(place)]
+        if covered:
+            place = self._placed(max(stop.bottom() for stop in covered) + BELOW_STOP)
         if place != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
             self.setGeometry(place)
             self._scrim.cover()
+
+    def _placed(self, top: int) -> QRect:
+        window = self.window_below()
+        size = self.wanted_size(QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE))
+        return QRect(QPoint((window.width() - size.width()) // 2, top), size)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and watched is self.parentWidget():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.core import earlier
-from app.core.earlier import free_path, keep_earlier, stamp_of
+from app.core.earlier import free_path, keep_earlier, namesakes_of, stamp_of, versions_of
 from app.errors import DocumentError
 
 
@@ -89,3 +89,59 @@ def test_writing_a_file_changes_its_stamp(tmp_path: Path) -> None:
     before = stamp_of(path)
     path.write_bytes(b"12")
     assert stamp_of(path) != before
+
+
+def kept(path: Path, folder: Path, text: bytes, written_s: float, replaced_s: float) -> None:
+    """A version that was written then, and written over later."""
+    path.write_bytes(text)
+    os.utime(path, (written_s, written_s))
+    assert keep_earlier(path, folder, lambda: replaced_s) is not None
+
+
+def test_versions_are_told_newest_first_with_their_times(tmp_path: Path, folder: Path) -> None:
+    path = tmp_path / "Round.nepb"
+    kept(path, folder, b"one", 1000, 2000)
+    kept(path, folder, b"two", 2000, 3000)
+    found = versions_of(path, folder)
+    assert [each.copy.read_bytes() for each in found] == [b"two", b"one"]
+    assert [(each.written_s, each.replaced_s) for each in found] == [(2000, 3000), (1000, 2000)]
+    assert [each.name for each in found] == ["Round", "Round"]
+
+
+def test_what_is_kept_already_is_not_kept_twice(tmp_path: Path, folder: Path) -> None:
+    path = tmp_path / "Round.nepb"
+    kept(path, folder, b"one", 1000, 2000)
+    kept(path, folder, b"one", 1000, 3000)
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_files_of_one_name_in_two_places_are_told_apart(tmp_path: Path, folder: Path) -> None:
+    here, there = tmp_path / "here" / "a b.nepb", tmp_path / "there" / "a b.nepb"
+    for path in (here, there):
+        path.parent.mkdir()
+        kept(path, folder, path.parent.name.encode(), 1000, 2000)
+    (folder / "a b, before 2026-11-20 12.00.00.nepb").write_bytes(b"of an older Studio")
+    (folder / "another.nepb").write_bytes(b"no version")
+    assert [each.copy.read_bytes() for each in versions_of(here, folder)] == [b"here"]
+    others = {each.copy.read_bytes() for each in namesakes_of(here, folder)}
+    assert others == {b"there", b"of an older Studio"}
+
+
+def test_of_many_versions_the_newest_and_some_of_each_time_stay(tmp_path: Path, folder: Path) -> None:
+    path = tmp_path / "Round.nepb"
+    hour, day = 3600.0, 86400.0
+    times = [*(number * day for number in range(1, 21)), *(30 * day + number * 60 for number in range(40))]
+    for when in times:
+        kept(path, folder, str(when).encode(), when - hour, when)
+    found = [each.replaced_s for each in versions_of(path, folder)]
+    assert len(found) == earlier.OF_ONE_FILE
+    assert found[: earlier.NEWEST] == times[: -earlier.NEWEST - 1 : -1]
+    assert len(set(times[:20]) & set(found)) >= 19, "one of nearly each day"
+
+
+def test_versions_do_not_fill_the_disk(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(earlier, "BYTES_KEPT", 25)
+    path = tmp_path / "Round.nepb"
+    for number in range(4):
+        kept(path, folder, b"%010d" % number, number * 100, number * 1000)
+    assert [each.copy.read_bytes()[-1:] for each in versions_of(path, folder)] == [b"3", b"2"]

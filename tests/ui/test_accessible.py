@@ -23,7 +23,7 @@ from tests.ui.show_panels import SIZES, prepare
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Whitespace}  # Client is a painted widget of ours
-OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about")
+OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about", "file.earlier")
 
 
 def stops(root: QWidget) -> Iterator[QWidget]:

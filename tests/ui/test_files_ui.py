@@ -167,7 +167,8 @@ def test_undo_does_not_write_over_what_somebody_else_wrote(commands, window, tmp
     path.write_bytes(before + b"\n")
     press_toast(window)
     assert path.read_bytes() == before + b"\n"
-    assert names(window) == ["Mine"]  # what the copy is called inside
+    assert names(window) == ["Mine, before"]
+    assert window.session.document.path is None  # a copy: saving it writes over neither of them
     assert window.session.document.workspace == BLOCKS
 
 
@@ -193,15 +194,68 @@ def test_saving_over_what_another_program_wrote_keeps_that(commands, window, hom
     assert window.toast.text == "Saved Mine. Another program had changed the file; what it wrote is kept."
     assert [copy.read_bytes() for copy in (home / "earlier").iterdir()] == [foreign]
     press_toast(window)
-    assert b'"theirs"' in window.session.document.path.read_bytes()
+    document = window.session.document
+    assert document.workspace["blocks"]["blocks"][0]["id"] == "theirs"
+    assert (document.name, document.path) == ("Mine, before", None)
 
 
 def test_saving_twice_is_no_change_by_others(commands, window, home: Path, tmp_path) -> None:
-    commands.files.open(saved(tmp_path / "Mine.nepb"))
+    path = saved(tmp_path / "Mine.nepb")
+    said = [path.read_bytes()]
+    commands.files.open(path)
     for id in "xy":
         window.session.document.edited(changed(id))
         commands.run("file.save")
         assert window.toast.text == "Saved Mine"
+        said.append(path.read_bytes())
+        commands.run("file.save")
+    assert sorted(copy.read_bytes() for copy in (home / "earlier").iterdir()) == sorted(said[:-1])
+
+
+def test_saving_goes_on_when_earlier_versions_can_not_be_kept(commands, window, home: Path, tmp_path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    commands.files.open(path)
+    window.session.document.edited(changed("z"))
+    (home / "earlier").write_text("in the way", "utf-8")
+    commands.run("file.save")
+    assert window.toast.text == "Saved Mine"
+    assert b'"z"' in path.read_bytes()
+    assert any("can't be kept" in record.text for record in window.session.console.records)
+
+
+def test_saving_as_keeps_the_file_that_it_writes_over(
+    commands, window, answers, home: Path, tmp_path
+) -> None:
+    answers.path = saved(tmp_path / "Theirs.nepb")
+    before = answers.path.read_bytes()
+    window.session.document.edited(changed("z"))
+    commands.run("file.save_as")
+    assert window.toast.text == "Saved Theirs. The file that was there is kept."
+    assert b'"z"' in answers.path.read_bytes()
+    assert [copy.read_bytes() for copy in (home / "earlier").iterdir()] == [before]
+    press_toast(window)
+    assert (names(window), window.session.document.path) == (["Theirs", "Theirs, before"], None)
+    assert window.session.document.workspace == BLOCKS
+
+
+def test_nothing_is_written_over_that_can_not_be_kept(
+    commands, window, answers, home: Path, tmp_path
+) -> None:
+    answers.path = saved(tmp_path / "Theirs.nepb")
+    before = answers.path.read_bytes()
+    window.session.document.edited(changed("z"))
+    (home / "earlier").write_text("in the way", "utf-8")
+    commands.run("file.save_as")
+    assert answers.path.read_bytes() == before
+    assert window.session.document.dirty
+    assert window.session.alerts.active[0].button == "Save somewhere else"
+
+
+def test_saving_as_where_nothing_was_keeps_nothing(commands, window, answers, home: Path, tmp_path) -> None:
+    answers.path = tmp_path / "New.nepb"
+    window.session.document.edited(changed("z"))
+    commands.run("file.save_as")
+    assert window.toast.text == "Saved New"
     assert not (home / "earlier").exists()
 
 

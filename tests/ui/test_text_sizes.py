@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QPoint, QRect
 
 from app import resources
 from app.core.run_view import RunView
@@ -19,7 +20,7 @@ from app.ui.panels.base import PanelContext
 from app.ui.start_page import read_examples
 from app.ui.status_bar import StatusBar
 from app.ui.theme import Theme
-from app.ui.widgets import StatusItem
+from app.ui.widgets import StatusItem, StopButton
 from tests.ui.clipping import clipped, lengthen, sideways
 from tests.ui.fakes import Session as FakeSession
 from tests.ui.shell_parts import PANELS, Answers
@@ -59,7 +60,7 @@ VIEWS = (
         confirm="Turtle is still",
     ),
 )
-OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about")
+OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about", "file.earlier")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -201,6 +202,9 @@ def test_the_window_cuts_no_words(
         shown = [each for each in window.findChildren(Overlay) if each.isVisible()]
         assert len(shown) == 1
         look(name, shown[0])
+        for stop in window.findChildren(StopButton):
+            body = QRect(stop.mapTo(window, QPoint()), stop.size())
+            assert not stop.isVisible() or not body.intersects(shown[0].geometry()), f"{name} covers Stop"
         shown[0].shut()
     assert faults == []
 
