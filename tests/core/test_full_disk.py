@@ -1,4 +1,4 @@
-"""A disk that is really full: nothing that was there is lost, it is said, and all goes on once there is room."""
+"""A disk that is really full: nothing that was there is lost, it is said, and then all goes on."""
 
 from __future__ import annotations
 
