@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from html import escape
 from typing import Protocol
@@ -16,6 +17,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.button import Button, IconButton
 from app.ui.widgets.small import label
 
+FIGURES = re.compile(r"\d+")
 LEAST_HEIGHT = 52
 ICON = 20
 STEP_ICONS = {"help.doctor": "stethoscope", "robots.virtual": "bot", "file.open": "folder-open"}
@@ -66,6 +68,7 @@ class Banner(QWidget):
         self.setMinimumHeight(LEAST_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._words = ("", "")
+        self._announced = ""
         self.words = label("", "lead", wrap=True)
         self.words.setTextFormat(Qt.TextFormat.RichText)
         theme.changed.connect(self._write)
@@ -104,8 +107,10 @@ class Banner(QWidget):
         self._words = (title, detail)
         self._write()
         spoken = f"{title} {detail}".strip()
-        if spoken != self.accessibleName():
-            self.setAccessibleName(spoken)
+        self.setAccessibleName(spoken)
+        news = FIGURES.sub("", spoken)
+        if news != self._announced:  # a count that goes on is no news
+            self._announced = news
             paint.announce(self, spoken)
         for widget, text in ((self.button, button), (self.second, second)):
             widget.set_word(text or "")

@@ -127,7 +127,7 @@ def parse(data: bytes) -> Asked | None:
     """What a start asked; None for what no Studio sends."""
     try:
         content = json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     files = content.get("files") if isinstance(content, Mapping) else None
     if not isinstance(files, Sequence) or isinstance(files, str):

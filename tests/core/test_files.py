@@ -21,6 +21,17 @@ def test_it_writes_and_replaces(tmp_path: Path) -> None:
     assert [file.name for file in path.parent.iterdir()] == ["a.json"]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="Windows does not replace a file that is open")
+@pytest.mark.parametrize("durable", [True, False])
+def test_who_reads_meanwhile_reads_the_old_file_to_its_end(tmp_path: Path, durable: bool) -> None:
+    path = tmp_path / "a.json"
+    write_atomically(path, b"one", durable=durable)
+    with path.open("rb") as reader:
+        write_atomically(path, b"second", durable=durable)
+        assert reader.read() == b"one"
+    assert path.read_bytes() == b"second"
+
+
 def test_nothing_is_never_written_over_something(tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     write_atomically(path, b"one")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -42,6 +43,18 @@ def test_work_of_a_killed_process_is_offered(tmp_path: Path) -> None:
     assert unsaved.workspace == {"blocks": 1}
     assert unsaved.robots == {"Pepper": {"title": "Pepper"}}
     assert unsaved.edited_s == 123.0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows does not replace a file that is open")
+def test_a_journal_is_replaced_whole(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.write("first", None, WORKSPACE, {})
+    (file,) = tmp_path.iterdir()
+    with file.open("rb") as reader:
+        journal.write("second, which is longer", None, WORKSPACE, {})
+        assert json.loads(reader.read())["name"] == "first"
+    assert json.loads(file.read_bytes())["name"] == "second, which is longer"
+    journal.discard()
 
 
 def test_a_pid_that_another_program_got_does_not_hide_the_work(tmp_path: Path) -> None:

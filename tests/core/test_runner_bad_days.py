@@ -10,7 +10,6 @@ import time
 import psutil
 import pytest
 
-from app.core.child_output import BYTES_PER_S
 from app.core.child_process import MOST_BYTES
 from app.core.runner import EVENTS_PER_S, Runner
 from tests.core.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, quickest_stop
@@ -104,7 +103,7 @@ def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) 
     assert me.memory_info().rss - before < 60_000_000
     (told, *_) = printed(heard)
     assert told.endswith(" MB that no block wrote were left out")
-    assert 1 < float(told.split()[0]) < 2 * BYTES_PER_S / 1e6 * (seconds + 1)
+    assert 1 < float(told.split()[0]) < 40 * (seconds + 1)  # MB: at 20 a second it waits for its turn
 
 
 def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:

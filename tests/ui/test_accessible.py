@@ -168,6 +168,20 @@ def test_alerts_are_said_once(qtbot, window: MainWindow, commands: Commands, sai
     assert said == ["The camera is silent. No pictures come."]
 
 
+def test_an_alert_that_counts_on_is_no_news(qtbot, window, commands: Commands, said: list[str]) -> None:
+    alerts = window.session.alerts
+    window.show()
+    commands.run("layout.behaviour")
+    for count in (1, 2, 12):
+        alerts.put("message:/bad", "warn", f"{count} messages can't be read.")
+        window.tick()
+    assert said == ["1 messages can't be read."]
+    alerts.cure("message:/bad")
+    alerts.put("silent:/cam", "warn", "The camera has been silent for 4 s.")
+    window.tick()
+    assert said[1:] == ["The camera has been silent for 4 s."]
+
+
 def test_the_end_of_a_stop_is_said_and_no_figure(qtbot, theme: Theme, said: list[str]) -> None:
     bar = RunBar(theme)
     qtbot.addWidget(bar)

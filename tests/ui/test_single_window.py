@@ -80,7 +80,7 @@ def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
 def test_nonsense_is_no_start(qtbot, name: str) -> None:
     asked: list[Asked] = []
     meeting = Meeting(name, asked.append)
-    for data in (b"{\n", b"[]\n", b'{"files": "x"}\n', b"x" * 1_100_000):
+    for data in (b"{\n", b"[]\n", b'{"files": "x"}\n', b"[" * 200_000 + b"\n", b"x" * 1_100_000):
         socket = QLocalSocket()
         socket.connectToServer(name)
         assert socket.waitForConnected(WAIT_MS)

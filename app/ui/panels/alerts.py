@@ -28,25 +28,37 @@ class AlertRow(QWidget):
     def __init__(self, theme: Theme, alert: Alert) -> None:
         super().__init__()
         self._theme, self.alert = theme, alert
-        title = label(alert.title, "title", wrap=True)
-        detail = label(alert.detail, "body", role="textSecondary", wrap=True)
-        detail.setVisible(bool(alert.detail))
-        clock = time.localtime(alert.since_s)
-        since = f"since {clock.tm_hour}:{clock.tm_min:02d}"
-        if alert.count > 1:
-            since += f", {grouped(alert.count)} times"
+        self._lines = (
+            label("", "title", wrap=True),
+            label("", "body", role="textSecondary", wrap=True),
+            label("", "small", role="textTertiary"),
+        )
         words = QVBoxLayout()
         words.setSpacing(2)
-        for line in (title, detail, label(since, "small", role="textTertiary")):
+        for line in self._lines:
             words.addWidget(line)
-        self.button = Button(theme, alert.button or "", size="small")
-        self.button.setVisible(bool(alert.button))
+        self.button = Button(theme, "", size="small")
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._row.setContentsMargins(40, 10, 12, 10)
         self._row.setSpacing(10)
         self._row.addLayout(words, 1)
         self._row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignVCenter)
+        self.renew(alert)
+
+    def renew(self, alert: Alert) -> None:
+        """Say what is known of it now; the button stays, also under a mouse that is pressed."""
+        self.alert = alert
+        clock = time.localtime(alert.since_s)
+        since = f"since {clock.tm_hour}:{clock.tm_min:02d}"
+        if alert.count > 1:
+            since += f", {grouped(alert.count)} times"
+        for line, text in zip(self._lines, (alert.title, alert.detail, since), strict=True):
+            line.setText(text)
+            paint.show_when(line, bool(text))
+        self.button.set_word(alert.button or "")
+        paint.show_when(self.button, bool(alert.button))
         self.setAccessibleName(f"{alert.severity}: {alert.title} {alert.detail}".strip())
+        self.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -111,18 +123,28 @@ class AlertsPanel(PanelWidget):
             self._show(active)
 
     def _show(self, active: list[Alert]) -> None:
-        for row in self.rows:
+        """Rows that are there stay: an alert that counts on is the same one."""
+        known = {row.alert.id: row for row in self.rows}
+        self.rows = [known.pop(alert.id, None) or self._made(alert) for alert in active]
+        for row in known.values():
             self._column.removeWidget(row)
             row.deleteLater()
-        self.rows = [AlertRow(self.theme, alert) for alert in active]
-        for place, row in enumerate(self.rows):
-            if row.alert.action is not None:
-                row.button.clicked.connect(
-                    lambda _on=False, action=row.alert.action: self.context.run(action)
-                )
-            self._column.insertWidget(place, row)
+        for place, (row, alert) in enumerate(zip(self.rows, active, strict=True)):
+            if row.alert != alert:
+                row.renew(alert)
+            if self._column.indexOf(row) != place:
+                self._column.insertWidget(place, row)
         self.pages.setCurrentIndex(1 if active else 0)
         self.chip.set(str(len(active)) if active else "", active[0].severity if active else "ok")
+
+    def _made(self, alert: Alert) -> AlertRow:
+        row = AlertRow(self.theme, alert)
+        row.button.clicked.connect(lambda: self._next_step(row))
+        return row
+
+    def _next_step(self, row: AlertRow) -> None:
+        if row.alert.action is not None:
+            self.context.run(row.alert.action)
 
 
 PANEL = Panel("alerts", "Alerts", "bell", (), AlertsPanel)
