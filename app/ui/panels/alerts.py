@@ -125,7 +125,7 @@ class AlertsPanel(PanelWidget):
     def _show(self, active: list[Alert]) -> None:
         """Rows that are there stay: an alert that counts on is the same one."""
         known = {row.alert.id: row for row in self.rows}
-        self.rows = [known.pop(alert.id, None) or self._made(alert) for alert in active]
+        self.rows = [known.pop(each.id) if each.id in known else self._made(each) for each in active]
         for row in known.values():
             self._column.removeWidget(row)
             row.deleteLater()
