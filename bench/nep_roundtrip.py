@@ -27,33 +27,37 @@ import zmq
 from blocks import Child, Sample, cpu_s, interleaved, is_trusted, other_process, verdict
 
 import nep
+from nep.backends.native.local import is_there
 
 SIZES = (100, 1_024, 16_384, 65_536, 262_144, 1_048_576, 4_194_304, 8_388_608)
 JUDGED = 16_384
 PAGE = 4096
 
 ECHO = """
-import sys, threading, time, zmq, nep
+import os, sys, threading, time, zmq, nep
 node = nep.node("echo")
-sub, pub = node.new_sub("ping", "bytes"), node.new_pub("pong", "bytes")
-def native():
+def native(name):
+    sub, pub = node.new_sub("ping" + name, "bytes"), node.new_pub("pong" + name, "bytes")
+    threading.Thread(target=lambda: echo(sub, pub), daemon=True).start()
+def echo(sub, pub):
     while True:
         pub.publish_bytes(sub.receive().data)
-def plain(port, ports):
-    context = zmq.Context()
-    back = context.socket(zmq.PUB)
-    there = context.socket(zmq.SUB)
-    there.subscribe(b"")
-    ports.append(back.bind_to_random_port("tcp://127.0.0.1"))
-    there.connect("tcp://127.0.0.1:" + port)
+native("")
+os.environ["NEP_LOCAL"] = "0"
+native("_tcp")
+def plain(there, back):
     while True:
         back.send(there.recv(copy=False), copy=False)
-ports = []
-threading.Thread(target=native, daemon=True).start()
-threading.Thread(target=plain, args=(sys.argv[1], ports), daemon=True).start()
-while not ports:
-    time.sleep(0.01)
-print(ports[0], flush=True)
+context = zmq.Context()
+ends = []
+for end in sys.argv[1:]:
+    back, there = context.socket(zmq.PUB), context.socket(zmq.SUB)
+    there.subscribe(b"")
+    back.bind(end.rpartition(":")[0] + ":*" if end.startswith("tcp") else end + "-back")
+    ends.append(back.getsockopt_string(zmq.LAST_ENDPOINT))
+    there.connect(end)
+    threading.Thread(target=plain, args=(there, back), daemon=True).start()
+print(*ends, flush=True)
 for line in sys.stdin:
     print(time.process_time(), flush=True)
 """
@@ -62,17 +66,18 @@ Trip = Callable[[memoryview], None]
 
 
 class Plain:
-    """One pair of plain PUB and SUB sockets to the echo."""
+    """One pair of plain PUB and SUB sockets to the echo, bound to `end`."""
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]]) -> None:
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], end: str) -> None:
         self.there = context.socket(zmq.PUB)
         self.back = context.socket(zmq.SUB)
         self.back.subscribe(b"")
-        self.port = self.there.bind_to_random_port("tcp://127.0.0.1")
+        self.there.bind(end)
+        self.end = self.there.getsockopt_string(zmq.LAST_ENDPOINT)
 
-    def connect(self, port: str) -> None:
+    def connect(self, end: str) -> None:
         """Connect to the echo, and wait until both ways are there."""
-        self.back.connect(f"tcp://127.0.0.1:{port}")
+        self.back.connect(end)
         while not self.back.poll(50):
             self.there.send(b"x")
         while self.back.poll(200):
@@ -82,6 +87,27 @@ class Plain:
         """There and back."""
         self.there.send(data, copy=False)
         self.back.recv(copy=False)
+
+
+class Native:
+    """A publisher and a subscriber of `node` to the echo."""
+
+    def __init__(self, node: nep.Node, name: str) -> None:
+        self._sub = node.new_sub("pong" + name, "bytes")
+        self._pub = node.new_pub("ping" + name, "bytes")
+
+    def trip(self, data: memoryview) -> None:
+        """There and back."""
+        self._pub.publish_bytes(data)
+        if self._sub.receive(5.0) is None:
+            raise SystemExit("a message did not come back")
+
+    def close(self) -> None:
+        """Close both; nothing may have been lost."""
+        if self._sub.lost:
+            raise SystemExit(f"{self._sub.lost} messages were lost")
+        self._pub.close()
+        self._sub.close()
 
 
 def measure(trip: Trip, ask: Child, size: int, trips: int) -> Sample:
@@ -106,22 +132,28 @@ def child_s(ask: Child) -> float:
 
 def compare(variants: dict[str, Trip], ask: Child, blocks: int, trips: int, limit: int) -> int:
     """Print the median round trip of "plain" and the others' ratio to it, for each size."""
-    print(f"{'bytes':>9} {'plain ms':>9} {'plain again':>12} {'native':>7} {'CPU ms':>8} {'native CPU':>11}")
-    again, native = [], []
+    others = [name for name in variants if name != "plain"]
+    print(f"{'bytes':>9} {'plain ms':>9}", *(f"{name:>14}" for name in others), " CPU ms  native CPU")
+    ratios: dict[str, list[float]] = {name: [] for name in others}
     for size in SIZES:
         ready = {name: partial(measure, trip, ask, size, trips) for name, trip in variants.items()}
         found = interleaved(ready, blocks, limit=limit)
         plain = found["plain"]
-        a_a, ratio = (found[name].seconds / plain.seconds for name in ("plain again", "native"))
+        here = {name: found[name].seconds / plain.seconds for name in others}
         if size >= JUDGED:
-            again.append(a_a)
-            native.append(ratio)
+            for name, ratio in here.items():
+                ratios[name].append(ratio)
         cpu = found["native"].cpu_s / plain.cpu_s
-        times = f"{size:>9} {plain.seconds * 1e3:>9.3f} {a_a:>12.2f} {ratio:>7.2f}"
-        doubt = "" if is_trusted(a_a) else "  does not count"
-        print(f"{times} {plain.cpu_s * 1e3:>8.3f} {cpu:>11.2f}{doubt}", flush=True)
-    print(f"native ÷ plain, geometric mean from {JUDGED} bytes up: {mean(native):.3f}")
-    return verdict(mean(again))
+        columns = " ".join(f"{ratio:>14.2f}" for ratio in here.values())
+        doubt = "" if is_trusted(here["plain again"]) else "  does not count"
+        print(
+            f"{size:>9} {plain.seconds * 1e3:>9.3f} {columns} {plain.cpu_s * 1e3:>7.3f} {cpu:>11.2f}{doubt}",
+            flush=True,
+        )
+    print(f"÷ plain, geometric mean from {JUDGED} bytes up:")
+    for name, each in ratios.items():
+        print(f"{name:>20} {mean(each):.3f}")
+    return verdict(mean(ratios["plain again"]))
 
 
 def mean(ratios: list[float]) -> float:
@@ -139,25 +171,29 @@ def main() -> int:
     )
     arguments = parser.parse_args()
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    plain = Plain(context)
+    plain = Plain(context, "tcp://127.0.0.1:*")
+    # Where there is no such name: TCP once more.
+    local = Plain(context, f"ipc://@nep-bench-{os.getpid()}" if is_there() else "tcp://127.0.0.1:*")
     with (
         nep.master("127.0.0.1:0", learn_s=0.0) as master,
         nep.node("bench", master=master.address) as node,
-        node.new_sub("pong", "bytes") as sub,
-        node.new_pub("ping", "bytes") as pub,
-        other_process(ECHO, (str(plain.port),), master.address) as ask,
+        other_process(ECHO, (plain.end, local.end), master.address) as ask,
     ):
-        plain.connect(ask.read())
-
-        def native(data: memoryview) -> None:
-            pub.publish_bytes(data)
-            if sub.receive(5.0) is None:
-                raise SystemExit("a message did not come back")
-
-        variants: dict[str, Trip] = {"plain": plain.trip, "plain again": plain.trip, "native": native}
+        for pair, end in zip((plain, local), ask.read().split(), strict=True):
+            pair.connect(end)
+        pairs = [Native(node, "")]
+        os.environ["NEP_LOCAL"] = "0"
+        pairs.append(Native(node, "_tcp"))
+        variants: dict[str, Trip] = {
+            "plain": plain.trip,
+            "plain again": plain.trip,
+            "plain, local": local.trip,
+            "native": pairs[0].trip,
+            "native, TCP": pairs[1].trip,
+        }
         code = compare(variants, ask, arguments.blocks, arguments.trips, arguments.limit)
-        if sub.lost:
-            raise SystemExit(f"{sub.lost} messages were lost")
+        for pair in pairs:
+            pair.close()
     context.destroy(0)
     return code
 

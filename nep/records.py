@@ -20,7 +20,10 @@ class NodeRecord:
 
 @dataclass(frozen=True)
 class PublisherRecord:
-    """A publisher as its node presents it. `endpoints` is empty when nobody can connect to it directly."""
+    """A publisher as its node presents it. `endpoints` is empty when nobody can connect to it directly.
+
+    `local` says that it is bound to the name of this computer that goes with its loopback endpoint, too.
+    """
 
     id: int
     topic: str
@@ -28,6 +31,7 @@ class PublisherRecord:
     codec: str
     endpoints: tuple[str, ...] = ()
     latched: bool = False
+    local: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 r"""The native wire: parts ↔ messages. Pure functions; the specification is `docs/wire.md`.
 
 A message is three parts, or four: topic and `\0`, a header of 32 bytes, the payload, and a msgpack map when
-the header's flag says so. Beside messages three notices travel, all under a subscriber's own hello topic
+the header's flag says so. Small ones travel with the first three in one part, to subscribers whose hello says
+that they read it. Beside messages three notices travel, all under a subscriber's own hello topic
 `\xffhello/<subscriber id>/<topic>`: *echo* (topic and header: "I have seen you; my messages are counted from
 here"), *bye* (the same with the flag BYE: "nothing comes after this") and the latched message (all parts).
 """
@@ -24,6 +25,8 @@ __all__ = [
     "SUBSCRIPTION_MAX_BYTES",
     "VERSION",
     "Header",
+    "Hello",
+    "apart",
     "check_size",
     "check_topic",
     "extension_part",
@@ -35,6 +38,7 @@ __all__ = [
     "read_extension",
     "read_header",
     "topic_part",
+    "unpack_at",
     "unpack_quickly",
 ]
 
@@ -53,6 +57,8 @@ BYE = 4
 
 HELLO = b"\xffhello/"
 """How a hello filter starts. 0xff sorts behind all of UTF-8, so it is installed after the topic filter."""
+HELLO_ONE = b"\xffhello1/"
+"""The same of a subscriber that also reads messages of one part."""
 
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
 _QUICKLY = struct.Struct("<IIQQQ")  # the first three in one
@@ -88,6 +94,8 @@ pack_quickly: Callable[[int, int, int, int, int], bytes] = _QUICKLY.pack
 """The 32 bytes of (form, size, seq, stamp_ns, publisher). A size beyond `SIZE_MAX` is told as 0."""
 unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _QUICKLY.unpack
 """(form, size, seq, stamp_ns, publisher) of a header, unchecked. Raises `struct.error`."""
+unpack_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _QUICKLY.unpack_from
+"""The same of a header that begins at an offset."""
 
 
 def check_topic(topic: str) -> str:
@@ -114,20 +122,29 @@ def topic_part(topic: str) -> bytes:
     return topic.encode("utf-8") + b"\0"
 
 
-def hello_part(subscriber: int, topic: str) -> bytes:
+class Hello(NamedTuple):
+    """What a hello filter says: who subscribes to what, and whether messages may come to it in one part."""
+
+    subscriber: int
+    topic: str
+    one_part: bool
+
+
+def hello_part(subscriber: int, topic: str, *, one_part: bool = False) -> bytes:
     """The hello filter of a subscriber, and the first part of what is sent to it alone."""
-    return HELLO + f"{subscriber:016x}/{topic}".encode()
+    return (HELLO_ONE if one_part else HELLO) + f"{subscriber:016x}/{topic}".encode()
 
 
-def parse_hello(part: bytes) -> tuple[int, str] | None:
-    """(subscriber id, topic) of a hello filter; None for anything else."""
-    if not part.startswith(HELLO):
+def parse_hello(part: bytes) -> Hello | None:
+    """What a hello filter says; None for anything else."""
+    one_part = part.startswith(HELLO_ONE)
+    if not one_part and not part.startswith(HELLO):
         return None
-    digits, slash, topic = part[len(HELLO) :].partition(b"/")
+    digits, slash, topic = part[len(HELLO_ONE if one_part else HELLO) :].partition(b"/")
     try:
         if len(digits) != 16 or not slash:
             return None
-        return int(digits, 16), topic.decode("utf-8")
+        return Hello(int(digits, 16), topic.decode("utf-8"), one_part)
     except ValueError:
         return None
 
@@ -180,6 +197,14 @@ def join(
     return topic_part(topic), flagged.pack(), payload, extension_part(extension)
 
 
+def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
+    """Topic, header and payload of a message in one part. Raises `WireError` when it is too short."""
+    cut = part.find(b"\0") + 1
+    if not cut or len(part) < cut + HEADER_BYTES:
+        raise WireError("a message has 3 or 4 parts, this one has 1", len(part))
+    return part[:cut], part[cut : cut + HEADER_BYTES], part[cut + HEADER_BYTES :]
+
+
 class Parts(NamedTuple):
     """A message as read from its parts."""
 
@@ -191,6 +216,8 @@ class Parts(NamedTuple):
 
 def split(parts: Sequence[bytes | memoryview]) -> Parts:
     """The message in `parts`. Raises `WireError` for anything that the specification does not allow."""
+    if len(parts) == 1:
+        parts = apart(bytes(parts[0]))
     if len(parts) < 3:
         raise WireError(f"a message has 3 or 4 parts, this one has {len(parts)}")
     name = bytes(parts[0])

@@ -67,7 +67,7 @@ class ZeromqCarrier:
             endpoints = outlet.move(link.hosts)
         self._hold(outlet)
         record = PublisherRecord(
-            spec.id, spec.topic, spec.msg_type, spec.codec.name, endpoints, spec.is_latched
+            spec.id, spec.topic, spec.msg_type, spec.codec.name, endpoints, spec.is_latched, outlet.is_local
         )
         try:
             reply = link.add_publisher(record, outlet, spec.wait_s)

@@ -46,7 +46,9 @@ HEADERS = st.builds(
     st.sampled_from([0, 3, 4, 1000, 2**32 - 1]),
 ).map(wire.Header.pack)
 PARTS = st.binary(max_size=40) | HEADERS | HEADERS.map(lambda head: head[:-1]) | HUGE | st.just(TOPIC)
-BAD = st.lists(PARTS, min_size=0, max_size=4).map(lambda parts: [TOPIC, *parts])
+BAD = st.lists(PARTS, min_size=0, max_size=4).map(lambda parts: [TOPIC, *parts]) | st.lists(
+    PARTS, min_size=0, max_size=3
+).map(lambda parts: [b"".join([TOPIC, *parts])])
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +76,12 @@ class Rogue:
         self.port = self.socket.bind_to_random_port("tcp://127.0.0.1")
         self.seqs = itertools.count(1)
 
-    def good(self, told: bool = True) -> bytes:
-        """Send a good message; its payload."""
+    def good(self, told: bool = True, one: bool = False) -> bytes:
+        """Send a good message, perhaps in one part; its payload."""
         payload = b"good %d" % next(self.seqs)
         head = wire.Header(3, 0, int(payload[5:]), 0, 42, len(payload) if told else 0)
-        self.socket.send_multipart([TOPIC, head.pack(), payload])
+        parts = [TOPIC, head.pack(), payload]
+        self.socket.send_multipart([b"".join(parts)] if one else parts)
         return payload
 
 
@@ -98,15 +101,15 @@ def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
         sub = node.new_sub("bad", "bytes", node.direct(port=rogue.port, mode="one2many", wire="native"))
 
         @FEW
-        @given(st.lists(BAD, min_size=1, max_size=4), st.booleans())
-        def attack(messages: list[list[bytes]], told: bool) -> None:
+        @given(st.lists(BAD, min_size=1, max_size=4), st.booleans(), st.booleans())
+        def attack(messages: list[list[bytes]], told: bool, one: bool) -> None:
             refused = sub.refused
             expected = [rogue.good()]
             bad = 0
             for parts in messages:
                 rogue.socket.send_multipart(parts)
                 bad += not is_message(parts)
-                expected.append(rogue.good(told))
+                expected.append(rogue.good(told, one))
             heard = []
             while len(heard) < len(expected):
                 message = sub.receive(5.0)

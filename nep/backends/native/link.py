@@ -14,6 +14,7 @@ from nep.addresses import is_loopback
 from nep.backends.native.calls import Calls
 from nep.backends.native.inlet import NativeInlet
 from nep.backends.native.io import IoThread, Rest
+from nep.backends.native.local import quickest
 from nep.backends.native.outlet import NativeOutlet
 from nep.backends.native.sockets import LOOPBACK, Socket, host_towards
 from nep.errors import AddressInUseError, ClosedError, MasterUnreachable, RequestRefusedError
@@ -101,7 +102,8 @@ class MasterLink:
         endpoints = outlet.move(self.hosts)
         if endpoints == record.endpoints or not endpoints:
             return added
-        return self.add_publisher(replace(record, endpoints=endpoints), outlet, wait_s)
+        moved = replace(record, endpoints=endpoints, local=outlet.is_local)
+        return self.add_publisher(moved, outlet, wait_s)
 
     def add_subscriber(self, record: SubscriberRecord, inlet: NativeInlet, wait_s: float | None) -> Found:
         """Register; the publishers to connect to. Raises as `Calls.ask` does."""
@@ -195,7 +197,7 @@ class MasterLink:
                 if not is_elsewhere and not outlet.wants_ports:
                     continue
                 try:
-                    moved = replace(record, endpoints=outlet.move(self.hosts))
+                    moved = replace(record, endpoints=outlet.move(self.hosts), local=outlet.is_local)
                 except AddressInUseError:
                     self._moved_to = ()  # tried again with the next renewal
                     continue
@@ -210,9 +212,11 @@ class MasterLink:
 
     def _near(self, remote: RemotePublisher) -> RemotePublisher:
         endpoints = remote.publisher.endpoints
-        if not endpoints or (self._is_near and len(endpoints) == 1):
+        if not endpoints:
             return remote
         chosen = nearest(endpoints, self.address)
+        if self._is_near:
+            chosen = quickest(remote.publisher, chosen)
         return replace(remote, publisher=replace(remote.publisher, endpoints=(chosen,) if chosen else ()))
 
     def _obey(self, answer: Reply | Push, now: float) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 import zmq
 
 from nep.backends.base import PublisherSpec
+from nep.backends.native.audience import Audience
 from nep.backends.native.io import Rest, Served
 from nep.backends.native.places import Places
 from nep.backends.native.refusals import Refusals
@@ -27,9 +28,7 @@ from nep.wire import (
     SIZE_MAX,
     extension_part,
     form_of,
-    hello_part,
     pack_quickly,
-    parse_hello,
     topic_part,
 )
 from nep.wire import EXTENSION as EXTENSION_FLAG
@@ -44,6 +43,8 @@ _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
 
 _NO_COPY_BYTES = 65_536
+_ONE_PART_BYTES = 16_384
+"""Smaller messages go out in one part where all who subscribe read that: see docs/adr/0009-one-part.md."""
 _LOOK_NS = 500_000
 """Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
 after it, because sending may have swallowed the descriptor's signal."""
@@ -65,7 +66,6 @@ class NativeOutlet:
         self.count = 0
         self.subscribers = 0
         """How many said hello and have not gone."""
-        self.refusals = Refusals()
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
@@ -74,7 +74,8 @@ class NativeOutlet:
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
         self._bytes = 0
         self._last_stamp_ns: int | None = None
-        self._seen: dict[int, int] = {}
+        self._audience = Audience(spec.topic)
+        self._seen, self._apart = self._audience.seen, self._audience.apart
         self._names: dict[int, str] = {}
         self._waited: set[int] = set()
         self._latched: tuple[Part, ...] | None = None
@@ -136,6 +137,16 @@ class NativeOutlet:
             return endpoints
 
     @property
+    def refusals(self) -> Refusals:
+        """What was sent to it and is no subscription."""
+        return self._audience.refusals
+
+    @property
+    def is_local(self) -> bool:
+        """Whether programs of this computer reach it without TCP: see `local`."""
+        return self._places.is_local
+
+    @property
     def wants_ports(self) -> bool:
         """Whether to `move`, though to the same addresses: see `SendMark`."""
         return self._mark.is_lowered
@@ -158,9 +169,10 @@ class NativeOutlet:
         """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed."""
         data: Part
         data, beside = encoded
-        if type(data) is not bytes:
+        extension = None
+        if beside or type(data) is not bytes:
             data = sendable(data)
-        extension = extension_part(beside) if beside else None
+            extension = extension_part(beside) if beside else None
         size = len(data)
         with self._lock:
             if self._is_closed:
@@ -172,6 +184,9 @@ class NativeOutlet:
             self._last_stamp_ns = stamp_ns = _time_ns()
             if extension or self._flags:
                 self._send_all(data, extension)
+            elif size < _ONE_PART_BYTES and not self._apart:
+                head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
+                self._send(b"".join((self._topic, head, data)))
             else:
                 send = self._send
                 send(self._topic, _SNDMORE)
@@ -221,30 +236,15 @@ class NativeOutlet:
     def _read_subscriptions(self) -> None:
         """With the lock held: until the socket has nothing more."""
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
-            event = self._socket.recv(zmq.DONTWAIT)
-            hello = parse_hello(event[1:])
-            if hello is None and event[1:] != self._topic:
-                self._refuse(event)
-            if hello is None or hello[1] != self.spec.topic:
-                continue  # a topic filter, or a subscriber of whoever had this port before
-            if event[0] == 1:
-                self._greet(hello[0])
-            else:
-                self._seen.pop(hello[0], None)
-                self.subscribers = len(self._seen)
+            own = self._audience.note(self._socket.recv(zmq.DONTWAIT), self.count)
+            # First: whoever gets the echo may rely on being counted.
+            self.subscribers = len(self._seen)
+            if own is not None:
+                self._greet(own)
             self._changed.notify_all()
 
-    def _refuse(self, event: bytes) -> None:
-        """Nobody of ours sends that; other programs' filters are harmless."""
-        if self.refusals.add(f"{len(event)} bytes that are no subscription of it"):
-            _logger.info("'%s' was sent %s", self.spec.topic, self.refusals.told())
-
-    def _greet(self, subscriber: int) -> None:
+    def _greet(self, own: bytes) -> None:
         """What was latched, then the echo: from here on the subscriber counts."""
-        own = hello_part(subscriber, self.spec.topic)
-        # First: whoever gets the echo may rely on being counted.
-        self._seen[subscriber] = self.count
-        self.subscribers = len(self._seen)
         if self._latched is not None:
             self._send_parts(own, self._latched)
         self._send_parts(own, (self._notice(0),))
@@ -279,6 +279,7 @@ class NativeOutlet:
                     most,
                 )
                 self._seen.clear()
+                self._audience.hellos.clear()
                 self.subscribers = 0
 
     def release(self) -> None:
@@ -289,6 +290,6 @@ class NativeOutlet:
 
     def _bye(self) -> None:
         if not self._socket.closed:
-            for subscriber in self._seen:
-                self._send_parts(hello_part(subscriber, self.spec.topic), (self._notice(BYE),))
+            for own in self._audience.hellos.values():
+                self._send_parts(own, (self._notice(BYE),))
             self._read_subscriptions()

@@ -1,4 +1,7 @@
-"""Places: the addresses of this computer at which a publisher's socket is bound, one endpoint each."""
+"""Places: the addresses of this computer at which a publisher's socket is bound, one endpoint each.
+
+Where there is one, the name beside the loopback endpoint is bound with it: see `local`.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Sequence
 
 import zmq
 
+from nep.backends.native.local import bind_beside
 from nep.backends.native.sockets import Socket, bind_free_port
 from nep.errors import AddressInUseError
 
@@ -21,6 +25,13 @@ class Places:
     def __init__(self, socket: Socket) -> None:
         self._socket = socket
         self._bound: dict[str, str] = {}
+        self._local: dict[str, str] = {}
+        """The names beside them, by host."""
+
+    @property
+    def is_local(self) -> bool:
+        """Whether it is also bound to the name beside its loopback endpoint."""
+        return bool(self._local)
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Bind at these hosts and no others, each with a port of its own; the endpoints, in their order.
@@ -34,6 +45,8 @@ class Places:
             if host not in self._bound:
                 try:
                     self._bound[host] = bind_free_port(self._socket, host)
+                    if name := bind_beside(self._socket, self._bound[host]):
+                        self._local[host] = name
                 except AddressInUseError as error:
                     problem = error
         if problem is not None and not self._bound:
@@ -43,10 +56,11 @@ class Places:
     def move_on(self) -> None:
         """Bind at other ports with the next `move`. Those that are bound stay, for whoever knows them."""
         self._bound.clear()
+        self._local.clear()
 
     def _leave(self, host: str) -> None:
-        endpoint = self._bound.pop(host)
-        try:
-            self._socket.unbind(endpoint)
-        except zmq.ZMQError as error:  # the address is gone: there was nothing to give back
-            _logger.debug("'%s' could not be unbound: %s", endpoint, error)
+        for endpoint in filter(None, (self._bound.pop(host), self._local.pop(host, ""))):
+            try:
+                self._socket.unbind(endpoint)
+            except zmq.ZMQError as error:  # the address is gone: there was nothing to give back
+                _logger.debug("'%s' could not be unbound: %s", endpoint, error)

@@ -127,7 +127,7 @@ def keep_alive(owner: Socket, endpoint: str) -> None:
     The kernel answers for a program that a debugger holds; a heartbeat of ZeroMQ would cut it off. Only for
     other computers: on this one the kernel tells of every end.
     """
-    is_far = not is_loopback(endpoint.removeprefix("tcp://"))
+    is_far = endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
     owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if is_far else -1)
     if is_far:
         owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)

@@ -27,12 +27,14 @@ from nep.wire import (
     HEADER_BYTES,
     LATCHED,
     Header,
+    apart,
     check_size,
     form_of,
     hello_part,
     read_extension,
     read_header,
     topic_part,
+    unpack_at,
     unpack_quickly,
 )
 
@@ -62,7 +64,10 @@ class SubSocket:
         self._topic_name = spec.topic
         self._msg_type = spec.msg_type
         self._topic = topic_part(spec.topic)
-        self._hello = hello_part(spec.id, spec.topic)
+        self._hello = hello_part(spec.id, spec.topic, one_part=True)
+        self._cut = len(self._topic)
+        self._body = self._cut + HEADER_BYTES
+        """Where header and payload of a message in one part begin."""
         # Nothing is told of the size, or what is as long may be the first part of the next message.
         self._doubtful = frozenset({0, len(self._topic), len(self._hello)})
         wait_shortly(socket)
@@ -121,48 +126,46 @@ class SubSocket:
         """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
 
         With `may_wait` the first is waited for. Notices are dealt with on the way. Nearly every message is
-        just the next one of its publisher and has the form of the one before: that is read here. Telling
-        whether a part is the last takes pyzmq longer than receiving it, so nobody asks: see `_carefully`.
+        just the next one of its publisher, has the form of the one before and comes in one part: that is read
+        here.
         """
-        recv, topic, find, doubtful = self._recv, self._topic, self.sources.by_id.get, self._doubtful
-        append = into.append
-        count, counted, flags, first = 0, 0, 0 if may_wait else _DONTWAIT, None
+        recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
+        cut, body = self._cut, self._body
+        count, others, flags, first = 0, 0, 0 if may_wait else _DONTWAIT, None
         try:
             while count < most and room > 0:
                 if first is None:
                     first = recv(flags)
                     flags = _DONTWAIT  # all parts of a message are there when its first is
-                head = data = None
-                if first == topic:
-                    head = recv(_DONTWAIT)
-                    if len(head) == HEADER_BYTES:
-                        form, size, seq, stamp_ns, publisher = unpack_quickly(head)
-                        source = find(publisher)
-                        if source and source.form == form and source.last == seq - 1 and size not in doubtful:
-                            data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
-                            if len(data) == size:
-                                message = new_message(Message)
-                                message.kind = source.kind
-                                message.raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
-                                message.stamp_ns = stamp_ns
-                                message.seq = source.last = seq
-                                message.publisher, message.extension = publisher, NOTHING
-                                message.decoded = UNDECODED
-                                append(message)
-                                count += 1
-                                room -= size
-                                first = None
-                                continue
-                first, other = self._carefully(first, head, data)
+                if len(first) >= body and first.startswith(topic):
+                    form, size, seq, stamp_ns, publisher = unpack_at(first, cut)
+                    source = find(publisher)
+                    if (
+                        source
+                        and source.form == form
+                        and source.last == seq - 1
+                        and len(first) == body + size
+                    ):
+                        message = new_message(Message)
+                        message.kind, message.raw = source.kind, first[body:]
+                        message.stamp_ns = stamp_ns
+                        message.seq = source.last = seq
+                        message.publisher, message.extension = publisher, NOTHING
+                        message.decoded = UNDECODED
+                        append(message)
+                        count += 1
+                        room -= size
+                        first = None
+                        continue
+                first, other = self._in_parts(first)
                 if other is not None:
                     append(other)
                     count += 1
-                    counted += 1
+                    others += 1
                     room -= other.size_bytes
         except zmq.Again:
-            if first is not None:
-                self.refusals.add(_TOO_SHORT)
-        self.sources.received += count - counted
+            pass  # nothing more
+        self.sources.received += count - others
         return count
 
     def read(self, *, may_wait: bool = False) -> Message | None:
@@ -171,44 +174,52 @@ class SubSocket:
         As `read_into` does it; a reader that waited has nothing of this in its processor's caches, so each
         line counts.
         """
-        recv = self._recv
         try:
-            first = recv(0 if may_wait else _DONTWAIT)
+            first = self._recv(0 if may_wait else _DONTWAIT)
         except zmq.Again:
             return None
+        if len(first) >= self._body and first.startswith(self._topic):
+            form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
+            source = self.sources.by_id.get(publisher)
+            if source and source.form == form and source.last == seq - 1 and len(first) == self._body + size:
+                self.sources.received += 1
+                source.last = seq
+                return arrived(source.kind, first[self._body :], stamp_ns, seq, publisher)
+        following, message = self._in_parts(first)
+        while message is None and following is not None:
+            following, message = self._in_parts(following)
+        return message or self._read_on()
+
+    def _read_on(self) -> Message | None:
+        """The next message after something that was none."""
+        one: list[Message] = []
+        return one[0] if self.read_into(one, 1, 1) else None
+
+    def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
+        """A message that begins with `first`: what comes behind it, if that was read too, and the message.
+
+        Telling whether a part is the last takes pyzmq longer than receiving it, so nobody asks: see
+        `_carefully`.
+        """
         if first != self._topic:
-            return self._read_on(first)
+            return self._carefully(first)
+        recv, data = self._recv, None
         try:
             head = recv(_DONTWAIT)
-            if len(head) != HEADER_BYTES:
-                return self._read_on(first, head)
-            form, size, seq, stamp_ns, publisher = unpack_quickly(head)
-            source = self.sources.by_id.get(publisher)
-            if not source or source.form != form or source.last != seq - 1 or size in self._doubtful:
-                return self._read_on(first, head)
-            data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
+            if len(head) == HEADER_BYTES:
+                form, size, seq, stamp_ns, publisher = unpack_quickly(head)
+                source = self.sources.by_id.get(publisher)
+                if source and source.form == form and source.last == seq - 1 and size not in self._doubtful:
+                    data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
+                    if len(data) == size:
+                        self.sources.received += 1
+                        source.last = seq
+                        raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
+                        return None, arrived(source.kind, raw, stamp_ns, seq, publisher)
         except zmq.Again:
             self.refusals.add(_TOO_SHORT)
-            return None
-        if len(data) != size:
-            return self._read_on(first, head, data)
-        self.sources.received += 1
-        message = new_message(Message)
-        message.kind = source.kind
-        message.raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
-        message.stamp_ns = stamp_ns
-        message.seq = source.last = seq
-        message.publisher, message.extension = publisher, NOTHING
-        message.decoded = UNDECODED
-        return message
-
-    def _read_on(self, first: bytes, *got: bytes | zmq.Frame | None) -> Message | None:
-        """The next message that can be understood, beginning with these parts."""
-        following, message = self._carefully(first, *got)
-        while message is None and following is not None:
-            following, message = self._carefully(following)
-        one: list[Message] = []
-        return message or (one[0] if self.read_into(one, 1, 1) else None)
+            return None, None
+        return self._carefully(first, head, data)
 
     def _carefully(self, first: bytes, *got: bytes | zmq.Frame | None) -> tuple[bytes | None, Message | None]:
         """What the parts mean that begin with `first` and go on with `got`, and perhaps with more.
@@ -243,6 +254,8 @@ class SubSocket:
 
     def _understand(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
         is_resent = first == self._hello
+        if not rest and first.startswith(self._topic):
+            first, *rest = apart(first)
         if not is_resent and first != self._topic:
             raise WireError("a message begins with something else than its topic")
         if not rest:
@@ -279,6 +292,6 @@ class SubSocket:
         source.form = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags)
         payload = rest[1]
         # A small view must not keep a large receive buffer alive.
-        is_large = isinstance(payload, memoryview) and len(payload) >= _NO_COPY_BYTES
+        is_large = len(payload) >= _NO_COPY_BYTES
         data = memoryview(payload).toreadonly() if is_large else bytes(payload)
         return arrived(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)

@@ -1,0 +1,69 @@
+"""Local: the names of this computer at which publishers are reached beside TCP's loopback.
+
+Programs of one computer exchange messages quicker through a Unix socket than through TCP, see
+docs/adr/0011-local-sockets.md. Only Linux has names for them that are no files, which somebody would have to
+clean up after a crash. A name holds the publisher's loopback port, and that belongs to no other program.
+With `NEP_LOCAL=0` publishers leave this out, for whoever wants to see the traffic with a network tool.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import sys
+
+import zmq
+
+from nep.backends.native.sockets import LOOPBACK, Socket
+from nep.records import PublisherRecord
+
+__all__ = ["bind_beside", "is_there", "local_of", "quickest"]
+
+_logger = logging.getLogger("nep")
+
+_TCP = f"tcp://{LOOPBACK}:"
+_LOCAL = "ipc://@nep-"
+_reached: set[bool] = set()
+"""Holds True once a program was reached in this way: then none is tried out any more."""
+
+
+def is_there() -> bool:
+    """Whether this computer has such names."""
+    return sys.platform == "linux" and zmq.has("ipc")
+
+
+def local_of(endpoint: str) -> str:
+    """The name beside a loopback endpoint; "" for any other."""
+    return f"{_LOCAL}{endpoint.removeprefix(_TCP)}" if endpoint.startswith(_TCP) else ""
+
+
+def bind_beside(owner: Socket, endpoint: str) -> str:
+    """Bind to the name beside a loopback endpoint; "" when it cannot be: then there is TCP."""
+    name = local_of(endpoint) if is_there() and os.environ.get("NEP_LOCAL", "") != "0" else ""
+    if name:
+        try:
+            owner.bind(name)
+        except zmq.ZMQError as error:
+            _logger.debug("'%s' could not be bound: %s", name, error)
+            return ""
+    return name
+
+
+def _is_reached(name: str) -> bool:
+    """Whether a program can be reached by this name: a sandbox may forbid it. Asked in earnest only once."""
+    if not _reached:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+            try:
+                probe.connect("\0" + name.removeprefix("ipc://@"))
+            except OSError as error:
+                _logger.debug("'%s' could not be reached: %s", name, error)
+                return False
+        _reached.add(True)
+    return True
+
+
+def quickest(publisher: PublisherRecord, endpoint: str) -> str:
+    """The name of a publisher that a program of this computer reaches at `endpoint`, or `endpoint` itself."""
+    name = local_of(endpoint) if publisher.local and is_there() else ""
+    return name if name and _is_reached(name) else endpoint

@@ -1,0 +1,110 @@
+"""Publishers of this computer are reached without TCP where there is such a way, and with it where not."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.backends.native import local
+from nep.masters import Master
+from tests.nep.programs import eventually
+
+NAMES = Path("/proc/net/unix")
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names without files")
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("near", master=master.address) as made:
+        yield made
+
+
+def endpoint(node: nep.Node, topic: str) -> str:
+    (publisher,) = node.graph().topics[topic].publishers
+    (endpoint,) = publisher.endpoints
+    return endpoint
+
+
+def ends(sub: nep.Subscriber) -> list[str]:
+    """Where a subscriber is connected."""
+    return [source.endpoint for _id, source in sub._inlet._readable.sources.items()]  # type: ignore[attr-defined]
+
+
+def is_bound(name: str) -> bool:
+    return f"@{name.removeprefix('ipc://@')}" in NAMES.read_text().split()
+
+
+@pytest.mark.parametrize("first", ["publisher", "subscriber"])
+def test_it_is_used_whoever_comes_first(node: nep.Node, first: str) -> None:
+    if first == "publisher":
+        pub = node.new_pub("t", "bytes")
+        sub = node.new_sub("t", "bytes")
+    else:
+        sub = node.new_sub("t", "bytes")
+        pub = node.new_pub("t", "bytes")
+    name = local.local_of(endpoint(node, "t"))
+    assert ends(sub) == [name]
+    pub.publish(b"first")
+    message = sub.receive(2.0)
+    assert message is not None
+    assert bytes(message.data) == b"first"
+    assert is_bound(name)
+    pub.close()
+    eventually(lambda: not is_bound(name))
+
+
+def test_a_publisher_may_leave_it_out(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NEP_LOCAL", "0")
+    pub = node.new_pub("t", "bytes")
+    sub = node.new_sub("t", "bytes")
+    assert ends(sub) == [endpoint(node, "t")]
+    assert not is_bound(local.local_of(endpoint(node, "t")))
+    pub.publish(b"first")
+    assert sub.receive(2.0) is not None
+
+
+def test_where_a_sandbox_forbids_it_there_is_tcp(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forbidden(_self: socket.socket, _address: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(local, "_reached", set())
+    pub = node.new_pub("t", "bytes")
+    with monkeypatch.context() as sandbox:
+        sandbox.setattr(socket.socket, "connect", forbidden)
+        sub = node.new_sub("t", "bytes")
+    assert ends(sub) == [endpoint(node, "t")]
+    pub.publish(b"first")
+    assert sub.receive(2.0) is not None
+
+
+def test_a_name_that_is_taken_is_left_alone(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    with contextlib.ExitStack() as taken:
+
+        def take(end: str) -> str:
+            name = f"nep-taken-{end.rpartition(':')[2]}"
+            holder = taken.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+            if not is_bound(name):
+                holder.bind(f"\0{name}")
+                holder.listen()
+            return f"ipc://@{name}"
+
+        monkeypatch.setattr(local, "local_of", take)
+        pub = node.new_pub("t", "bytes")
+        monkeypatch.undo()
+        sub = node.new_sub("t", "bytes")
+        assert ends(sub) == [endpoint(node, "t")]
+        pub.publish(b"first")
+        assert sub.receive(2.0) is not None
+
+
+def test_a_loopback_endpoint_is_the_only_one_with_a_name() -> None:
+    assert local.local_of("tcp://127.0.0.1:4711") == "ipc://@nep-4711"
+    assert local.local_of("tcp://192.168.1.20:4711") == ""
+    assert local.local_of("") == ""

@@ -1,0 +1,123 @@
+"""Small messages travel in one part to those who read that, and in three as soon as somebody else listens."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import pytest
+import zmq
+
+import nep
+from nep import wire
+from nep.masters import Master
+from tests.nep.programs import eventually
+
+Stranger = Callable[..., zmq.Socket[bytes]]
+IDS = itertools.count(1)
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("parts", master=master.address) as made:
+        yield made
+
+
+@pytest.fixture
+def stranger(node: nep.Node) -> Iterator[Stranger]:
+    """A subscriber that is no nep's: connects to the topic's publisher and sets these filters."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context.linger = 0
+    sockets = []
+
+    def made(topic: str, *filters: bytes) -> zmq.Socket[bytes]:
+        socket = context.socket(zmq.SUB)
+        sockets.append(socket)
+        for each in filters:
+            socket.subscribe(each)
+        socket.connect(node.graph().topics[topic].publishers[0].endpoints[0])
+        return socket
+
+    yield made
+    for each in sockets:
+        each.close(0)
+    context.term()
+
+
+def heard(pub: nep.Publisher, socket: zmq.Socket[bytes], payload: bytes, parts: int) -> None:
+    """Publishes until the socket hears it in so many parts."""
+
+    def comes() -> bool:
+        pub.publish(payload)
+        while socket.poll(50):
+            got = socket.recv_multipart()
+            if got[0].startswith(b"\xff"):
+                continue  # its echo
+            if wire.split(got).payload == payload and len(got) == parts:
+                return True
+        return False
+
+    eventually(comes)
+
+
+def test_whoever_says_so_gets_one_part_while_nobody_else_listens(node: nep.Node, stranger: Stranger) -> None:
+    pub = node.new_pub("t", "bytes")
+    hello = wire.hello_part(next(IDS), "t", one_part=True)
+    able = stranger("t", b"t\0", hello)
+    assert able.recv_multipart()[0] == hello  # its echo
+    heard(pub, able, b"small", 1)
+    heard(pub, able, b"x" * 100_000, 3)  # what is large is not copied together
+
+    own = wire.hello_part(next(IDS), "t")
+    other = stranger("t", b"t\0", own)
+    assert other.recv_multipart()[0] == own
+    heard(pub, other, b"for both", 3)
+    heard(pub, able, b"for both again", 3)
+    for _ in range(3):  # from its echo on it never gets what it did not ask for
+        pub.publish(b"in parts")
+    assert [len(other.recv_multipart()) for _ in range(3)] == [3, 3, 3]
+
+
+@pytest.mark.parametrize("filter_", [b"", b"t", b"t\0"], ids=["everything", "a prefix", "the topic"])
+def test_a_debugger_that_says_nothing_gets_three_parts(
+    node: nep.Node, stranger: Stranger, filter_: bytes
+) -> None:
+    pub = node.new_pub("t", "bytes")
+    sub = node.new_sub("t", "bytes")
+    debugger = stranger("t", filter_)
+    heard(pub, debugger, b"for all to read", 3)
+    message = sub.receive(2.0)
+    assert message is not None
+    assert bytes(message.data) == b"for all to read"
+    debugger.close()
+    sub.close()
+    eventually(lambda: pub.subscribers == 0)
+    hello = wire.hello_part(next(IDS), "t", one_part=True)
+    heard(pub, stranger("t", b"t\0", hello), b"one again", 1)
+
+
+def test_coming_and_going_and_other_topics_change_nothing(node: nep.Node, stranger: Stranger) -> None:
+    pub = node.new_pub("t", "bytes")
+    stays = wire.hello_part(next(IDS), "t", one_part=True)
+    able = stranger("t", b"t\0", stays)
+    heard(pub, able, b"at first", 1)
+    for _ in range(5):
+        with node.new_sub("t", "bytes"):
+            assert pub.subscribers == 2
+        eventually(lambda: pub.subscribers == 1)
+    lost = stranger("t", b"other\0", wire.hello_part(next(IDS), "other"))  # an old publisher's port
+    heard(pub, able, b"in the end", 1)
+    assert not lost.poll(50)
+
+
+@pytest.mark.parametrize("size", [0, 1, 8_191, 8_192, 16_383, 16_384, 70_000])
+def test_every_size_arrives_as_it_was(node: nep.Node, size: int) -> None:
+    sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
+    payload = bytes(range(256)) * (size // 256 + 1)
+    for data in (payload[:size], memoryview(payload)[:size], payload[:size]):
+        pub.publish_bytes(data)
+        message = sub.receive(2.0)
+        assert message is not None
+        assert message.data == payload[:size]
+        assert message.data.readonly
+    assert sub.lost == 0
