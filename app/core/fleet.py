@@ -228,7 +228,7 @@ class Fleet:
             link = self._links[robot.name] = RobotLink(robot.name, robot)
         elif link.connected and link.robot == robot:
             return
-        link.robot, link.connected = robot, True
+        link.robot, link.connected, link.gone_s = robot, True, None
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.answer])
         self._open_publisher(link)
@@ -248,7 +248,7 @@ class Fleet:
         self._submit(f"reach {link.name}", open_them)
 
     def _away(self, link: RobotLink) -> None:
-        link.connected = False
+        link.connected, link.gone_s = False, self._clock()
         self._alive.rest(link.name)
         if link.watch is not None:
             link.watch.close()

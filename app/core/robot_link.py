@@ -67,7 +67,7 @@ class RobotLink:
 
     ``values`` has the newest value of each sensor while somebody looks. ``tried`` are the last tries, the
     newest at the end. ``mute`` says that it did not answer a command; ``heard_s`` is when it last answered
-    anything.
+    anything or was asked, ``answered_s`` when it last answered, ``gone_s`` since when it is away.
     """
 
     name: str
@@ -80,6 +80,8 @@ class RobotLink:
     tried: deque[Invocation] = field(default_factory=lambda: deque(maxlen=TRIES_KEPT))
     mute: bool = False
     heard_s: float = 0.0
+    answered_s: float | None = None
+    gone_s: float | None = None
     last_stop: str | None = None
     publisher: Publisher | None = None
     world: Publisher | None = None

@@ -57,7 +57,8 @@ class Tries:
 
     def answer(self, link: RobotLink, answer: Payload) -> None:
         """Take over one of the robot's answers; those to others only say that it lives."""
-        link.heard_s, link.mute = self._clock(), False
+        link.heard_s = link.answered_s = self._clock()
+        link.mute = False
         for made in link.running:
             if made.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
                 continue

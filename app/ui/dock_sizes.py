@@ -1,7 +1,7 @@
 """How large the panels of a layout are until a person moves the lines between them.
 
-A column keeps its width and the last panel of a column its height; what a larger window gives goes to the
-others, as in the design (UI.md §2).
+A column keeps its width and the last panel of a column its height, and so does one with only panels below it
+that come later; what a larger window gives goes to the others, as in the design (UI.md §2).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def fit(bench: QMainWindow, layout: Layout, docks: Mapping[str, QDockWidget], ga
             dock = _first(docks, names)
             if dock is not None and not any(dock in bench.tabifiedDockWidgets(b) for b in before):
                 before.append(dock)
-                there.append((dock, height))
+                there.append((dock, height, set(names) <= layout.later))
         if there:
             columns.append((column.width, there))
     if not columns:
@@ -51,10 +51,10 @@ def fit(bench: QMainWindow, layout: Layout, docks: Mapping[str, QDockWidget], ga
     heads = [there[0][0] for _, there in columns]
     for _, there in columns:
         room = high - gap * (len(there) - 1)
-        heights = [height for _, height in there]
-        fixed = [place > 0 and place == len(there) - 1 for place in range(len(there))]
+        heights = [height for _, height, _ in there]
+        fixed = [place > 0 and all(late for *_, late in there[place + 1 :]) for place in range(len(there))]
         bench.resizeDocks(
-            [dock for dock, _ in there], shares(heights, room, keep=fixed), Qt.Orientation.Vertical
+            [dock for dock, *_ in there], shares(heights, room, keep=fixed), Qt.Orientation.Vertical
         )
     bench.resizeDocks(heads, shares(wanted, wide, keep=keep), Qt.Orientation.Horizontal)
 

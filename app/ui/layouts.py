@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from app.ui.panels.base import Density
 
@@ -21,6 +21,8 @@ class Layout:
     """A layout as it is at first: columns from the left; in narrow windows ``narrow`` become tabs.
 
     ``homes`` tells beside which panel another one opens, as a tab; the rest open beside the last panel.
+    ``brings`` tells which panel comes with another one when that is opened; it is ``later``: at first its row
+    is not there.
     """
 
     name: str
@@ -30,6 +32,12 @@ class Layout:
     columns: tuple[Column, ...]
     narrow: tuple[str, str]
     homes: Mapping[str, str]
+    brings: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def later(self) -> frozenset[str]:
+        """The panels whose rows are not there at first."""
+        return frozenset(self.brings.values())
 
 
 BEHAVIOUR = Layout(
@@ -39,7 +47,7 @@ BEHAVIOUR = Layout(
     "comfortable",
     (
         Column(0, ((("behaviour",), 626), (("problems",), 124))),
-        Column(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140))),
+        Column(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190))),
     ),
     ("robot", "camera"),
     {
@@ -49,7 +57,9 @@ BEHAVIOUR = Layout(
         "alerts": "problems",
         "nodes": "problems",
         "image": "camera",
+        "health": "sensors",
     },
+    {"robots": "health"},
 )
 DEVELOPER = Layout(
     "developer",
@@ -62,7 +72,7 @@ DEVELOPER = Layout(
         Column(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
     ("topics", "inspector"),
-    {"robots": "topics", "doctor": "topics", "robot": "image", "camera": "image"},
+    {"robots": "topics", "doctor": "topics", "robot": "image", "camera": "image", "health": "console"},
 )
 LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 

@@ -1,8 +1,8 @@
-"""The head of the chosen robot: its name, how it is, what it did with the last stop, and its own Stop."""
+"""The head of the chosen robot: its name, how it is, and its own Stop."""
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.ui.flow import Flow
 from app.ui.theme import Theme
@@ -19,24 +19,16 @@ class RobotHead(QWidget):
         self.name = label("", "heading")
         self.chip = Chip(theme)
         self.about = Elided("body", "textSecondary")
-        self.health = Elided("small", "textTertiary")
-        self.health.hide()
         self.finder = SearchField(theme, "Find an action")
         self.finder.setFixedWidth(FINDER_WIDTH)
         self.finder.setMinimumHeight(theme.size("control", "form"))
         self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
         self.stop.fill_icon = True
-        facts = QWidget()
-        about = QVBoxLayout(facts)
-        about.setContentsMargins(0, 0, 0, 0)
-        about.setSpacing(0)
-        about.addWidget(self.about)
-        about.addWidget(self.health)
         row = Flow(self)
         row.setContentsMargins(16, 7, 16, 8)
         row.addWidget(self.name)
         row.addWidget(self.chip)
-        row.add_elastic(facts)
+        row.add_elastic(self.about)
         row.push()
         row.addWidget(self.finder)
         row.addWidget(self.stop)

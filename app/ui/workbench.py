@@ -9,13 +9,13 @@ from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.ui import dock_state
+from app.ui.dock_places import AREA, join
 from app.ui.dock_sizes import fit
 from app.ui.docks import Dock
 from app.ui.layouts import Layout
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
 
-AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
 NARROW_PX = 1280
@@ -69,7 +69,8 @@ class Workbench(QMainWindow):
         waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
         last: Dock | None = None
         for column in self._layout.columns:
-            rows = [names for names, _height in column.rows if any(name in self._panels for name in names)]
+            rows = [names for names, _ in column.rows if any(n in self._panels for n in names)]
+            rows = [names for names in rows if not set(names) <= self._layout.later]
             head = self._put(rows[0], None, last) if rows else None
             if head is not None:
                 waiting.append((head, rows[1:]))
@@ -130,27 +131,24 @@ class Workbench(QMainWindow):
         return dock
 
     def open(self, name: str) -> Dock | None:
-        """Show a panel, in front and where it was; None when there is no such panel."""
+        """Show a panel, in front and where it was; None when there is no such panel.
+
+        The first time it brings the panel that belongs to it.
+        """
+        brought = self._layout.brings.get(name, "")
+        if brought and name not in self.docks and brought not in self.docks:
+            self.open(brought)
         dock = self._dock(name)
         if dock is None:
             return None
         if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
-            self._join(dock)
+            join(self, self._layout, self.docks, dock)
+            self._size_timer.start(0)
         dock.try_again()
         dock.show()
         dock.raise_()
         self._tabs_soon()
         return dock
-
-    def _join(self, dock: Dock) -> None:
-        """Give a panel that has no place yet one beside its home, else beside the last panel."""
-        others = [other for other in self.docks.values() if other is not dock and not other.isFloating()]
-        placed = [o for o in others if self.dockWidgetArea(o) != Qt.DockWidgetArea.NoDockWidgetArea]
-        home = self.docks.get(self._layout.homes.get(dock.description.name, ""))
-        if placed:
-            self.tabifyDockWidget(home if home in placed else placed[-1], dock)
-        else:
-            self.addDockWidget(AREA, dock)
 
     def open_names(self) -> tuple[str, ...]:
         """The panels that are open, also those behind a tab."""

@@ -199,6 +199,10 @@ class RobotLink:
     invocations: dict[str, Invocation] = field(default_factory=dict)
     tried: list[Invocation] = field(default_factory=list)
     last_stop: str | None = "answered in 41 ms, at 8:40"
+    silent: str | None = None
+    mute: bool = False
+    answered_s: float | None = None
+    gone_s: float | None = None
 
 
 class Fleet:

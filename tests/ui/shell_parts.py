@@ -19,6 +19,7 @@ NAMES = {
     "camera": ("Camera", ()),
     "image": ("Image", ("image",)),
     "sensors": ("Sensors now", ()),
+    "health": ("Health", ()),
     "topics": ("Topics", ()),
     "inspector": ("Inspector", ("*",)),
     "console": ("Console", ()),

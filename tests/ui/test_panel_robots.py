@@ -129,17 +129,10 @@ def test_later_cards_are_folded_and_say_their_values(panel) -> None:
     assert card.form.isVisibleTo(card)
 
 
-def test_stop_stops_the_chosen_robot_and_says_what_came_of_it(panel, window) -> None:
+def test_stop_stops_the_chosen_robot(panel, window) -> None:
     assert panel.stop.text() == "Stop Pepper"
-    assert panel.health.text() == "Stop answered in 41 ms, at 8:40"
     press(panel.stop)
     assert window.session.calls == [("stop_robot", "Pepper")]
-    window.session.fleet.links[0].last_stop = "not answered, at 8:41"
-    panel.refresh()
-    assert panel.health.text() == "Stop not answered, at 8:41"
-    window.session.fleet.links[0].last_stop = None
-    panel.refresh()
-    assert not panel.health.isVisible()
 
 
 def test_another_robot_can_be_chosen_and_only_it_is_looked_at(panel, window) -> None:

@@ -76,7 +76,7 @@ class RobotsPanel(PanelWidget):
         right = QVBoxLayout()
         right.setSpacing(0)
         self.head = head = RobotHead(theme)
-        self.name, self.chip, self.about, self.health = head.name, head.chip, head.about, head.health
+        self.name, self.chip, self.about = head.name, head.chip, head.about
         self.finder, self.stop = head.finder, head.stop
         self.finder.textChanged.connect(self._filter)
         self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
@@ -207,9 +207,6 @@ class RobotsPanel(PanelWidget):
         self._make_forms()
         if self._new("head", link.state, link.chip):
             self.chip.set(link.chip.removeprefix("virtual, "), STATUS.get(link.state, "ok"))
-        if self._new("health", link.name, link.last_stop):
-            self.health.setText(f"Stop {link.last_stop}" if link.last_stop else "")
-            self.health.setVisible(bool(link.last_stop))
         for name, card in self.cards.items():
             made = link.invocations.get(name)
             now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()

@@ -1,0 +1,224 @@
+"""Health: how the robot that is shown is, what is to be looked at first, and what to do about it."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.health_facts import HealthFact, facts_of
+from app.ui.icons import paint_icon
+from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.theme import Theme
+from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Scrolled, label, paint
+from app.ui.words import age_words
+
+if TYPE_CHECKING:
+    from app.core.robot_link import RobotLink
+    from app.core.watches import Watch
+
+TITLE_WIDTH = 96
+BESIDE_FROM = 300
+ROW = {"compact": 22, "comfortable": 28}
+ICON = 18
+TEXT = {"compact": "body", "comfortable": "bodyLarge"}
+
+
+class StatusIcon(QWidget):
+    """How one thing is, as an icon; words beside it say the same."""
+
+    def __init__(self, theme: Theme, height: int) -> None:
+        """``height`` of the line of words beside it."""
+        super().__init__()
+        self._theme, self._status, self._height = theme, "off", height
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    def set(self, status: str) -> None:
+        """Show another status."""
+        if status != self._status:
+            self._status = status
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(round(self._theme.scaled(ICON)), self._height)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        look, painter = self._theme.status(self._status), QPainter(self)
+        square = QRectF(0, (self.height() - self.width()) / 2, self.width(), self.width())
+        paint_icon(painter, square, look.icon, self._theme.colour(look.colour))
+        painter.end()
+
+
+class HealthRow(QWidget):
+    """Icon, title and words; the words stand below the title where there is no room beside it."""
+
+    def __init__(self, theme: Theme, density: Density) -> None:
+        super().__init__()
+        self._theme = theme
+        self.fact: HealthFact | None = None
+        self.title = label("", TEXT[density])
+        self.words = label("", TEXT[density], role="textSecondary", wrap=True)
+        line = paint.height_of(theme.font(TEXT[density]))
+        space = round(max(1.0, (theme.scaled(ROW[density]) - line) / 2))
+        self._space = space
+        self.icon = StatusIcon(theme, round(line) + 2 * space)
+        self._said = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._said.setSpacing(10)
+        self._said.addWidget(self.title, 0, Qt.AlignmentFlag.AlignTop)
+        self._said.addWidget(self.words, 1)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(16, 0, 16, 0)
+        row.setSpacing(10)
+        row.addWidget(self.icon, 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(self._said, 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        beside = self.width() >= self._theme.scaled(BESIDE_FROM)
+        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        self.title.setMinimumWidth(round(self._theme.scaled(TITLE_WIDTH)) if beside else 0)
+        space = self._space
+        self.title.setContentsMargins(0, space, 0, space if beside else 0)
+        self.words.setContentsMargins(0, space if beside else 0, 0, space)
+        self._said.setDirection(way)
+        self._said.setSpacing(10 if beside else 0)
+
+    def show_fact(self, fact: HealthFact) -> None:
+        """Show another fact, or other words of it."""
+        if fact == self.fact:
+            return
+        self.fact = fact
+        self.icon.set(fact.status)
+        self.title.setText(fact.title)
+        self.words.setText(fact.words)
+        self.setAccessibleName(fact.title)
+        self.setAccessibleDescription(fact.words)
+
+
+class HealthPanel(PanelWidget):
+    """The health of the robot that is shown."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Health")
+        self._robot = ""
+        self._revision = -1
+        self._watch: Watch | None = None
+        self._facts: tuple[HealthFact, ...] = ()
+        self.rows: list[HealthRow] = []
+        self.chip = Chip(self.theme)
+        self.chips = [self.chip]
+        self.empty = EmptyState(
+            self.theme,
+            "bot",
+            "No robot is connected",
+            "How it is stands here as soon as it is there.",
+            [
+                EmptyAction("Use the virtual robot", lambda: context.run("robots.virtual"), "bot"),
+                EmptyAction("Find out why", lambda: context.run("help.doctor"), "stethoscope"),
+            ],
+        )
+        self.step = Button(self.theme, "Start it again", "rotate-ccw", size="small")
+        self.step.clicked.connect(self._do_next_step)
+        inside = QWidget()
+        self._column = QVBoxLayout(inside)
+        self._column.setContentsMargins(0, 6, 0, 6)
+        self._column.setSpacing(0)
+        below = QHBoxLayout()
+        below.setContentsMargins(16, 6, 16, 6)
+        below.addWidget(self.step)
+        below.addStretch(1)
+        self._column.addLayout(below)
+        self._column.addStretch(1)
+        self._scroll = Scrolled(inside)
+        self._scroll.setAccessibleName("How the robot is")
+        self._scroll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(self._scroll)
+        self.pages.setMinimumSize(1, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        fleet = self.session.fleet
+        if fleet.revision != self._revision:
+            self._revision = fleet.revision
+            self._choose(fleet.shown or fleet.link(self._robot))
+        link = fleet.link(self._robot) if self._robot else None
+        if link is None:
+            self.chip.set("")
+            return
+        facts = facts_of(link, self.session.topics, time.monotonic(), _whole_age)
+        if facts != self._facts:
+            self._facts = facts
+            self._show(facts, link)
+
+    def _show(self, facts: tuple[HealthFact, ...], link: RobotLink) -> None:
+        self._make_rows(len(facts))
+        for row, fact in zip(self.rows, facts, strict=True):
+            row.show_fact(fact)
+        wrong = [fact for fact in facts if fact.to_look_at]
+        worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
+        self.chip.set(f"{len(wrong)} to look at" if wrong else "", worst)
+        self.step.setText("Start it again" if link.virtual else "Find out why")
+        self.step.setVisible(not link.connected or link.mute)
+
+    def _make_rows(self, count: int) -> None:
+        """So many rows; the button stands below the first."""
+        while len(self.rows) > count:
+            row = self.rows.pop()
+            self._column.removeWidget(row)
+            row.deleteLater()
+        while len(self.rows) < count:
+            row = HealthRow(self.theme, self.density)
+            self._column.insertWidget(len(self.rows) + 1 if self.rows else 0, row)
+            self.rows.append(row)
+
+    def _choose(self, link: RobotLink | None) -> None:
+        self.pages.setCurrentIndex(0 if link is None else 1)
+        if link is None:
+            return
+        several = len(self.session.fleet.links) > 1
+        self.set_title("Health", link.name if several else "")
+        if link.name == self._robot and self._watch is not None:
+            return
+        self.shut()
+        self._robot, self._revision = link.name, self.session.fleet.revision
+        self._watch = self.session.fleet.look_at(link.name)
+
+    def _do_next_step(self) -> None:
+        link = self.session.fleet.link(self._robot)
+        if link is not None:
+            self.context.run(f"connect:{link.name}" if link.virtual else "help.doctor")
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        self._make_rows(0)  # the next refresh makes them anew
+        self._facts = ()
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self._make_rows(0)
+        self._facts = ()
+
+    def shut(self) -> None:
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
+        self._revision = -1
+
+
+def _whole_age(age_s: float) -> str:
+    """Nobody reads tenths of a second: 1 s, 14 s, 2 min."""
+    return f"{max(1, int(age_s))} s" if age_s < 60 else age_words(age_s)
+
+
+PANEL = Panel("health", "Health", "heart", (), HealthPanel)
+"""How the robot is: what answers, what it tells of itself, how it stops."""

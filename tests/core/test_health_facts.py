@@ -1,0 +1,143 @@
+"""What Health says of one robot, fact by fact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.core.health_facts import LOW_PERCENT, HealthFact, facts_of
+from app.core.robot_link import RobotLink
+from app.core.topics import Topic
+from app.robots import rize, simulated
+from app.robots.description import Field, Sensor, parse, td_for
+
+PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
+NOW = 1000.0
+
+
+def seconds(age_s: float) -> str:
+    return f"{age_s:g} s"
+
+
+class Case:
+    """A robot that is well, with all its topics."""
+
+    def __init__(self) -> None:
+        self.link = RobotLink("Pepper", PEPPER, answered_s=NOW - 3, last_stop="answered in 41 ms, at 8:40")
+        self.link.values["battery"] = 84
+        self.topics = {
+            sensor.topic: Topic(sensor.topic, rate_hz=15.2, age_s=0.1) for sensor in PEPPER.sensors
+        }
+
+    def facts(self) -> tuple[HealthFact, ...]:
+        return facts_of(self.link, self.topics, NOW, seconds)  # type: ignore[arg-type]
+
+    def says(self, title: str) -> tuple[str, str]:
+        fact = next(fact for fact in self.facts() if fact.title == title)
+        return fact.status, fact.words
+
+    def with_sensor(self, sensor: Sensor, value: object) -> None:
+        self.link.robot = replace(PEPPER, sensors=(*PEPPER.sensors, sensor))
+        self.link.values[sensor.name] = value
+
+
+@pytest.fixture
+def case() -> Case:
+    return Case()
+
+
+def test_a_robot_that_is_well(case: Case) -> None:
+    assert [(fact.title, fact.status, fact.words) for fact in case.facts()] == [
+        ("Connection", "ok", "last answer 3 s ago"),
+        ("Battery", "ok", "84 %"),
+        ("Stop", "ok", "answered in 41 ms, at 8:40"),
+        ("Camera", "ok", "sends 15 pictures a second"),
+        ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} send"),
+        ("Left alone", "ok", "stops by itself after 1 s"),
+        ("Sign of life", "ok", f"every {PEPPER.beat_s:g} s while it works"),
+    ]
+    assert not any(fact.to_look_at for fact in case.facts())
+
+
+def test_what_is_not_known_yet_is_no_warning(case: Case) -> None:
+    case.link.answered_s = case.link.last_stop = None
+    case.link.values.clear()
+    case.topics.clear()
+    assert case.says("Connection") == ("ok", "connected; not asked yet")
+    assert case.says("Battery") == ("off", "not told yet")
+    assert case.says("Stop") == ("off", "not used yet")
+    assert case.says("Camera") == ("off", "no picture yet")
+    assert not any(fact.to_look_at for fact in case.facts())
+
+
+def test_one_that_does_not_answer_says_since_when_and_what_to_do(case: Case) -> None:
+    case.link.mute = True
+    assert case.says("Connection") == ("error", "does not answer; its last answer is 3 s old; start it again")
+    case.link.answered_s = None
+    case.link.robot = replace(PEPPER, virtual=False)
+    assert case.says("Connection") == ("error", "does not answer; check that it is on")
+
+
+def test_of_one_that_has_gone_nothing_old_is_said(case: Case) -> None:
+    case.link.connected, case.link.gone_s = False, NOW - 12
+    assert case.says("Connection") == ("warn", "gone for 12 s; start it again")
+    assert [fact.title for fact in case.facts()] == ["Connection", "Stop", "Left alone", "Sign of life"]
+
+
+def test_a_low_battery_comes_first(case: Case) -> None:
+    case.link.values["battery"] = LOW_PERCENT - 1
+    assert case.facts()[0] == HealthFact("Battery", "warn", "19 %; charge it soon")
+    case.link.values["battery"] = LOW_PERCENT
+    assert case.says("Battery") == ("ok", "20 %")
+
+
+def test_the_warmest_part_is_named(case: Case) -> None:
+    joints = Sensor(
+        "joints", "joints", "object", "/joints",
+        fields=(Field("knee", "left knee", "number", "°C"), Field("hip", "hip", "number", "°C")),
+    )  # fmt: skip
+    case.with_sensor(joints, {"knee": 44.2, "hip": 39.0})
+    assert case.says("Temperature") == ("ok", "left knee 44 °C")
+    case.link.values["joints"] = {"knee": 44.2, "hip": 61.0}
+    assert case.says("Temperature") == ("warn", "hip warm, 61 °C; let it rest")
+    case.link.values["joints"] = None
+    assert "Temperature" not in [fact.title for fact in case.facts()]
+
+
+@pytest.mark.parametrize(
+    ("last", "status"),
+    [
+        ("answered in 41 ms, at 8:40", "ok"),
+        ("not answered, at 8:41", "error"),
+        ("sent at 8:41; this robot cannot confirm", "off"),
+    ],
+)
+def test_the_last_stop(case: Case, last: str, status: str) -> None:
+    case.link.last_stop = last
+    assert case.says("Stop") == (status, last)
+
+
+def test_a_silent_camera(case: Case) -> None:
+    case.link.silent = "camera silent"
+    case.topics["/Pepper/camera"].age_s = 4.0
+    assert case.says("Camera") == ("error", "silent for 4 s")
+
+
+def test_sensors_that_tell_all_the_time_and_have_stopped(case: Case) -> None:
+    case.topics["/Pepper/distance"].age_s = 8.0
+    case.topics["/Pepper/heard_word"].age_s = 8.0  # tells only when there is something
+    assert case.says("Sensors") == ("warn", "distance silent for 8 s")
+    case.topics["/Pepper/sees_ball"].age_s = 9.0
+    assert case.says("Sensors") == ("warn", "distance and 1 more silent for 9 s")
+    case.topics["/Pepper/distance"].gone_s = case.topics["/Pepper/sees_ball"].gone_s = 1.0
+    assert case.says("Sensors")[0] == "ok"
+
+
+def test_one_of_rize_has_neither_watchdog_nor_signs_of_life(case: Case) -> None:
+    case.link.robot = rize.robot("Nao")
+    case.link.last_stop = None
+    assert case.says("Stop") == ("off", "not used yet; this robot cannot confirm")
+    assert case.says("Left alone")[0] == "off"
+    assert "Sign of life" not in [fact.title for fact in case.facts()]
+    assert not any(fact.to_look_at for fact in case.facts())

@@ -1,0 +1,148 @@
+"""Health: rows of facts, how many are to be looked at, and the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from app.ui.commands import Commands
+from app.ui.main_window import MainWindow
+from app.ui.panels.health import PANEL, HealthPanel
+from tests.ui.fakes import RobotLink, Session, pepper
+from tests.ui.panel_case import Window, press
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.fixture
+def asked(qapp) -> Window:
+    return Window(Session.full())
+
+
+@pytest.fixture
+def panel(asked: Window) -> Iterator[HealthPanel]:
+    made = asked.make(PANEL, (384, 300))
+    assert isinstance(made, HealthPanel)
+    yield made
+    made.shut()
+    made.close()
+
+
+def said(panel: HealthPanel) -> dict[str, str]:
+    return {row.title.text(): row.words.text() for row in panel.rows}
+
+
+def test_each_fact_is_a_row_and_nothing_is_to_be_looked_at(panel, asked) -> None:
+    assert said(panel)["Battery"] == "84 %"
+    assert said(panel)["Stop"] == "answered in 41 ms, at 8:40"
+    assert panel.chip.text == ""
+    assert not panel.step.isVisible()
+    assert panel.rows[0].accessibleName() == "Connection"
+    assert panel.rows[0].accessibleDescription() == panel.rows[0].words.text()
+    asked.session.fleet.links[0].last_stop = "not answered, at 8:41"
+    panel.refresh()
+    assert said(panel)["Stop"] == "not answered, at 8:41"
+
+
+def test_what_is_to_be_looked_at_is_counted_and_first(panel, asked) -> None:
+    asked.session.fleet.links[0].values["battery"] = 7
+    panel.refresh()
+    assert (panel.chip.text, panel.chip.status) == ("1 to look at", "warn")
+    assert panel.rows[0].title.text() == "Battery"
+    asked.session.fleet.links[0].mute = True
+    panel.refresh()
+    assert (panel.chip.text, panel.chip.status) == ("2 to look at", "error")
+
+
+@pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])
+def test_one_that_does_not_answer_has_a_next_step(panel, asked, virtual: bool, does: str) -> None:
+    link = asked.session.fleet.links[0]
+    link.virtual, link.mute = virtual, True
+    panel.refresh()
+    assert panel.step.isVisible()
+    assert panel.rows[0].y() < panel.step.y() < panel.rows[1].y()
+    press(panel.step)
+    assert asked.commands == [does]
+
+
+def test_without_a_robot_it_says_what_to_do(qapp) -> None:
+    asked = Window(Session())
+    panel = asked.make(PANEL, (384, 300))
+    assert panel.pages.currentWidget() is panel.empty
+    for button in panel.empty._buttons:
+        press(button)
+    assert asked.commands == ["robots.virtual", "help.doctor"]
+    asked.session.fleet.join(RobotLink("Pepper", pepper()))
+    panel.refresh()
+    assert panel.pages.currentWidget() is not panel.empty
+    panel.shut()
+
+
+def test_it_looks_at_the_robot_that_is_shown_and_names_it_when_there_are_two(panel, asked) -> None:
+    assert asked.session.fleet.looked_at == ["Pepper"]
+    assert panel.subtitle() == ""
+    asked.session.fleet.join(RobotLink("Turtle", pepper("Turtle")))
+    asked.session.fleet.choose("Turtle")
+    panel.refresh()
+    assert asked.session.fleet.looked_at == ["Turtle"]
+    assert panel.subtitle() == "Turtle"
+    panel.shut()
+    assert asked.session.fleet.looked_at == []
+
+
+def test_rows_are_made_anew_for_another_text_size(panel) -> None:
+    old = panel.rows[0]
+    panel.theme_changed()
+    panel.refresh()
+    assert panel.rows[0] is not old
+    assert len(panel.rows) == len(said(panel))
+
+
+# -- where it stands --------------------------------------------------------------------------------------
+
+
+def test_it_comes_with_robots_below_the_sensors(qtbot, window: MainWindow, commands: Commands) -> None:
+    window.show()
+    commands.run("layout.behaviour")
+    bench = window.bench
+    assert bench is not None
+    assert "health" not in bench.open_names()
+    commands.run("robots.show")
+    health, sensors, robots = (bench.docks[name] for name in ("health", "sensors", "robots"))
+    qtbot.waitUntil(lambda: abs(health.height() - 190) <= 1)
+    assert abs(sensors.height() - 140) <= 1
+    assert health.x() == sensors.x()
+    assert health.y() > sensors.y()
+    assert robots.isVisible()
+    assert not bench.tabifiedDockWidgets(health)
+
+
+def test_closed_it_stays_closed_also_after_a_restart(qtbot, window: MainWindow, commands: Commands) -> None:
+    window.show()
+    commands.run("layout.behaviour")
+    bench = window.bench
+    assert bench is not None
+    commands.run("robots.show")
+    bench.docks["health"].close()
+    bench.docks["robots"].close()
+    commands.run("robots.show")
+    assert "health" not in bench.open_names()
+    saved = bench.save()
+    for name in ("health", "robots"):
+        bench.removeDockWidget(bench.docks.pop(name))
+    assert bench.restore(saved)
+    assert "robots" in bench.open_names()
+    assert "health" not in bench.open_names()
+
+
+def test_beside_sensors_that_share_their_place_it_is_a_tab(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    window.show()
+    commands.run("layout.behaviour")
+    bench = window.bench
+    assert bench is not None
+    bench.tabifyDockWidget(bench.docks["camera"], bench.docks["sensors"])
+    commands.run("robots.show")
+    assert bench.docks["health"] in bench.tabifiedDockWidgets(bench.docks["sensors"])
