@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from app.blocks.catalogue import categories
 from app.blocks.growing import inputs_of, name_of
 from app.blocks.shaping import CALL, CALL_RESULT, PLAIN, RESULT
-from app.blocks.workspace import Placed
+from app.blocks.workspace import Placed, saved_blocks
 
 LIMIT_S = 10
 
@@ -22,12 +22,12 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
     verb, _, object_ = action.partition(":")
     made: dict[str, object] = copy.deepcopy(dict(workspace))
     if verb == "limit":
-        for block in _blocks(made):
+        for block in saved_blocks(made):
             if block.get("id") == object_ and block.get("type") == "control_wait_until":
                 _limit(block)
                 return made
     if verb == "define":
-        for block in _blocks(made):
+        for block in saved_blocks(made):
             if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
                 return _defined(made, block)
     if verb == "add":
@@ -85,19 +85,3 @@ def _can_follow(block_type: str) -> bool:
     if block_type in known:
         return known[block_type] in ("statement", "cap")
     return "_get_" not in block_type and "_when_" not in block_type
-
-
-def _blocks(workspace: Mapping[str, object]) -> Iterator[dict[str, object]]:
-    """Every block, outermost first."""
-    blocks = workspace.get("blocks")
-    waiting = list(blocks.get("blocks", ())) if isinstance(blocks, Mapping) else []
-    while waiting:
-        block = waiting.pop(0)
-        if not isinstance(block, dict):
-            continue
-        yield block
-        inputs = block.get("inputs")
-        connections = list(inputs.values()) if isinstance(inputs, Mapping) else []
-        for connection in (*connections, block.get("next")):
-            if isinstance(connection, Mapping):
-                waiting += [connection[name] for name in ("block", "shadow") if name in connection]

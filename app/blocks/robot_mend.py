@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from app.blocks.categories.robot import robot_blocks
 from app.blocks.robot_text import type_of
+from app.blocks.workspace import saved_blocks
 from app.robots.description import Robot
 
 
 def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, object], ...]:
     """Every block that names the robot, the outermost first."""
-    return tuple(block for block in _blocks(workspace) if _robot_of(block) == robot)
+    return tuple(block for block in saved_blocks(workspace) if _robot_of(block) == robot)
 
 
 def can_do(workspace: Mapping[str, object], missing: str, model: str, robot: Robot) -> bool:
@@ -42,18 +43,3 @@ def _translated(block_type: str, model: str, robot: Robot) -> str:
 def _robot_of(block: Mapping[str, object]) -> object:
     fields = block.get("fields")
     return fields.get("ROBOT") if isinstance(fields, Mapping) else None
-
-
-def _blocks(workspace: Mapping[str, object]) -> Iterator[dict[str, object]]:
-    blocks = workspace.get("blocks")
-    waiting = list(blocks.get("blocks", ())) if isinstance(blocks, Mapping) else []
-    while waiting:
-        block = waiting.pop(0)
-        if not isinstance(block, dict):
-            continue
-        yield block
-        inputs = block.get("inputs")
-        connections = list(inputs.values()) if isinstance(inputs, Mapping) else []
-        for connection in (*connections, block.get("next")):
-            if isinstance(connection, Mapping):
-                waiting += [connection[name] for name in ("block", "shadow") if name in connection]

@@ -5,7 +5,8 @@ A file may hold anything. What has not the right form is left out; nothing raise
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 MAX_DEPTH = 40
@@ -51,6 +52,21 @@ class Workspace:
             for inner in block.inputs.values():
                 waiting.extend(inner)
         return found
+
+
+def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
+    """Every block of a saved workspace as it was saved, shadows too, the outermost first."""
+    blocks = saved.get("blocks")
+    waiting = deque(_list(blocks.get("blocks") if isinstance(blocks, Mapping) else None))
+    while waiting:
+        block = waiting.popleft()
+        if not isinstance(block, dict):
+            continue
+        yield block
+        inputs = block.get("inputs")
+        for connection in (*(inputs.values() if isinstance(inputs, Mapping) else ()), block.get("next")):
+            if isinstance(connection, Mapping):
+                waiting.extend(connection[name] for name in ("block", "shadow") if name in connection)
 
 
 def parse_workspace(saved: Mapping[str, object]) -> Workspace:

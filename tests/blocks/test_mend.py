@@ -2,8 +2,11 @@ from __future__ import annotations
 
 import copy
 
+import pytest
+
 from app.blocks.compiler import compile_behaviour
 from app.blocks.mend import mend
+from app.blocks.robot_mend import blocks_of, can_do
 from tests.blocks.samples import block, robot, say, started, workspace
 
 
@@ -52,3 +55,15 @@ def test_an_empty_workspace_gets_a_start():
 def test_what_is_no_matter_of_blocks():
     assert mend(workspace(), "connect:NAO") is None
     assert mend(workspace(), "limit:nobody") is None
+
+
+@pytest.mark.parametrize(
+    "blocks",
+    [None, 7, "x", {}, {"blocks": None}, {"blocks": 7}, {"blocks": [None, {"inputs": 3, "next": []}]}],
+)
+def test_nothing_is_mended_in_what_is_no_workspace_and_nothing_raises(blocks):
+    saved = {"blocks": blocks}
+    assert mend(saved, "limit:w") is None
+    assert mend(saved, "define:w") is None
+    assert blocks_of(saved, "Pepper") == ()
+    assert not can_do(saved, "Pepper", "pepper", robot())

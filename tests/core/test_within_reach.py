@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,17 +59,25 @@ def blink_and_wait() -> dict[str, object]:
     return {"blocks": {"languageVersion": 0, "blocks": [started]}}
 
 
+@contextmanager
+def used_by_a_program(session: Session, node: nep.Node) -> Iterator[None]:
+    """A lamp is there, and a program that has used it goes on; at the end the lamp goes away."""
+    driver = Driver(LAMP, "Lamp", node)
+    driver.start()
+    try:
+        tick_until(session, lambda: within_reach(session))
+        session.document.edited(blink_and_wait())
+        session.runs.run()
+        tick_until(session, lambda: "w" in session.runs.running_blocks)
+        yield
+    finally:
+        driver.close()
+
+
 def test_a_robot_that_went_away_during_the_program_is_named_until_it_answers(session: Session) -> None:
     with nep.node("lamps") as node:
-        driver = Driver(LAMP, "Lamp", node)
-        driver.start()
-        try:
-            tick_until(session, lambda: within_reach(session))
-            session.document.edited(blink_and_wait())
-            session.runs.run()
-            tick_until(session, lambda: "w" in session.runs.running_blocks)
-        finally:
-            driver.close()
+        with used_by_a_program(session, node):
+            pass
         tick_until(session, lambda: not session.fleet.connected)
         tick_until(session, lambda: session.alerts.has("robot:Lamp"))
         for _ in range(2):  # "Stop again" is no proof either
@@ -91,16 +100,8 @@ def test_a_robot_that_went_away_during_the_program_is_named_until_it_answers(ses
 
 
 def test_a_person_who_says_that_it_is_still_is_believed(session: Session) -> None:
-    with nep.node("lamps") as node:
-        driver = Driver(LAMP, "Lamp", node)
-        driver.start()
-        try:
-            tick_until(session, lambda: within_reach(session))
-            session.document.edited(blink_and_wait())
-            session.runs.run()
-            tick_until(session, lambda: "w" in session.runs.running_blocks)
-        finally:
-            driver.close()
+    with nep.node("lamps") as node, used_by_a_program(session, node):
+        pass
     tick_until(session, lambda: not session.fleet.connected)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
@@ -129,17 +130,8 @@ def test_whom_a_new_master_does_not_know_yet_has_not_gone(session: Session) -> N
 
 
 def test_closing_the_session_ends_the_program_at_once(session: Session) -> None:
-    with nep.node("lamps") as node:
-        driver = Driver(LAMP, "Lamp", node)
-        driver.start()
-        try:
-            tick_until(session, lambda: within_reach(session))
-            session.document.edited(blink_and_wait())
-            session.runs.run()
-            tick_until(session, lambda: "w" in session.runs.running_blocks)
-            runner = session.runs._runner
-            assert runner is not None
-            session.close()
-            assert runner.wait(2.0)
-        finally:
-            driver.close()
+    with nep.node("lamps") as node, used_by_a_program(session, node):
+        runner = session.runs._runner
+        assert runner is not None
+        session.close()
+        assert runner.wait(2.0)

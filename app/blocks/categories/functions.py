@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from app.blocks.block import Block
 from app.blocks.category import Category
 from app.blocks.fields import StatementInput, TextField, ValueInput
 from app.blocks.growing import InputField, Inputs
+
+_definition = partial(Block, shape="definition", style="functions")
+_statement = partial(Block, shape="statement", style="functions")
+_value = partial(Block, shape="value", style="functions")
 
 _NAME = TextField("NAME", "my function")
 _INPUTS = Inputs("INPUTS")
@@ -19,11 +25,9 @@ CATEGORY = Category(
     order=50,
     dynamic="functions",
     blocks=(
-        Block(
-            type="functions_define",
-            text="to %NAME %INPUTS %BODY",
-            shape="definition",
-            style="functions",
+        _definition(
+            "functions_define",
+            "to %NAME %INPUTS %BODY",
             icon="square-function",
             tooltip="Makes a block of your own: its name, its inputs, and what it does.",
             help="Its block is in this category then. The buttons add an input and take the last one away; "
@@ -34,11 +38,9 @@ CATEGORY = Category(
             mutator="function",
             words=("define", "procedure", "method", "own", "block", "make"),
         ),
-        Block(
-            type="functions_define_result",
-            text="to %NAME %INPUTS %BODY give back %RESULT",
-            shape="definition",
-            style="functions",
+        _definition(
+            "functions_define_result",
+            "to %NAME %INPUTS %BODY give back %RESULT",
             icon="square-function",
             tooltip="Makes a value block of your own, which works out a result.",
             help="For example “double” with the input “number” gives back number × 2.",  # noqa: RUF001
@@ -47,11 +49,9 @@ CATEGORY = Category(
             mutator="function",
             words=("define", "return", "procedure", "own", "block", "make"),
         ),
-        Block(
-            type="functions_return_if",
-            text="if %CONDITION give back %VALUE",
-            shape="statement",
-            style="functions",
+        _statement(
+            "functions_return_if",
+            "if %CONDITION give back %VALUE",
             icon="corner-down-left",
             tooltip="Ends the function with this result if this is so.",
             help="Only inside a function that gives back a result.",
@@ -60,11 +60,9 @@ CATEGORY = Category(
             needs_function="result",
             words=("return",),
         ),
-        Block(
-            type="functions_leave_if",
-            text="if %CONDITION leave the function",
-            shape="statement",
-            style="functions",
+        _statement(
+            "functions_leave_if",
+            "if %CONDITION leave the function",
             icon="corner-down-left",
             tooltip="Ends the function if this is so; the script goes on where it was used.",
             help="Only inside a function without a result.",
@@ -73,11 +71,9 @@ CATEGORY = Category(
             needs_function="plain",
             words=("return", "exit", "end"),
         ),
-        Block(
-            type="functions_call",
-            text="%INPUTS",
-            shape="statement",
-            style="functions",
+        _statement(
+            "functions_call",
+            "%INPUTS",
             icon="square-function",
             tooltip="Runs your function.",
             python="",
@@ -85,11 +81,9 @@ CATEGORY = Category(
             mutator="call",
             in_toolbox=False,
         ),
-        Block(
-            type="functions_result",
-            text="%INPUTS",
-            shape="value",
-            style="functions",
+        _value(
+            "functions_result",
+            "%INPUTS",
             icon="square-function",
             tooltip="Runs your function and is what it gives back.",
             python="",
@@ -97,11 +91,9 @@ CATEGORY = Category(
             mutator="call",
             in_toolbox=False,
         ),
-        Block(
-            type="functions_input",
-            text="%INPUT",
-            shape="value",
-            style="functions",
+        _value(
+            "functions_input",
+            "%INPUT",
             icon="",
             tooltip="What was put into this gap of the function.",
             python="%INPUT",

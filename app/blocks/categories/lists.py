@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from app.blocks.block import Block
 from app.blocks.category import Category
 from app.blocks.fields import ChoiceField, StatementInput, ValueInput, VariableField
 from app.blocks.growing import Items
+
+_value = partial(Block, shape="value", style="variables")
+_boolean = partial(Block, shape="boolean", style="variables")
+_statement = partial(Block, shape="statement", style="variables")
 
 _LIST = ValueInput("LIST", "List", variable="list")
 _NUMBER = ValueInput("NUMBER", "Number", 1, only=("WHERE", "number"))
@@ -20,11 +26,9 @@ def _at(call: str, places: tuple[tuple[str, str], ...] = _PLACES_OR_ANY) -> dict
 
 
 _MAKING = (
-    Block(
-        type="lists_empty",
-        text="empty list",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_empty",
+        "empty list",
         icon="list",
         tooltip="A list with nothing in it yet.",
         help="Put it into a variable first, then add items to that variable.",
@@ -33,11 +37,9 @@ _MAKING = (
         fails=False,
         words=("new", "create", "array"),
     ),
-    Block(
-        type="lists_create",
-        text="list of %ITEM",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_create",
+        "list of %ITEM",
         icon="list-plus",
         tooltip="A list of these items.",
         help="The two buttons add and take away a gap. A list has room for 10000 items.",
@@ -48,11 +50,9 @@ _MAKING = (
         extra={"items": 3},
         words=("new", "create", "array", "make"),
     ),
-    Block(
-        type="lists_split",
-        text="split %TEXT at %BETWEEN",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_split",
+        "split %TEXT at %BETWEEN",
         icon="split",
         tooltip="A list of the pieces of a text between these characters.",
         help="“a,b,c” at “,” gives a list of three items. At an empty text it gives the single characters.",
@@ -64,11 +64,9 @@ _MAKING = (
 )
 
 _READING = (
-    Block(
-        type="lists_get",
-        text="%WHERE %NUMBER of %LIST",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_get",
+        "%WHERE %NUMBER of %LIST",
         icon="list-ordered",
         tooltip="One item of a list; the first is number 1.",
         help="When there is no such item, the behaviour stops here and says how many there are.",
@@ -77,11 +75,9 @@ _READING = (
         variant="WHERE",
         words=("get", "element", "index", "choose"),
     ),
-    Block(
-        type="lists_length",
-        text="number of items in %LIST",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_length",
+        "number of items in %LIST",
         icon="ruler",
         tooltip="How many items a list has.",
         python="length(%LIST)",
@@ -89,11 +85,9 @@ _READING = (
         check="Number",
         words=("length", "count", "size"),
     ),
-    Block(
-        type="lists_contains",
-        text="%LIST contains %VALUE",
-        shape="boolean",
-        style="variables",
+    _boolean(
+        "lists_contains",
+        "%LIST contains %VALUE",
         icon="list-checks",
         tooltip="Whether such an item is in the list.",
         help="For a text: whether these characters are in it.",
@@ -102,11 +96,9 @@ _READING = (
         check="Boolean",
         words=("in", "has", "includes", "find"),
     ),
-    Block(
-        type="lists_position",
-        text="number of %VALUE in %LIST",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_position",
+        "number of %VALUE in %LIST",
         icon="search",
         tooltip="Which number the first such item has; 0 when there is none.",
         python="position(%LIST, %VALUE)",
@@ -114,11 +106,9 @@ _READING = (
         check="Number",
         words=("index", "find", "where", "position"),
     ),
-    Block(
-        type="lists_join",
-        text="all items of %LIST with %BETWEEN between them",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_join",
+        "all items of %LIST with %BETWEEN between them",
         icon="link",
         tooltip="One text of all items.",
         help="Useful to let a robot say a whole list: with “, ” between them.",
@@ -130,11 +120,9 @@ _READING = (
 )
 
 _CHANGING = (
-    Block(
-        type="lists_add",
-        text="add %VALUE to %LIST",
-        shape="statement",
-        style="variables",
+    _statement(
+        "lists_add",
+        "add %VALUE to %LIST",
         icon="list-plus",
         tooltip="Puts a value at the end of a list.",
         help="A variable begins with 0: set it to an empty list before the first item.",
@@ -142,11 +130,9 @@ _CHANGING = (
         arguments=(ValueInput("VALUE", None, "apple"), _LIST),
         words=("append", "push", "put"),
     ),
-    Block(
-        type="lists_insert",
-        text="insert %VALUE as %WHERE %NUMBER of %LIST",
-        shape="statement",
-        style="variables",
+    _statement(
+        "lists_insert",
+        "insert %VALUE as %WHERE %NUMBER of %LIST",
         icon="list-plus",
         tooltip="Puts a value into a list; the items behind it move on.",
         python=_at("insert_item(%LIST, @, %VALUE)", _PLACES),
@@ -154,11 +140,9 @@ _CHANGING = (
         variant="WHERE",
         words=("add", "put", "push"),
     ),
-    Block(
-        type="lists_set",
-        text="set %WHERE %NUMBER of %LIST to %VALUE",
-        shape="statement",
-        style="variables",
+    _statement(
+        "lists_set",
+        "set %WHERE %NUMBER of %LIST to %VALUE",
         icon="square-pen",
         tooltip="Puts another value in the place of an item.",
         python=_at("set_item(%LIST, @, %VALUE)"),
@@ -166,11 +150,9 @@ _CHANGING = (
         variant="WHERE",
         words=("replace", "change"),
     ),
-    Block(
-        type="lists_remove",
-        text="remove %WHERE %NUMBER of %LIST",
-        shape="statement",
-        style="variables",
+    _statement(
+        "lists_remove",
+        "remove %WHERE %NUMBER of %LIST",
         icon="list-minus",
         tooltip="Takes an item out of a list; the items behind it move up.",
         python=_at("remove_item(%LIST, @)"),
@@ -178,11 +160,9 @@ _CHANGING = (
         variant="WHERE",
         words=("delete", "drop", "pop"),
     ),
-    Block(
-        type="lists_take",
-        text="take out %WHERE %NUMBER of %LIST",
-        shape="value",
-        style="variables",
+    _value(
+        "lists_take",
+        "take out %WHERE %NUMBER of %LIST",
         icon="list-minus",
         tooltip="Takes an item out of a list and gives it.",
         help="To go through a list in a random order: take out a random item until the list is empty.",
@@ -191,11 +171,9 @@ _CHANGING = (
         variant="WHERE",
         words=("pop", "draw", "remove"),
     ),
-    Block(
-        type="lists_each",
-        text="for each item %VAR in %LIST %BODY",
-        shape="statement",
-        style="variables",
+    _statement(
+        "lists_each",
+        "for each item %VAR in %LIST %BODY",
         icon="repeat",
         tooltip="Runs the blocks inside once for each item; the variable holds the item.",
         help="It goes over the items that were there when it began, whatever happens to the list inside.",
