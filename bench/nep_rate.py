@@ -8,12 +8,14 @@ plain pyzmq against itself: a run counts only when that is within 5 %, see `bloc
 then.
 
     plain           one part of 1000 bytes: PUB.send, SUB.recv as bytes; nobody counts, checks or decodes
+    plain, local    the same over a Unix socket, as nep goes on one computer where it can
     plain, 3 parts  the same bytes behind a topic and 32 bytes: send_multipart, recv_multipart
     listen          Subscriber.listen in the main thread
     spin            a callback that `Node.spin` calls in the main thread
     sink            batches given to a sink in the node's thread, as Studio takes them
     json            a robot's state that is encoded and decoded again, 1000 bytes of JSON, with listen
-    plain json      the same with `json.dumps`, `json.loads` and one part, as many programs do it
+    json, a text    the same with 1000 bytes that are nearly all one text
+    plain json      the robot's state with `json.dumps`, `json.loads` and one part, as many programs do it
 """
 
 from __future__ import annotations
@@ -33,23 +35,27 @@ import nep
 from nep.message import Message
 
 SIZE = 1000
-NATIVE = ("listen", "spin", "sink", "json")
+NATIVE = ("listen", "spin", "sink", "json", "text")
 
 SENDER = """
 import json, os, sys, time, zmq, nep
+from nep.backends.native.local import is_there
 count, state = int(sys.argv[1]), json.loads(sys.argv[2])
 data = os.urandom(1000)
 node = nep.node("sender")
-topics = {name: node.new_pub(name, "json" if name == "json" else "bytes") for name in sys.argv[3:]}
+payloads = {"json": state, "text": {"text": "x" * 989}}
+topics = {name: node.new_pub(name, "json" if name in payloads else "bytes") for name in sys.argv[3:]}
 context = zmq.Context()
-plains = [context.socket(zmq.PUB), context.socket(zmq.PUB)]
-for plain in plains:
+plains = [context.socket(zmq.PUB) for _ in range(3)]
+local = f"ipc://@nep-bench-{os.getpid()}" if is_there() else "tcp://127.0.0.1:*"
+for plain, end in zip(plains, ("tcp://127.0.0.1:*", "tcp://127.0.0.1:*", local)):
     plain.setsockopt(zmq.SNDHWM, 0)
-print(*(plain.bind_to_random_port("tcp://127.0.0.1") for plain in plains), flush=True)
+    plain.bind(end)
+print(*(plain.getsockopt_string(zmq.LAST_ENDPOINT) for plain in plains), flush=True)
 for line in sys.stdin:
     what = line.strip()
     if what in topics:
-        publish, payload = topics[what].publish, state if what == "json" else data
+        publish, payload = topics[what].publish, payloads.get(what, data)
         for _ in range(count):
             publish(payload)
     elif what == "parts":
@@ -60,11 +66,12 @@ for line in sys.stdin:
         for _ in range(count):
             plains[0].send(json.dumps(state).encode())
     elif what == "one":
-        plains[0].send(data)
-        plains[1].send(data)
+        for plain in plains:
+            plain.send(data)
     else:
+        send = plains[2 if what == "local" else 0].send
         for _ in range(count):
-            plains[0].send(data)
+            send(data)
     print(time.process_time(), flush=True)
 """
 
@@ -155,12 +162,12 @@ class Bursts:
         return Sample(seconds, (used + self._child_s - before) / self._count)
 
 
-def connect(sockets: Sequence[zmq.Socket[bytes]], ports: Sequence[str], child: Child) -> None:
+def connect(sockets: Sequence[zmq.Socket[bytes]], ends: Sequence[str], child: Child) -> None:
     """Connect to the child's plain sockets, and wait until their messages come."""
-    for socket, port in zip(sockets, ports, strict=True):
+    for socket, end in zip(sockets, ends, strict=True):
         socket.setsockopt(zmq.RCVHWM, 0)
         socket.subscribe(b"")
-        socket.connect(f"tcp://127.0.0.1:{port}")
+        socket.connect(end)
         while not socket.poll(50):
             child.write("one")
             child.read()
@@ -184,7 +191,7 @@ def show(samples: dict[str, Sample]) -> int:
 def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int]:
     """The samples of all variants, and how many messages were lost."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    plain, parts = context.socket(zmq.SUB), context.socket(zmq.SUB)
+    plain, parts, local = (context.socket(zmq.SUB) for _ in range(3))
     sunk, spun = Count(count), Count(count)
     state = robot_state()
     with (
@@ -192,11 +199,12 @@ def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int
         nep.node("bench", master=master.address) as node,
         node.new_sub("listen", "bytes") as listener,
         node.new_sub("json", "json") as reader,
+        node.new_sub("text", "json") as texter,
         node.new_sub("sink", "bytes", sink=sunk.batch) as sinker,
         node.new_callback("spin", "bytes", spun.one) as spinner,
         other_process(SENDER, (str(count), json.dumps(state), *NATIVE), master.address) as child,
     ):
-        connect((plain, parts), child.read().split(), child)
+        connect((plain, parts, local), child.read().split(), child)
         bursts = Bursts(child, count)
 
         def listen(subscriber: nep.Subscriber) -> object:
@@ -216,15 +224,17 @@ def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int
         variants = {
             "plain": partial(bursts.take, "plain", plain.recv),
             "plain again": partial(bursts.take, "plain", plain.recv),
+            "plain, local": partial(bursts.take, "local", local.recv),
             "plain, 3 parts": partial(bursts.take, "parts", parts.recv_multipart),
             "listen": partial(bursts.take, "listen", partial(listen, listener)),
             "spin": partial(bursts.count, "spin", spun, spin),
             "sink": partial(bursts.count, "sink", sunk, partial(sunk.is_full.wait, 10.0)),
             "json": partial(bursts.take, "json", partial(listen, reader)),
+            "json, a text": partial(bursts.take, "text", partial(listen, texter)),
             "plain json": partial(bursts.take, "plain json", lambda: json.loads(plain.recv())),
         }
         samples = interleaved(variants, blocks, limit=limit)
-        lost = sum(each.lost or 0 for each in (listener, reader, sinker, spinner))
+        lost = sum(each.lost or 0 for each in (listener, reader, texter, sinker, spinner))
     context.destroy(0)
     return samples, lost
 
