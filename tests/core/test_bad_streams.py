@@ -26,16 +26,6 @@ BAD = b'{"joints": [1, 2, 3'
 
 
 @pytest.fixture
-def session(master: Master, tmp_path: Path) -> Iterator[Session]:
-    session = Session(
-        Settings(tmp_path), address=master.address, journal_folder=tmp_path, start_companions=False
-    )
-    session.start()
-    yield session
-    session.close()
-
-
-@pytest.fixture
 def talker(master: Master) -> Iterator[nep.Node]:
     with nep.node("talker") as node:
         yield node

@@ -18,7 +18,6 @@ import pytest
 import nep
 from app.core.robot_link import Invocation, RobotLink
 from app.core.session import Session
-from app.core.settings import Settings
 from app.robots.description import td_for
 from app.robots.turtle import ROBOT
 from nep.masters import Master
@@ -30,17 +29,6 @@ FOUND_S = 20.0
 SAID_S = 8.0  # silence is noticed after 2 s; the rest is for a machine with much to do
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes are frozen by signals of POSIX")
-
-
-@pytest.fixture
-def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
-    monkeypatch.setenv("NEP_MASTER", master.address)
-    made = Session(
-        Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
-    )
-    made.start()
-    yield made
-    made.close()
 
 
 class Turtles:

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
 
@@ -15,28 +14,12 @@ import pytest
 
 import nep
 from app.core.session import Session
-from app.core.settings import Settings
 from app.errors import RobotInputError, RobotUnknownError
 from app.robots.description import td_for
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
-from nep.masters import Master
 from tests.core.waiting import tick_until
 
 EXAMPLES = Path(__file__).parents[2] / "resources" / "examples"
-
-
-@pytest.fixture
-def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
-    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
-    session = Session(
-        Settings(tmp_path),
-        address=master.address,
-        journal_folder=tmp_path / "journal",
-        start_companions=False,
-    )
-    session.start()
-    yield session
-    session.close()
 
 
 class Lamp:

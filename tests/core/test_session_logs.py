@@ -3,33 +3,14 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
-from pathlib import Path
-
-import pytest
 
 import nep
 from app.core.alerts import Alerts
 from app.core.companions import CompanionFailed
 from app.core.session import Session
-from app.core.settings import Settings
 from app.core.source import MasterFound, MasterLost
-from nep.masters import Master
 from tests.blocks.samples import number, stack, started, text, workspace, write
 from tests.core.waiting import tick_until
-
-
-@pytest.fixture
-def session(master: Master, tmp_path: Path) -> Iterator[Session]:
-    session = Session(
-        Settings(tmp_path),
-        address=master.address,
-        journal_folder=tmp_path / "journal",
-        start_companions=False,
-    )
-    session.start()
-    yield session
-    session.close()
 
 
 def told(session: Session, origin: str) -> list[str]:

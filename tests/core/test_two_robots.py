@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 import nep
 from app.core.moving import MayNotMoveError
 from app.core.session import Session
-from app.core.settings import Settings
 from app.robots import simulated, turtle
 from app.robots.driver import Driver
 from nep.masters import Master
@@ -19,17 +17,6 @@ from tests.blocks.samples import block, number, say, started, text, workspace, w
 from tests.core.waiting import tick_until
 
 FOUND_S = 20.0
-
-
-@pytest.fixture
-def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
-    monkeypatch.setenv("NEP_MASTER", master.address)
-    made = Session(
-        Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
-    )
-    made.start()
-    yield made
-    made.close()
 
 
 @pytest.fixture

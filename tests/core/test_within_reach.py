@@ -6,27 +6,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
-
-import pytest
 
 import nep
 from app.core.master_state import LEARNING_S
 from app.core.session import Session
-from app.core.settings import Settings
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
-from nep.masters import Master
 from tests.core.waiting import tick_until
-
-
-@pytest.fixture
-def session(master: Master, tmp_path: Path) -> Iterator[Session]:
-    session = Session(
-        Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
-    )
-    session.start()
-    yield session
-    session.close()
 
 
 class Lamp:

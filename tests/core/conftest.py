@@ -1,0 +1,27 @@
+"""What tests of the core share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.core.session import Session
+from app.core.settings import Settings
+from nep.masters import Master
+
+
+@pytest.fixture
+def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+    """A session on the test's own master, with everything that it keeps in the test's folder."""
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    made = Session(
+        Settings(tmp_path),
+        address=master.address,
+        journal_folder=tmp_path / "journal",
+        start_companions=False,
+    )
+    made.start()
+    yield made
+    made.close()
