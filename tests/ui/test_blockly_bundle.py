@@ -48,6 +48,25 @@ def test_building_again_gives_the_committed_bundle(tools, tmp_path):
 
 @built
 @pytest.mark.timeout(300)
+def test_a_build_that_fails_leaves_the_bundle_as_it_was(tools, tmp_path):
+    here, out = tmp_path / "editor", tmp_path / "out"
+    shutil.copytree(EDITOR / "src", here / "src")
+    shutil.copy(EDITOR / "build.mjs", here)
+    (here / "node_modules").symlink_to(EDITOR / "node_modules", target_is_directory=True)
+    (here / "src" / "index.html").unlink()  # is needed last, after the script was built
+    out.mkdir()
+    (out / "editor.js").write_text("the one before")
+    done = subprocess.run(
+        [node, "build.mjs", str(out)], cwd=here, capture_output=True, text=True, timeout=50, check=False
+    )
+    assert done.returncode != 0
+    assert "index.html" in done.stderr
+    assert files(out) == {"editor.js": b"the one before"}
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["editor", "out"]
+
+
+@built
+@pytest.mark.timeout(300)
 def test_the_sources_are_strictly_typed(tools):
     tsc = EDITOR / "node_modules" / "typescript" / "bin" / "tsc"
     done = subprocess.run(

@@ -26,7 +26,7 @@ export function iconName(name: string, style: string): string {
 }
 
 /** Each icon is parsed once; a page with a thousand blocks copies it. */
-const drawings = new Map<string, SVGGElement>();
+const drawings = new Map<string, SVGElement>();
 
 /** Fills `group` with the icon, scaled to `size` units; colours come from CSS. */
 export function drawIcon(group: Element, name: string, size: number): void {
@@ -34,10 +34,12 @@ export function drawIcon(group: Element, name: string, size: number): void {
   let drawn = drawings.get(key);
   if (!drawn) {
     const filled = FILLED[name];
-    drawn = document.createElementNS(SVG, 'g');
+    const whole = document.createElementNS(SVG, 'g');
+    whole.innerHTML = filled ?? lucide[name] ?? '';
+    const only = whole.childElementCount === 1 ? whole.firstElementChild : null;
+    drawn = only instanceof SVGElement ? only : whole;
     drawn.setAttribute('transform', `scale(${size / 24})`);
     drawn.setAttribute('class', filled ? 'nepGlyph' : 'nepLines');
-    drawn.innerHTML = filled ?? lucide[name] ?? '';
     drawings.set(key, drawn);
   }
   group.replaceChildren(drawn.cloneNode(true));

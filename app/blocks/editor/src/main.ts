@@ -1,5 +1,6 @@
 // The page of the block editor: what the window tells it (`nepReceive`) and what it tells the window.
 import * as Blockly from 'blockly/core';
+import './quick';
 import './fields';
 import './shapes';
 import {HelpCard, focusedBlock, offerHelp} from './help';
@@ -43,7 +44,7 @@ class Editor {
       history: (tab, canUndo, canRedo) => ofShown(tab, () => bridge.history(canUndo, canRedo)),
       selected: (tab, id) => ofShown(tab, () => bridge.selected(id)),
     });
-    new ResizeObserver(() => Blockly.svgResize(this.shown.workspace)).observe(document.body);
+    new ResizeObserver(() => this.shown.resize()).observe(document.body);
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.shown.program.flush());
     this.makeZoomButtons();

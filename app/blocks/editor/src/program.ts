@@ -1,6 +1,8 @@
 // The workspace as JSON: loading, saving, telling the window about real edits.
 import * as Blockly from 'blockly/core';
+import type {Far} from './far';
 import {type BlockState, KEPT, keep, keepWhole, unkeep} from './kept';
+import {wordsLater} from './quick';
 
 type Json = Record<string, unknown>;
 
@@ -31,7 +33,8 @@ export class Program {
   private historyTold = 'false false';
   private loading = false;
 
-  constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly listener: Listener) {
+  constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly far: Far,
+    private readonly listener: Listener) {
     workspace.addChangeListener((event) => this.onEvent(event));
   }
 
@@ -44,6 +47,7 @@ export class Program {
     this.told = JSON.stringify(this.save());
     this.tellHistory();
     this.goHome();
+    this.far.look();
   }
 
   /** Another program in the place of this one, as one edit that undo takes back; the view stays. */
@@ -141,11 +145,14 @@ export class Program {
     try {
       this.loadOthers(others, how);
       this.workspace.setResizesEnabled(false);
-      for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
+      wordsLater(() => {
+        for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
+      });
     } finally {
       Blockly.utils.dom.stopTextWidthCache();
       this.workspace.setResizesEnabled(true);
       Checker.lenient = false;
+      this.far.lookSoon();
     }
   }
 
@@ -169,6 +176,7 @@ export class Program {
       for (const block of this.workspace.getTopBlocks(false).slice(before)) block.dispose(false);
       Blockly.serialization.blocks.append(keepWhole(state) as Blockly.serialization.blocks.State, this.workspace, how);
     }
+    this.far.hide(this.workspace.getTopBlocks(false).slice(before));
   }
 
   private onEvent(event: Blockly.Events.Abstract): void {

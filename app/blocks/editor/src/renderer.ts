@@ -88,6 +88,12 @@ export class StatePath extends Blockly.zelos.PathObject {
 
 class Constants extends Blockly.zelos.ConstantProvider {
   override FIELD_TEXT_FONTWEIGHT = '600';
+  private plain: Blockly.Theme.BlockStyle | null = null;
+
+  /** Each block begins with the style of none, which Blockly works out anew for each. */
+  override getBlockStyle(name: string | null): Blockly.Theme.BlockStyle {
+    return name ? super.getBlockStyle(name) : this.plain ??= super.getBlockStyle(name);
+  }
 }
 
 class Renderer extends Blockly.zelos.Renderer {

@@ -1,6 +1,7 @@
 // One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
 import * as Blockly from 'blockly/core';
 import {FieldChoice} from './choices';
+import {Far} from './far';
 import {Functions} from './functions';
 import {CHECKER, Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
@@ -21,6 +22,7 @@ export class Tab {
   readonly program: Program;
   readonly states: States;
   private readonly functions: Functions;
+  private readonly far: Far;
   key = '';
   generation = 0;
   private readonly frame = document.createElement('div');
@@ -41,7 +43,8 @@ export class Tab {
       move: {scrollbars: true, drag: true, wheel: true},
       zoom: {controls: false, wheel: true, pinch: true, startScale: SCALE, minScale: 0.3, maxScale: 2},
     });
-    this.program = new Program(this.workspace, {
+    this.far = new Far(this.workspace);
+    this.program = new Program(this.workspace, this.far, {
       changed: (json) => listener.changed(this, json),
       history: (canUndo, canRedo) => listener.history(this, canUndo, canRedo),
       selected: (id) => listener.selected(this, id),
@@ -76,9 +79,15 @@ export class Tab {
     Blockly.common.setMainWorkspace(this.workspace);
     // Blockly pastes where was copied; a person means what they see.
     Blockly.clipboard.setLastCopiedWorkspace(this.workspace);
-    Blockly.svgResize(this.workspace);
+    this.resize();
     this.update();
     this.program.tellHistory(true);
+  }
+
+  /** The page has another size. */
+  resize(): void {
+    Blockly.svgResize(this.workspace);
+    this.far.lookSoon();
   }
 
   /** Tells the newest edits and takes it off the screen; what is told to it meanwhile waits until `show`. */
