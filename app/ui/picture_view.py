@@ -1,4 +1,4 @@
-"""Pictures of a stream on black: fitting or zoomed, turned, with boxes, and the value under the mouse."""
+"""Pictures of a stream: fitting or zoomed, turned, with boxes, and the value under the mouse."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.picture_boxes import Box, paint_box
 from app.ui.picture_place import PicturePlace
+from app.ui.picture_silent import grey, paint_around, paint_silent
 from app.ui.theme import Theme
 from app.ui.widgets import paint
 from app.ui.words import age_words
@@ -48,13 +49,17 @@ class PictureView(QWidget):
     """The newest picture of a stream; `take` is called at each refresh and paints only what is new."""
 
     def __init__(self, theme: Theme, *, fill: bool = False, labelled: bool = True) -> None:
-        """``fill`` lets the picture fill the view where its edges may be cut by a tenth."""
+        """``fill`` lets the picture fill the view where its edges may be cut by a tenth, and has no black beside it.
+
+        Without a label (``labelled``) a person reads in its middle that no new picture comes.
+        """
         super().__init__()
         self._theme = theme
         self._fill, self._labelled = fill, labelled
         self.place = PicturePlace()
         self._picture: Picture | None = None
         self._image: QImage | None = None
+        self._grey: QImage | None = None  # of the last picture, when no new one comes
         self._boxes: tuple[Box, ...] = ()
         self._rate = self._state = self._age = ""
         self.mouse: QPointF | None = None  # where a person points, when it matters
@@ -89,7 +94,7 @@ class PictureView(QWidget):
 
     def clear(self) -> None:
         """Show nothing."""
-        self._picture = self._image = None
+        self._picture = self._image = self._grey = None
         self._boxes = ()
         self._rate = self._state = self._age = ""
         self.update()
@@ -111,6 +116,7 @@ class PictureView(QWidget):
             self._picture = picture
             rows, columns = picture.bgra.shape[:2]
             # QImage does not copy the bytes: self._picture keeps them.
+            self._grey = None
             self._image = QImage(picture.bgra.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32)
             if not stream.held:
                 stream.shown()
@@ -165,20 +171,32 @@ class PictureView(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        area = self.area()
-        if self._image is None or not area.contains(QRectF(self.rect())):
-            painter.fillRect(self.rect(), QColor("black"))
-        if self._image is not None:
-            self._paint_image(painter, area, self._image)
-        if self._state.startswith("Last"):
+        area, view = self.area(), QRectF(self.rect())
+        silent = self._state.startswith("Last")
+        image = self._grey_image() if silent and not self._labelled else self._image
+        if image is None or not area.contains(view):
+            if image is None or not self._fill:
+                painter.fillRect(self.rect(), QColor("black"))
+            else:
+                paint_around(painter, view, image)
+        if image is not None:
+            self._paint_image(painter, area, image)
+        if silent and not self._labelled:
+            paint_silent(painter, self._theme, view, self._state)
+        elif silent:
             painter.fillRect(area, QColor(90, 90, 90, 150))
         else:
             shares = self.place.to_view(area)
             for box in self._boxes:
                 paint_box(painter, self._theme, shares.mapRect(box.place), box)
-        if (self._labelled or self._state) and self.words:
+        if self._labelled and self.words:
             self._paint_label(painter)
         painter.end()
+
+    def _grey_image(self) -> QImage | None:
+        if self._grey is None and self._image is not None:
+            self._grey = grey(self._image)
+        return self._grey
 
     def _paint_image(self, painter: QPainter, area: QRectF, image: QImage) -> None:
         smooth = self.scale() < SHARP_FROM

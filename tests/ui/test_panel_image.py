@@ -15,7 +15,7 @@ from app.ui.panels.camera import CameraPanel
 from app.ui.panels.image import PANEL, ImagePanel
 from app.ui.picture_actions import ROWS
 from app.ui.picture_boxes import boxes_of
-from app.ui.picture_view import pixel_words, rate_sentence
+from app.ui.picture_view import PictureView, pixel_words, rate_sentence
 from app.ui.picture_zoom import ZoomablePicture
 from app.ui.snapshot_job import SnapshotJob
 from app.ui.theme import Theme
@@ -90,6 +90,37 @@ def test_a_silent_stream_is_grey_and_says_how_old_its_picture_is(view) -> None:
     assert view.grab().toImage().pixelColor(20, 80) != before
 
 
+@pytest.fixture
+def camera_view(qtbot, qapp) -> PictureView:
+    view = PictureView(Theme("light"), fill=True, labelled=False)
+    qtbot.addWidget(view)
+    view.resize(400, 160)
+    view.show()
+    return view
+
+
+def test_beside_the_cameras_picture_there_is_no_black(camera_view) -> None:
+    camera_view.take(stream_of(picture(320, 240)))  # type: ignore[arg-type]
+    assert camera_view.area().left() > 60
+    image = camera_view.grab().toImage()
+    assert all(image.pixelColor(x, 80).lightness() > 60 for x in (2, 30, 370, 397))
+
+
+def test_the_cameras_last_picture_has_no_colours_and_says_so_in_its_middle(camera_view) -> None:
+    shown = picture(320, 240)
+    camera_view.take(stream_of(shown, silent_s=4.2))  # type: ignore[arg-type]
+    assert camera_view.words.startswith("Last picture, 4 s old")
+    image = camera_view.grab().toImage()
+    found = [image.pixelColor(x, y) for x in range(0, 400, 3) for y in range(0, 160, 3)]
+    assert all(max(one.red(), one.green(), one.blue()) - min(one.red(), one.green(), one.blue()) < 3
+        for one in found)  # fmt: skip
+    assert any(one.lightness() > 240 for one in found)  # the words
+    assert all(image.pixelColor(x, 150).lightness() < 200 for x in range(8, 200, 4))  # no label below
+    camera_view.take(stream_of(shown))  # type: ignore[arg-type]
+    assert any(one.saturation() > 100 for one in (camera_view.grab().toImage().pixelColor(x, 100)
+        for x in range(100, 300)))  # fmt: skip
+
+
 def test_boxes_are_drawn_where_they_are_with_their_words(view) -> None:
     boxes = boxes_of(FACES)
     assert (boxes[0].words, boxes[0].confidence) == ("face", 0.97)
@@ -162,8 +193,8 @@ def test_the_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> 
     window = Window(Session())
     window.session.images.source = lambda _topic: Picture(np.zeros((24, 32, 4), np.uint8), 32, 24, 1, 1, 0.0)
     panel = window.make(CAMERA)
-    qtbot.addWidget(panel)
-    qtbot.addWidget(panel.header_widgets()[0])
+    for widget in (panel, *panel.header_widgets()):
+        qtbot.addWidget(widget)
     assert isinstance(panel, CameraPanel)
     assert panel.empty.isVisible()
     link = window.session.fleet.join(RobotLink("Pepper", pepper()))
@@ -178,6 +209,7 @@ def test_the_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> 
     panel.refresh()
     assert panel.view.words == "Last picture, 4 s old"  # the last picture stays, grey
     assert panel.rate.text() == ""
+    assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
     panel.shut()
     assert window.session.images.streams[0].closed
     assert window.session.fleet.looked_at == []
@@ -404,8 +436,8 @@ def test_the_camera_panel_shows_the_robot_that_was_chosen(qtbot, qapp) -> None:
         ]
         window.session.fleet.join(RobotLink(name, replace(described, sensors=tuple(sensors))))
     panel = window.make(CAMERA)
-    qtbot.addWidget(panel)
-    qtbot.addWidget(panel.header_widgets()[0])
+    for widget in (panel, *panel.header_widgets()):
+        qtbot.addWidget(widget)
     assert panel.subtitle() == "/Pepper/camera"
     window.session.fleet.choose("Nao")
     panel.refresh()

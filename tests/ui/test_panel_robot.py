@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import time
+
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.ui.panels.robot import PANEL, RobotPanel
+from app.ui.panels.robot import PANEL, STALE_AFTER_S, RobotPanel
 from tests.ui.fakes import RobotLink, Session, drawing, pepper
 from tests.ui.panel_case import Window, button, press
 
@@ -52,6 +54,34 @@ def test_the_same_state_is_not_painted_again(panel, window, monkeypatch) -> None
     link.drawing = drawing(x=1.0)
     panel.refresh()
     assert asked == [1]
+
+
+@pytest.mark.parametrize("how", ["away", "mute", "old"])
+def test_one_that_fell_silent_is_grey_and_says_nothing_any_more(panel, window, monkeypatch, how) -> None:
+    link = window.session.fleet.links[0]
+    link.drawing = drawing(speech="Hello!")
+    panel.refresh()
+    speaking = panel.view.grab().toImage()
+    assert panel.view.accessibleDescription() == "Hello!"
+    now = time.monotonic()
+    if how == "old":
+        monkeypatch.setattr(time, "monotonic", lambda: now + STALE_AFTER_S + 0.1)
+    elif how == "mute":
+        link.mute = True
+    else:
+        link.state = "away"
+    panel.refresh()
+    assert panel.view.stale
+    assert panel.view.accessibleDescription() == ""
+    grey = panel.view.grab().toImage()
+    link.drawing = drawing()
+    panel.view.show_state(link.drawing)
+    assert panel.view.grab().toImage() == grey  # there is no bubble
+    monkeypatch.undo()
+    link.state, link.mute, link.drawing = "ready", False, drawing(speech="Hello!")
+    panel.refresh()
+    assert panel.view.grab().toImage() == speaking
+    assert panel.view.accessibleDescription() == "Hello!"
 
 
 @pytest.mark.parametrize("part", ["head", "left_hand", "right_hand"])

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.picture_view import PictureView, rate_sentence
+from app.ui.picture_view import SILENT_AFTER_S, PictureView, rate_sentence
 from app.ui.robot_boxes import boxes_on, camera_of
-from app.ui.widgets import Elided, EmptyAction, EmptyState
+from app.ui.widgets import Chip, Elided, EmptyAction, EmptyState
+from app.ui.words import age_words
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream
@@ -32,6 +33,8 @@ class CameraPanel(PanelWidget):
         self._revision = -1
         self.rate = Elided("body", "textSecondary", least=60)
         self.header = [self.rate]
+        self.chip = Chip(self.theme)
+        self.chips = [self.chip]
         self.view = PictureView(self.theme, fill=True, labelled=False)
         self.view.setAccessibleName("What the robot sees")
         self.empty = EmptyState(
@@ -59,9 +62,11 @@ class CameraPanel(PanelWidget):
         if self._stream is None or link is None:
             return
         self.view.take(self._stream, boxes_on(link, self._topic))
-        silent = self._stream.silent_s
+        silent_s = self._stream.silent_s
+        silent = silent_s is not None and silent_s > SILENT_AFTER_S
         sentence = rate_sentence(self._stream.shown_hz, self._stream.arriving_hz)
-        self.rate.setText("" if silent is not None and silent > 2 else sentence)
+        self.rate.setText("" if silent else sentence)
+        self.chip.set(f"silent for {age_words(silent_s)}" if silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
 

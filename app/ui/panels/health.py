@@ -126,11 +126,12 @@ class HealthPanel(PanelWidget):
         self._column = QVBoxLayout(inside)
         self._column.setContentsMargins(0, 6, 0, 6)
         self._column.setSpacing(0)
-        below = QHBoxLayout()
+        self._below = QWidget()
+        below = QHBoxLayout(self._below)
         below.setContentsMargins(16, 6, 16, 6)
         below.addWidget(self.step)
         below.addStretch(1)
-        self._column.addLayout(below)
+        self._column.addWidget(self._below)
         self._column.addStretch(1)
         self._scroll = Scrolled(inside)
         self._scroll.setAccessibleName("How the robot is")
@@ -168,7 +169,7 @@ class HealthPanel(PanelWidget):
         worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
         self.chip.set(f"{len(wrong)} to look at" if wrong else "", worst)
         self.step.setText("Start it again" if link.virtual else "Find out why")
-        self.step.setVisible(not link.connected or link.mute)
+        self._below.setVisible(not link.connected or link.mute)
 
     def _make_rows(self, count: int) -> None:
         """So many rows; the button stands below the first."""

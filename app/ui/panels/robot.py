@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     from app.core.watches import Watch
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
+STALE = QColor(90, 90, 90, 150)
+STALE_AFTER_S = 2.0
+"""A virtual robot tells how it is many times a second, also when it does nothing."""
 STATUS = {"ready": "ok", "busy": "running", "silent": "warn", "away": "off"}
 KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
 
@@ -37,6 +42,7 @@ class RoomView(QWidget):
         self._drawing = RobotDrawing(theme.font("label"))
         self._data: Mapping[str, object] | None = None
         self.state = RobotState()
+        self.stale = False
         self._pressed: str | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
@@ -54,7 +60,14 @@ class RoomView(QWidget):
         state = RobotState.parse(data)
         if state != self.state:
             self.state = state
-            self.setAccessibleDescription(state.speech or "")
+            self.setAccessibleDescription("" if self.stale else state.speech or "")
+            self.update()
+
+    def set_stale(self, stale: bool) -> None:
+        """Whether it has not told for a while how it is: grey, and what it said is not said any more."""
+        if stale != self.stale:
+            self.stale = stale
+            self.setAccessibleDescription("" if stale else self.state.speech or "")
             self.update()
 
     def sizeHint(self) -> QSize:
@@ -66,7 +79,10 @@ class RoomView(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        self._drawing.paint(painter, QRectF(self.rect()), self.state, dark=self._theme.dark)
+        state = replace(self.state, speech=None, moving=False) if self.stale else self.state
+        self._drawing.paint(painter, QRectF(self.rect()), state, dark=self._theme.dark)
+        if self.stale:
+            painter.fillRect(self.rect(), STALE)
         painter.end()
 
     def _at(self, position: QPointF) -> str | None:
@@ -119,6 +135,8 @@ class RobotPanel(PanelWidget):
         self._robot = ""
         self._revision = -1
         self._watch: Watch | None = None
+        self._told: Mapping[str, object] | None = None
+        self._told_s = 0.0
         self.chip = Chip(self.theme)
         self.reset = IconButton(self.theme, "rotate-cw", "Put the robot and its room back", size=30)
         self.reset.clicked.connect(lambda: self._change({"reset": True}))
@@ -155,7 +173,11 @@ class RobotPanel(PanelWidget):
             return
         self.chip.set(link.chip, STATUS.get(link.state, "ok"))
         if link.drawing is not None:
+            now = time.monotonic()
+            if link.drawing is not self._told:
+                self._told, self._told_s = link.drawing, now
             self.view.show_state(link.drawing)
+            self.view.set_stale(link.state == "away" or link.mute or now - self._told_s > STALE_AFTER_S)
             self.pages.setCurrentWidget(self.view)
 
     def _show_menu(self) -> None:
