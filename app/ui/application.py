@@ -91,6 +91,29 @@ def make_window(session: Session, options: Options) -> tuple[MainWindow, Command
     return window, commands
 
 
+def first_steps(window: MainWindow, commands: Commands, options: Options) -> list[Callable[[], object]]:
+    """Let the window say what comes (what was asked, or left); what brings it after the first paint."""
+    left = "" if options.alone else commands.left
+    asked = bool(options.files or options.demo)
+    if options.self_drive is not None:
+        window.begin()
+        commands.do_asked(Asked(options.files, options.demo))
+        return []
+    if not asked and not left:
+        return [window.begin]
+
+    def show() -> None:
+        if asked:
+            commands.do_asked(Asked(options.files, options.demo))
+        else:
+            commands.habits.show_layout(left)
+        if window.bench is None:  # what was asked can't be opened; an alert says so
+            window.show_start()
+
+    window.expect("behaviour" if asked else left)
+    return [window.begin, show]
+
+
 def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order."""
     meeting_place = single_window.place(home())
@@ -111,11 +134,7 @@ def run(options: Options) -> int:
     soon = AfterFirstPaint(window, steps_after(window))
     window.show()
     window.activateWindow()  # keys go there at once, also where no window manager sees to it
-    first: list[Callable[[], object]] = [window.begin]
-    if options.files or options.demo or options.self_drive is not None:
-        window.begin()
-        commands.do_asked(Asked(options.files, options.demo))
-        first = []
+    first = first_steps(window, commands, options)
     if not options.alone:
         first.append(lambda: single_window.Meeting(meeting_place, commands.do_asked, window))
     soon.put_first(first)

@@ -14,7 +14,7 @@ from app.ui.docks import Dock
 from app.ui.file_dialogs import Asks, SystemDialogs
 from app.ui.files import Files
 from app.ui.habits import Habits
-from app.ui.main_window import MainWindow
+from app.ui.main_window import START, MainWindow
 from app.ui.mends import RobotMends
 from app.ui.others_sheet import OthersSheet
 from app.ui.popup import Sheet
@@ -102,7 +102,7 @@ class Commands:
             "file.save": files.save,
             "file.save_as": files.save_as,
             "file.earlier": lambda: files.with_newest(self._earlier_versions),
-            "file.start_page": window.show_start,
+            "file.start_page": self._start_page,
             "file.quit": window.close,
             "edit.undo": lambda: self._edit("undo"),
             "edit.redo": lambda: self._edit("redo"),
@@ -197,6 +197,10 @@ class Commands:
     def _show(self, layout: str) -> None:
         self.habits.show_layout(layout)
 
+    def _start_page(self) -> None:
+        self._window.show_start()
+        self._window.state.keep_layout(START)
+
     def _edit(self, what: str) -> None:
         editor = self._window.editor()
         if isinstance(editor, Undoes):
@@ -267,6 +271,13 @@ class Commands:
             window.setWindowState(window.windowState() & ~Qt.WindowState.WindowMinimized)
             window.raise_()
             window.activateWindow()
+
+    @property
+    def left(self) -> str:
+        """The layout that a person worked in last, if there is something in it; "" for the start page."""
+        last = self._window.state.layout
+        there = {"developer": True, "behaviour": any(not each.blank for each in self._session.documents)}
+        return last if there.get(last, False) else ""
 
     def demo(self) -> None:
         """Begin with the virtual robot and the first example."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QCloseEvent, QCursor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.dock_title import DockTitle
-from app.ui.panels.base import Density, Panel, PanelWidget
+from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
 from app.ui.widgets.menus import Menu, drop_below
@@ -227,3 +227,13 @@ class Dock(QDockWidget):
             drop_below(menu, anchor)
         else:
             menu.popup(QCursor.pos())
+
+
+def fitting(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:
+    """The one of these panels that shows such a kind: one made for it before one that shows anything."""
+    there = [docks[name] for name in names]
+    for wanted in (kinds, {ANY_TYPE}):
+        for dock in there:
+            if wanted & set(dock.description.accepts):
+                return dock
+    return None

@@ -14,7 +14,8 @@ from app.core.session import Session
 from app.ui.app_bar import AppBar
 from app.ui.arrangements import Arrangements
 from app.ui.banner import BannerPlace
-from app.ui.docks import Dock
+from app.ui.coming import Coming
+from app.ui.docks import Dock, fitting
 from app.ui.enter_key import EnterKey
 from app.ui.focus_ring import FocusRing
 from app.ui.garbage import Settling
@@ -22,7 +23,7 @@ from app.ui.layouts import LAYOUTS, layout_named
 from app.ui.leaving import Leaving
 from app.ui.move_question import MoveQuestion
 from app.ui.panel_focus import PanelFocus
-from app.ui.panels.base import ANY_TYPE, Panel, PanelContext
+from app.ui.panels.base import Panel, PanelContext
 from app.ui.robots_chip import robots_chip
 from app.ui.run_bar import RunBar, ToolBar
 from app.ui.start_page import Example, StartPage
@@ -143,6 +144,15 @@ class MainWindow(QMainWindow):
         self.state.keep_layout(layout.name)
         return bench
 
+    def expect(self, layout: str) -> None:
+        """Show the bars of a layout, and in its place that it is made in a moment."""
+        self.showing = layout
+        coming = Coming(layout)
+        self.pages.addWidget(coming)
+        self.pages.setCurrentWidget(coming)
+        self._show_bars(layout)
+        self.bench_made.connect(coming.deleteLater)
+
     def _show_bars(self, layout: str | None) -> None:
         self.bar.show_layout(layout)
         self.run_bar.setVisible(layout == "behaviour")
@@ -172,10 +182,10 @@ class MainWindow(QMainWindow):
         known = self.session.topics.get(topic)
         kinds = {known.codec, known.msg_type} if known is not None else set()
         bench = self.bench if self.bench is not None else self.show_layout("developer")
-        dock = _fitting(bench, kinds)
+        dock = fitting(bench.docks, bench.open_names(), kinds)
         if dock is None:
             bench = self.show_layout("developer")
-            dock = _fitting(bench, kinds) or bench.open("inspector")
+            dock = fitting(bench.docks, bench.open_names(), kinds) or bench.open("inspector")
         if dock is not None:
             dock.show()
             dock.raise_()
@@ -286,13 +296,3 @@ class MainWindow(QMainWindow):
             self.session.close()
             self.on_shut()
         super().closeEvent(event)
-
-
-def _fitting(bench: Workbench, kinds: set[str]) -> Dock | None:
-    """The open panel that shows one of these kinds: one made for it before one that shows anything."""
-    docks = [bench.docks[name] for name in bench.open_names()]
-    for wanted in (kinds, {ANY_TYPE}):
-        for dock in docks:
-            if wanted & set(dock.description.accepts):
-                return dock
-    return None

@@ -59,8 +59,8 @@ class WindowState:
 
     @property
     def layout(self) -> str:
-        """The layout that showed last."""
-        return self._settings.get("layout", "behaviour")
+        """The layout that showed last; "start" for the start page, also when Studio never ran before."""
+        return self._settings.get("layout", "start")
 
     def keep_layout(self, name: str) -> None:
         """Keep which layout shows."""

@@ -55,8 +55,14 @@ def test_work_is_offered_again_after_kill_9(start: Callable[..., Studio], tmp_pa
     assert again.quit() == 0
 
     third = start()
-    third.find(kind="StartPage")
+    until(lambda: set(third.blocks()) == edited, "what was worked on last shows")
     assert not third.all("Put it back")
+    third.choose("File", "Start page")
+    third.find(kind="StartPage")
+    assert third.quit() == 0
+
+    fourth = start()
+    fourth.find(kind="StartPage")
 
 
 def test_what_is_thrown_away_is_not_offered_again(start: Callable[..., Studio], tmp_path: Path) -> None:

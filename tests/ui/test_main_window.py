@@ -15,6 +15,8 @@ from app.core.run_view import RunView
 from app.core.session import Session
 from app.core.settings import Settings
 from app.ui.actions import TABLE, shortcuts
+from app.ui.application import Options, first_steps
+from app.ui.coming import Coming
 from app.ui.commands import Commands
 from app.ui.file_dialogs import SystemDialogs
 from app.ui.main_window import MainWindow
@@ -554,3 +556,53 @@ def test_files_are_asked_for_without_covering_stop(qtbot, window: MainWindow, co
     QTest.keyClick(dialog, Qt.Key.Key_F12)
     assert stops == ["stop"]
     dialog.close()
+
+
+def test_the_next_start_shows_what_was_worked_on_last(window: MainWindow, commands: Commands) -> None:
+    assert commands.left == "", "a first start"
+    commands.run("layout.developer")
+    assert commands.left == "developer"
+    commands.run("layout.behaviour")
+    assert commands.left == "", "no behaviour is open"
+    window.session.document.edited({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "a"}]}})
+    assert commands.left == "behaviour"
+    commands.run("file.start_page")
+    assert commands.left == "", "a person went to the start page"
+
+
+def test_a_layout_that_comes_shows_its_bars_and_then_itself(window: MainWindow, commands: Commands) -> None:
+    window.expect("behaviour")
+    coming = window.findChild(Coming)
+    assert window.pages.currentWidget() is coming
+    assert coming.accessibleName() == "Getting the blocks ready."
+    assert not window.run_bar.isHidden()
+    assert window.start.isHidden()
+    commands.run("layout.behaviour")
+    assert window.pages.currentWidget() is window.benches["behaviour"]
+
+
+@pytest.mark.parametrize("kind", ["good", "bad", "none"])
+def test_a_start_shows_the_file_that_was_asked_for(
+    window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.setattr(window, "begin", lambda: None)
+    path = tmp_path / "Mine.nepb"
+    path.write_text('{"format": "nep-behaviour", "version": 1, "workspace": {}}' if kind == "good" else "?")
+    steps = first_steps(window, commands, Options((path,) if kind != "none" else ()))
+    for step in steps:
+        step()
+    assert window.showing == ("behaviour" if kind == "good" else "start")
+    assert len(list(window.session.alerts.active)) == (1 if kind == "bad" else 0)
+
+
+def test_a_start_shows_what_was_left(
+    window: MainWindow, commands: Commands, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(window, "begin", lambda: None)
+    window.state.keep_layout("developer")
+    steps = first_steps(window, commands, Options())
+    assert window.findChild(Coming).accessibleName() == "Getting the panels ready."
+    for step in steps:
+        step()
+    assert window.showing == "developer"
+    assert [step.__name__ for step in first_steps(window, commands, Options(new_window=True))] == ["<lambda>"]
