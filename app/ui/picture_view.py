@@ -49,7 +49,7 @@ class PictureView(QWidget):
     """The newest picture of a stream; `take` is called at each refresh and paints only what is new."""
 
     def __init__(self, theme: Theme, *, fill: bool = False, labelled: bool = True) -> None:
-        """``fill`` lets the picture fill the view where its edges may be cut by a tenth, and has no black beside it.
+        """``fill`` lets the picture fill the view where its edges may be cut by a tenth; no black is by it.
 
         Without a label (``labelled``) a person reads in its middle that no new picture comes.
         """
