@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -244,20 +244,23 @@ class Topics:
 
 
 def _renew(topics: Iterable[Topic], view: GraphView) -> None:
+    find = view.topics.get
     for topic in topics:
-        info = view.topics.get(topic.name)
+        info = find(topic.name)
         if info is not None and info is not topic.info and topic.gone_since is None:
             _take_figures(topic, info)
 
 
 def _take_figures(topic: Topic, info: TopicInfo) -> None:
     topic.info = info
-    topic.rate_hz, topic.bandwidth_Bps = info.rate_hz, info.bandwidth_Bps
+    topic.rate_hz = rate_hz = info.rate_hz
+    topic.bandwidth_Bps = info.bandwidth_Bps
     topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
-    if info.last_stamp_ns is not None:
-        topic.last_stamp_ns = max(info.last_stamp_ns, topic.last_stamp_ns or 0)
-    if info.rate_hz is not None:
-        topic.rates.append(info.rate_hz)
+    stamp_ns, before = info.last_stamp_ns, topic.last_stamp_ns
+    if stamp_ns is not None and (before is None or stamp_ns > before):
+        topic.last_stamp_ns = stamp_ns
+    if rate_hz is not None:
+        topic.rates.append(rate_hz)
 
 
 def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
@@ -266,15 +269,15 @@ def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
 
 
 def _age(topic: Topic, now: float, now_ns: int) -> float | None:
-    stamp = topic.last_stamp_ns
-    if topic.newest is not None and topic.newest.stamp_ns is not None:
-        stamp = max(stamp or 0, topic.newest.stamp_ns)
+    stamp, newest = topic.last_stamp_ns, topic.newest
+    if newest is not None and newest.stamp_ns is not None:
+        stamp = max(stamp or 0, newest.stamp_ns)
     if stamp is not None:
-        return max(0.0, (now_ns - stamp) / 1e9)
+        return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
     return now - topic.last_received if topic.last_received is not None else None
 
 
-def total_rate_hz(topics: Sequence[TopicInfo]) -> float | None:
+def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:
     """Messages a second of all topics together; None when no publisher told its rate."""
     known = [info.rate_hz for info in topics if info.rate_hz is not None]
     return sum(known) if known else None

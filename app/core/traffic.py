@@ -7,8 +7,11 @@ from collections.abc import Mapping
 
 from app.core.losses import WINDOW_S, RecentLosses
 from app.core.mailbox import Batch
-from app.core.topics import Topics, total_rate_hz
+from app.core.topics import AT_ONCE, Topics, total_rate_hz
 from nep.views import GraphView
+
+SUM_EVERY_S = 0.5
+"""Figures of very many topics are summed up this often, however often they are told."""
 
 
 class Traffic:
@@ -24,20 +27,35 @@ class Traffic:
         self._topics = topics
         self._losses = RecentLosses()
         self._recent: deque[tuple[float, int, int]] = deque()
+        self._untold: GraphView | None = None
+        self._summed_at = -SUM_EVERY_S
         self.messages_per_s: float | None = None
         self.lost_30s = 0
         self.shown_30s = 0
         self.sent_30s = 0
 
     def follow(self, view: GraphView, now: float) -> None:
-        """Take over a new graph; ``now`` is monotonic seconds."""
-        self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
-        self.messages_per_s = total_rate_hz(list(view.topics.values()))
+        """Take over a new graph; ``now`` is monotonic seconds. Very many topics are summed up at leisure."""
+        self._untold = view
+        if len(view.topics) <= AT_ONCE:
+            self._sum_up(view, now)
+        else:
+            self._sum_up_if_due(now)
 
     def add(self, batches: Mapping[str, Batch], now: float) -> None:
-        """Count what a tick took over."""
+        """Count what a tick took over; called with every tick."""
         shown = sum(len(batch.messages) for batch in batches.values())
         self._count(shown, sum(batch.arrived for batch in batches.values()), now)
+        self._sum_up_if_due(now)
+
+    def _sum_up_if_due(self, now: float) -> None:
+        if self._untold is not None and now - self._summed_at >= SUM_EVERY_S:
+            self._sum_up(self._untold, now)
+
+    def _sum_up(self, view: GraphView, now: float) -> None:
+        self._untold, self._summed_at = None, now
+        self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
+        self.messages_per_s = total_rate_hz(view.topics.values())
 
     def miss(self, missed: Mapping[str, int], now: float) -> None:
         """Count what did not arrive here; ``missed`` are totals since each topic is looked at."""

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.lazy_json import LazyList, LazyObject
 from app.ui.theme import Theme
-from app.ui.widgets import Elided, IconButton, Line, label, paint
+from app.ui.widgets import Changing, IconButton, Line, label, paint
 from app.ui.words import grouped, latency_words, size_words
 from nep.errors import NepError
 
@@ -124,7 +124,7 @@ class Foot(QWidget):
         self.path.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.copy_value = IconButton(theme, "copy", "Copy value", "Ctrl+C", size=26)
         self.copy_path = IconButton(theme, "link", "Copy path", "Ctrl+Shift+C", size=26)
-        self.facts = Elided("small", "textTertiary")
+        self.facts = Changing("small", "textTertiary")
         self.legend = Legend(theme)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)

@@ -142,6 +142,10 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         """The key of a row."""
         return self._key(row)
 
+    def cell_at(self, row: int, column: int) -> Cell:
+        """What a cell shows now, asked without the way through Qt."""
+        return self.columns[column].cell(self._rows.shown[row])
+
     def index_of(self, key: str) -> QModelIndex:
         """The first cell of the row with this key; invalid when it is not shown."""
         keys = self._rows.keys

@@ -10,12 +10,13 @@ from PySide6.QtGui import QFont, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
 from app.ui.icons import paint_icon, paint_icon_again
-from app.ui.table import CELL_ROLE, Cell, Column, Order
+from app.ui.table import Cell, Column, Order
 from app.ui.theme import Theme
 from app.ui.widgets.small import SPARK, paint_sparkline
 
 Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
+REMEMBERED = 4000  # cells: some screens full, so that scrolling does not gather all there are
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
@@ -37,6 +38,9 @@ class Shown(Protocol):
     def cell_font(self, cell: Cell) -> QFont:
         """The font of a cell."""
 
+    def cell_at(self, row: int, column: int) -> Cell:
+        """What a cell shows now."""
+
 
 def padded(rect: QRect, column: int, last: int) -> QRectF:
     """The inside of a cell: the outer columns keep further from the edge."""
@@ -46,31 +50,38 @@ def padded(rect: QRect, column: int, last: int) -> QRectF:
 
 
 class CellDelegate(QStyledItemDelegate):
-    """Paints a `Cell`."""
+    """Paints a `Cell`, and knows what each place showed when it was painted last."""
 
     def __init__(self, theme: Theme, view: Shown, parent: QWidget) -> None:
         super().__init__(parent)
         self._theme = theme
         self._view = view
+        self._painted: dict[tuple[int, int], Cell] = {}
+
+    def changed(self, row: int, columns: Sequence[int]) -> list[int]:
+        """Those of the columns that this row would show otherwise than it was painted last."""
+        if len(self._painted) > REMEMBERED:
+            self._painted.clear()
+        at = self._view.cell_at
+        return [column for column in columns if self._painted.get((row, column)) != at(row, column)]
 
     def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
         return QSize(40, self._view.row_height)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        cell = index.data(CELL_ROLE)
-        if not isinstance(cell, Cell):
-            return
+        row, column = index.row(), index.column()
+        cell = self._painted[row, column] = self._view.cell_at(row, column)
         theme, rect = self._theme, QRect(option.rect)
-        chosen = bool(option.state & QStyle.StateFlag.State_Selected)
+        chosen = QStyle.StateFlag.State_Selected in option.state
         painter.save()
         if chosen:
             painter.fillRect(rect, theme.colour("selected"))
-        elif self._view.hovered_row == index.row():
+        elif self._view.hovered_row == row:
             painter.fillRect(rect, theme.colour("hover"))
-        if chosen and index.column() == 0:
+        if chosen and column == 0:
             painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
-        figures = self._view.shown_columns[index.column()].figures
-        inside = padded(rect, index.column(), self._view.last_shown)
+        figures = self._view.shown_columns[column].figures
+        inside = padded(rect, column, self._view.last_shown)
         role = "selectedText" if chosen and cell.role == "text" else cell.role
         if chosen and role == "textTertiary":
             role = "accentText"
@@ -84,13 +95,18 @@ class CellDelegate(QStyledItemDelegate):
             paint_sparkline(painter, place, cell.curve, theme.colour(role))
             return
         box = box.adjusted(cell.indent, 0, 0, 0)
+        if not (cell.text or cell.icon or cell.chip):
+            return
         font = self._view.cell_font(cell)
         metrics = QFontMetricsF(font)
         colour = theme.colour(role)
         taken = (ICON + 5.0 if cell.icon else 0.0) + (self._chip_width(cell.chip) + 8 if cell.chip else 0.0)
-        shorten = Qt.TextElideMode.ElideMiddle if cell.middle else Qt.TextElideMode.ElideRight
-        text = metrics.elidedText(cell.text, shorten, max(0.0, box.width() - taken))
+        text, room = cell.text, max(0.0, box.width() - taken)
         advance = metrics.horizontalAdvance(text)
+        if advance > room:
+            shorten = Qt.TextElideMode.ElideMiddle if cell.middle else Qt.TextElideMode.ElideRight
+            text = metrics.elidedText(text, shorten, room)
+            advance = metrics.horizontalAdvance(text)
         x = box.right() - advance - taken if figures else box.left()
         if cell.icon:
             top = box.center().y() - ICON / 2

@@ -10,17 +10,21 @@ from PySide6.QtCore import (
     QModelIndex,
     QPersistentModelIndex,
     QPoint,
+    QRect,
     QRectF,
     Qt,
     Signal,
 )
 from PySide6.QtGui import (
+    QAccessible,
+    QAccessibleTableModelChangeEvent,
     QFocusEvent,
     QFont,
     QKeyEvent,
     QPainter,
     QPaintEvent,
     QPen,
+    QRegion,
     QResizeEvent,
 )
 from PySide6.QtWidgets import (
@@ -71,7 +75,8 @@ class TableView(QTableView, Generic[Row]):
         self._large = False
         self.setModel(model)
         self._model = model
-        self.setItemDelegate(CellDelegate(theme, self, self))
+        self._cells = CellDelegate(theme, self, self)
+        self.setItemDelegate(self._cells)
         self.setHorizontalHeader(Head(theme, self, self))
         head = self.horizontalHeader()
         head.sectionClicked.connect(self._sort)
@@ -128,6 +133,10 @@ class TableView(QTableView, Generic[Row]):
             self._fonts[key] = font
         return self._fonts[key]
 
+    def cell_at(self, row: int, column: int) -> Cell:
+        """What a cell shows now."""
+        return self._model.cell_at(row, column)
+
     def visible_rows(self) -> tuple[int, int]:
         """First and last row that can be seen; the last is before the first when there is none."""
         first = self.rowAt(0)
@@ -137,9 +146,35 @@ class TableView(QTableView, Generic[Row]):
         return first, last if last >= 0 else self._model.rowCount() - 1
 
     def tell_visible_changed(self) -> None:
-        """Figures changed: repaint what can be seen, with one signal."""
+        """Figures may have changed: repaint those that can be seen and did, with one signal."""
         first, last = self.visible_rows()
         self._model.tell_changed(first, last)
+
+    def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
+        """Qt says which rows may have changed; it would paint all of them again."""
+        top, bottom = self.visible_rows()
+        columns = [place for place in range(len(self.columns)) if not self.isColumnHidden(place)]
+        dirty = QRegion()
+        for row in range(max(first.row(), top), min(last.row(), bottom) + 1):
+            changed = self._cells.changed(row, columns)
+            if changed:
+                x = self.columnViewportPosition(changed[0])
+                wide = self.columnViewportPosition(changed[-1]) + self.columnWidth(changed[-1]) - x
+                dirty += QRect(x, self.rowViewportPosition(row), wide, self.row_height)
+        if not dirty.isEmpty():
+            self.viewport().update(dirty)
+            self._tell_screen_reader(first.row(), last.row())
+
+    def _tell_screen_reader(self, first: int, last: int) -> None:
+        if QAccessible.isActive():
+            event = QAccessibleTableModelChangeEvent(
+                self, QAccessibleTableModelChangeEvent.ModelChangeType.DataChanged
+            )
+            event.setFirstRow(first)
+            event.setLastRow(last)
+            event.setFirstColumn(0)
+            event.setLastColumn(len(self.columns) - 1)
+            QAccessible.updateAccessibility(event)
 
     def chosen_key(self) -> str | None:
         """The key of the chosen row."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import ValuesView
+from dataclasses import replace
+
 from app.core.losses import WINDOW_S
 from app.core.mailbox import Batch
-from app.core.topics import Topics
+from app.core.topics import AT_ONCE, Topics
 from app.core.traffic import Traffic
 from nep.message import Message
 from nep.views import GraphView, PublisherInfo, TopicInfo
@@ -59,3 +62,30 @@ def test_the_figures_of_the_network_come_from_the_graph() -> None:
     assert (traffic.messages_per_s, traffic.lost_30s) == (10.0, 0)
     traffic.follow(view(9), 1.0)
     assert traffic.lost_30s == 5
+
+
+class Counted(dict[str, TopicInfo]):
+    """Topics that count how often somebody went through all of them."""
+
+    times = 0
+
+    def values(self) -> ValuesView[TopicInfo]:
+        self.times += 1
+        return super().values()
+
+
+def test_very_many_topics_are_summed_up_twice_a_second_and_the_last_figures_are_not_forgotten() -> None:
+    traffic = Traffic(Topics())
+    one = TopicInfo("/a", "json", "json", lost=1, rate_hz=2.0)
+    views = [
+        GraphView(1, 1, {}, Counted({f"/{n}": replace(one, lost=told) for n in range(AT_ONCE + 1)}))
+        for told in range(1, 21)
+    ]
+    for number, view in enumerate(views):
+        traffic.follow(view, number / 20)
+        traffic.add({}, number / 20)
+    went = sum(view.topics.times for view in views if isinstance(view.topics, Counted))
+    assert 4 <= went <= 6  # each time for what was lost and for the rates
+    traffic.add({}, 2.0)
+    assert traffic.messages_per_s == 2.0 * (AT_ONCE + 1)
+    assert traffic.lost_30s == 19 * (AT_ONCE + 1)

@@ -5,9 +5,10 @@ import threading
 from collections.abc import Iterator, Mapping
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
 
 from app.core import lazy_json
 from app.ui.inspector_body import LARGE, NOTHING, RAW, TREE
@@ -68,6 +69,35 @@ def test_the_newest_message_as_a_tree_with_its_facts(panel, window) -> None:
     assert panel.foot.facts.text().startswith("seq 18\u2009204   ")
     assert "latency" in panel.foot.facts.text()
     assert panel.live.text == "live"
+
+
+class Layouts(QObject):
+    """Counts how often something inside asked to be laid out again."""
+
+    def __init__(self, watched: QWidget) -> None:
+        super().__init__()
+        self.count = 0
+        watched.installEventFilter(self)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        self.count += event.type() == QEvent.Type.LayoutRequest
+        return False
+
+
+def test_facts_that_change_with_each_message_do_not_lay_out_the_window_again(qapp, panel, window) -> None:
+    panel.show_topic("/blackboard")
+    layouts, told = Layouts(panel.body), set()
+    for number in range(8):
+        window.session.send("/blackboard", blackboard(number))
+        ticks(window, panel)
+        qapp.processEvents()
+        if number == 2:  # its first messages fill the panel, which is laid out for them
+            layouts.count = 0
+            told.clear()
+        told.add(panel.foot.facts.text())
+        assert panel.foot.facts.accessibleName() == panel.foot.facts.text()
+    assert len(told) == 6
+    assert layouts.count == 0
 
 
 def test_the_next_message_keeps_what_is_expanded_and_marks_what_changed(panel, window) -> None:

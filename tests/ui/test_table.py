@@ -3,11 +3,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import pytest
-from PySide6.QtCore import QModelIndex, QPoint, QRectF, Qt
-from PySide6.QtGui import QImage, QPainter
+from PySide6.QtCore import QEvent, QModelIndex, QObject, QPoint, QRectF, Qt
+from PySide6.QtGui import QImage, QPainter, QPaintEvent, QRegion
 from PySide6.QtTest import QSignalSpy, QTest
+from PySide6.QtWidgets import QTableView
 
 from app.ui.table import CELL_ROLE, Cell, Column, Order, TableModel
+from app.ui.table_cells import REMEMBERED
 from app.ui.table_columns import ColumnChoice
 from app.ui.table_view import TableView
 from app.ui.theme import Theme
@@ -117,6 +119,62 @@ def test_only_rows_that_can_be_seen_are_told_with_one_signal(qapp, view, model) 
     assert told.count() == 1
     first, last = told.at(0)[0], told.at(0)[1]
     assert 4990 <= first.row() <= last.row() <= 5020
+
+
+class Brush(QObject):
+    """Notes where a view is painted again."""
+
+    def __init__(self, view: TableView[Row]) -> None:
+        super().__init__()
+        self.painted = QRegion()
+        view.viewport().installEventFilter(self)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        if isinstance(event, QPaintEvent):
+            self.painted += event.region()
+        return False
+
+
+@pytest.fixture
+def brush(qapp, view) -> Brush:
+    qapp.processEvents()
+    made = Brush(view)
+    view.viewport().repaint()
+    assert made.painted.boundingRect() == view.viewport().rect()
+    made.painted = QRegion()
+    return made
+
+
+def test_only_figures_that_changed_are_painted_again(qapp, view, model, brush) -> None:
+    view.tell_visible_changed()
+    qapp.processEvents()
+    assert brush.painted.isEmpty()
+    model.row_at(model.index(1, 0)).rate = 7.5
+    view.tell_visible_changed()
+    qapp.processEvents()
+    assert brush.painted == QRegion(view.visualRect(model.index(1, 1)))
+
+
+def test_a_figure_that_changed_while_something_else_was_painted_is_painted_again(
+    qapp, view, model, brush
+) -> None:
+    row = model.row_at(model.index(0, 0))
+    row.rate = 7.5
+    view.viewport().repaint()
+    row.rate = 2.0  # as the view was told it last
+    brush.painted = QRegion()
+    view.tell_visible_changed()
+    qapp.processEvents()
+    assert brush.painted == QRegion(view.visualRect(model.index(0, 1)))
+
+
+def test_what_was_painted_is_not_remembered_of_all_rows(qapp, view, model) -> None:
+    model.set_rows([Row(f"{number:05}", 1.0) for number in range(REMEMBERED)])
+    for first in range(0, REMEMBERED, 5):
+        view.scrollTo(model.index(first, 0), QTableView.ScrollHint.PositionAtTop)
+        view.viewport().repaint()
+        view.tell_visible_changed()
+    assert len(view._cells._painted) <= REMEMBERED + 50
 
 
 def test_the_stretching_column_takes_what_is_left(view) -> None:

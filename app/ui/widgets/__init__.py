@@ -18,6 +18,7 @@ from app.ui.widgets.slider import NumberField as NumberField
 from app.ui.widgets.slider import SliderWithUnit as SliderWithUnit
 from app.ui.widgets.small import Bar as Bar
 from app.ui.widgets.small import Card as Card
+from app.ui.widgets.small import Changing as Changing
 from app.ui.widgets.small import Elided as Elided
 from app.ui.widgets.small import Line as Line
 from app.ui.widgets.small import SearchField as SearchField

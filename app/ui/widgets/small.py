@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QFrame, QLabel, QLineEdit, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
@@ -53,11 +53,34 @@ class Elided(QLabel):
     def paintEvent(self, _event: QPaintEvent) -> None:
         room = self.contentsRect()
         fits = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideMiddle, room.width() + 1)
-        self.setToolTip(self.text() if fits != self.text() else "")
+        whole = self.text() if fits != self.text() else ""
+        if whole != self.toolTip():
+            self.setToolTip(whole)
         painter = QPainter(self)
         painter.setPen(self.palette().color(self.foregroundRole()))
         painter.drawText(room, int(paint.LEFT), fits)
         painter.end()
+
+
+class Changing(Elided):
+    """Words that change many times a second, in room that does not depend on them.
+
+    A label asks for its room anew with every word, and the whole window is then laid out again.
+    """
+
+    def __init__(self, kind: str, role: str) -> None:
+        self._words = ""
+        super().__init__(kind, role)
+        super().setText("0")  # the room of one line
+
+    def text(self) -> str:
+        return self._words
+
+    def setText(self, text: str) -> None:
+        if text != self._words:
+            self._words = text
+            self.setAccessibleName(text)
+            self.update()
 
 
 class Line(QWidget):
@@ -130,15 +153,20 @@ def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], co
         return
     least, most = min(values), max(values)
     steady = most - least <= 0.1 * abs(most) or most == least
-    points = QPolygonF()
+    lowest, span = (most - (abs(most) or 1), 2 * (abs(most) or 1)) if steady else (least, most - least)
+    left, step = rect.left(), rect.width() / (len(values) - 1)
+    bottom, rise = rect.bottom() - 1, (rect.height() - 2) / span
+    curve = QPainterPath()
+    curve.reserve(len(values))
+    curve.moveTo(left, bottom - (values[0] - lowest) * rise)
+    draw_to = curve.lineTo
     for index, value in enumerate(values):
-        share = 0.5 + 0.5 * (value - most) / (abs(most) or 1) if steady else (value - least) / (most - least)
-        x = rect.left() + rect.width() * index / (len(values) - 1)
-        points.append(QPointF(x, rect.bottom() - 1 - share * (rect.height() - 2)))
+        draw_to(left + step * index, bottom - (value - lowest) * rise)
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(QPen(colour, SPARK_STROKE))
-    painter.drawPolyline(points)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawPath(curve)
     painter.restore()
 
 
