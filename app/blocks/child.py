@@ -195,25 +195,35 @@ class Run:
         return silent if self._stop_answer_s else ()
 
     def _begin(self, network: Network) -> None:
-        names = self._runtime.namespace()
+        names = self._runtime.namespace() | {"step": partial(self._step, network)}
         code = compile(self._program.runnable, "<behaviour>", "exec")
         exec(code, names)  # noqa: S102 (the compiler's own tree: no text of a file is in it but as a literal)
         self._began = time.monotonic()
         self._runtime.start(network, self._robots)
 
+    def _step(self, network: Network, block: str) -> None:
+        """A block begins; in slow motion robots do not drive on while it waits for its turn."""
+        if self._runtime.scheduler.pace_s:
+            with network.slow():
+                self._runtime.step(block)
+        else:
+            self._runtime.step(block)
+
     def _watch(self) -> None:
         """Tell 30 times a second what runs, when it changed."""
-        runtime, before = self._runtime, None
+        runtime, saying, before = self._runtime, self._runtime.saying, None
         while not runtime.finished.wait(SAMPLE_S):
             now = runtime.scheduler.snapshot()
-            words = runtime.says(now.blocks)
+            words, warning = saying.says(now.blocks), saying.warns(now.blocks)
             self._out.send_printed()
-            if (now, words) == before:
+            if (now, words, warning) == before:
                 continue
-            before = (now, words)
+            before = (now, words, warning)
             if now.paused:
-                block = now.next_block
-                self._out.send("paused", block=block, blocks=now.blocks, says=runtime.reading(block))
+                reading = saying.reading(now.next_block)
+                self._out.send(
+                    "paused", block=now.next_block, blocks=now.blocks, says=reading, warning=warning
+                )
             else:
                 self._out.send("running", blocks=now.blocks, says=words)
 

@@ -20,15 +20,23 @@ def rest_of(action: Action, input: Mapping[str, object], call: Call) -> dict[str
     """
     if not call.began:
         return dict(input)
+    if is_unknown(action, input, call):
+        return None
     name = measured_by(action, input)
     if name is None:
-        return None if action.risk == "locomotes" else dict(input)
-    left, whole = call.feedback.get(LEFT), input[name]
-    if isinstance(left, bool) or not isinstance(left, (int, float)) or not isinstance(whole, (int, float)):
-        return None
+        return dict(input)
+    left, whole = _number(call.feedback.get(LEFT)), _number(input[name])
     if abs(left) <= abs(whole) / 1000:
         return None
     return {**input, name: math.copysign(min(abs(left), abs(whole)), whole)}
+
+
+def is_unknown(action: Action, input: Mapping[str, object], call: Call) -> bool:
+    """Whether the robot was on its way to another place, and does not tell how much of it is left."""
+    name = measured_by(action, input)
+    if not call.began or name is None:
+        return call.began and action.risk == "locomotes"
+    return not _is_number(call.feedback.get(LEFT))
 
 
 def measured_by(action: Action, input: Mapping[str, object]) -> str | None:
@@ -44,3 +52,7 @@ def measured_by(action: Action, input: Mapping[str, object]) -> str | None:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, (int, float)) else 0.0

@@ -9,8 +9,9 @@ from typing import Protocol
 
 from app.blocks import values
 from app.blocks.explain import BehaviourError
-from app.blocks.holding import rest_of
+from app.blocks.holding import is_unknown, rest_of
 from app.blocks.link import Call, Link
+from app.blocks.saying import Saying
 from app.blocks.scheduler import Scheduler
 from app.robots.description import Action, Parameter, Robot
 
@@ -34,6 +35,7 @@ class Stage(Protocol):
     """What a robot's handle needs of the program that runs."""
 
     scheduler: Scheduler
+    saying: Saying
 
     def described(self, name: str) -> Robot:
         """The description of a robot that is there."""
@@ -43,8 +45,8 @@ class Stage(Protocol):
         """The network."""
         ...
 
-    def tell(self, sentence: str) -> None:
-        """What a robot does now."""
+    def write(self, value: object) -> None:
+        """Write a line to the console."""
         ...
 
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
@@ -109,11 +111,11 @@ class RobotHandle:
         if wrong:
             raise BehaviourError(f"{self._name} can't do this: {wrong[0]}.")
         words = sentence(robot, action, input)
-        self._runtime.tell(words)
+        self._runtime.saying.tell(words)
         try:
             call = self._do(robot, action, action.complete(input), words)
         finally:
-            self._runtime.tell("")
+            self._runtime.saying.tell("")
         if call.state == "failed":
             raise BehaviourError(_ended(f"{self._name}: {call.error or f'“{action.title}” failed'}"))
         return call
@@ -125,9 +127,16 @@ class RobotHandle:
             self._await(robot, action, call, words)
             if not call.held or call.state != "canceled":
                 return call
+            unknown = is_unknown(action, input, call)
+            if unknown:
+                left_out = f"{self._name} does not tell how much of “{action.title}” is left"
+                self._runtime.saying.warn(f"{left_out}; Go on leaves it out")
             self._runtime.scheduler.hold()
+            self._runtime.saying.warn("")
             rest = rest_of(action, input, call)
             if rest is None:
+                if unknown:
+                    self._runtime.write(f"{left_out}, so it was left out")
                 return call
             input = rest
 
@@ -140,7 +149,7 @@ class RobotHandle:
         until = time.monotonic() + limit + MARGIN_S
         waits = bool(call.waits_for) and call.state == "accepted"
         if waits:
-            self._runtime.tell(_waiting(robot, call))
+            self._runtime.saying.tell(_waiting(robot, call))
 
         def ready() -> bool:
             return call.done or (can_hold and scheduler.holds())
@@ -149,7 +158,7 @@ class RobotHandle:
             if waits:  # its time limit begins with it
                 until = time.monotonic() + limit + MARGIN_S
                 waits = not call.began
-                self._runtime.tell(_waiting(robot, call) if waits else words)
+                self._runtime.saying.tell(_waiting(robot, call) if waits else words)
             said = self._broken(robot, call)
             if said is None and time.monotonic() >= until:
                 said = f"{self._name} has not ended “{action.title}” within {limit:g} s."

@@ -18,6 +18,7 @@ from app.blocks.hats import Hat, PassGate, changes, event_matches
 from app.blocks.link import Link
 from app.blocks.namespace import namespace
 from app.blocks.robot_handle import RobotHandle
+from app.blocks.saying import Saying
 from app.blocks.scheduler import Scheduler, Stopped
 from app.robots.description import Robot
 
@@ -44,7 +45,6 @@ class Runtime:
     ) -> None:
         self._printed = printed
         self._labels = labels or {}
-        self._readings = readings or {}
         self._link: Link | None = None
         self._robots: Mapping[str, Robot] = {}
         self._starts: list[Script] = []
@@ -52,8 +52,8 @@ class Runtime:
         self._subscriptions: list[Callable[[Link], None]] = []
         self._count_lock = threading.Lock()
         self._running = 0
-        self._told: dict[str | None, str] = {}
         self.scheduler = Scheduler()
+        self.saying = Saying(self.scheduler.block, readings or {})
         self._calls = Calls(self.scheduler)
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
@@ -268,25 +268,6 @@ class Runtime:
         if self._link is None:
             raise BehaviourError("the program has not begun yet.")
         return self._link
-
-    # ---- what happens now, in words
-
-    def tell(self, sentence: str) -> None:
-        """What a robot does now for the calling script's block; "" when it is done."""
-        block = self.scheduler.block()
-        if sentence:
-            self._told[block] = sentence
-        else:
-            self._told.pop(block, None)
-
-    def says(self, blocks: Sequence[str]) -> str:
-        """The sentence for the run bar: what a robot does now, else the first block in words."""
-        told = next((self._told[block] for block in blocks if block in self._told), None)
-        return told or self.reading(blocks[0] if blocks else None)
-
-    def reading(self, block: str | None) -> str:
-        """A block in words, "" for none."""
-        return self._readings.get(block or "", "")
 
 
 def _is_so(condition: Callable[[], object]) -> bool:

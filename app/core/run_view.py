@@ -16,7 +16,7 @@ NOTHING = "Take “when started” from Events and hang blocks below it"
 class RunState:
     """Where the run is. ``state`` is ready, running, paused, stopping, proven or unanswered.
 
-    Times are monotonic seconds; the program's clock stands while it is paused (``held_s``,
+    ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the program's clock stands while it is paused (``held_s``,
     ``pause_began_s``).
     """
 
@@ -24,6 +24,7 @@ class RunState:
     name: str = ""
     says: str = ""
     paused_at: str = ""
+    warning: str = ""
     started_s: float = 0.0
     held_s: float = 0.0
     pause_began_s: float | None = None
@@ -144,7 +145,7 @@ def _paused(run: RunState, _now: float) -> RunView:
     return RunView(
         "paused",
         f"Paused at “{run.paused_at}”" if run.paused_at else "Paused",
-        "Robots hold still; the clock stands",
+        run.warning or "Robots hold still; the clock stands",
         f"{run.name} is paused",
         can_run=True,
         can_step=True,

@@ -271,7 +271,8 @@ class Runner:
         if kind == "ready":
             return RunnerEvent("ready", self.run)
         if kind in ("running", "paused"):
-            return RunnerEvent(kind, self.run, blocks=blocks, says=text_of(said, "says"))
+            says, text = text_of(said, "says"), text_of(said, "warning")
+            return RunnerEvent(kind, self.run, blocks=blocks, says=says, text=text)
         if kind == "error":
             return RunnerEvent("error", self.run, blocks=first, text=text_of(said, "sentence"), ok=False)
         if kind == "print":

@@ -154,7 +154,7 @@ class Runs:
                 self._mark(running=event.blocks, stopped=self.stopped_blocks)
             case "paused" if run.state in {"running", "paused"}:
                 run.state, run.paused_at = "paused", place_of(event.says, event.blocks, self._labels)
-                run.pause_began_s = run.pause_began_s or self._clock()
+                run.pause_began_s, run.warning = run.pause_began_s or self._clock(), event.text
                 self._mark(stopped=event.blocks)
             case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
                 self._on_error(event)

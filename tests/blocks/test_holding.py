@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from app.blocks.holding import measured_by, rest_of
+from app.blocks.compiler import compile_behaviour
+from app.blocks.holding import is_unknown, measured_by, rest_of
 from app.blocks.link import Call
 from app.robots import simulated
 from app.robots.description import parse, td_for
+from tests.blocks.fakes import FakeLink, Play, until
+from tests.blocks.samples import block, number, started, text, workspace, write
 
 PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
 
@@ -51,6 +54,68 @@ def test_driving_without_telling_what_is_left_is_left_out() -> None:
     drives = replace(action("walk"), feedback=())
     assert measured_by(drives, {"distance": 1.0}) is None
     assert rest_of(drives, {"distance": 1.0}, held("walk", to_go=0.5)) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "feedback", "unknown"),
+    [
+        ("walk", {"distance": 1.0}, {"to_go": 0.4}, False),
+        ("walk", {"distance": 1.0}, {"to_go": 0.0}, False),  # it was done
+        ("walk", {"distance": 1.0}, {}, True),
+        ("walk", {"distance": 1.0}, {"to_go": True}, True),
+        ("wave", {"hand": "left"}, {}, False),  # it begins again
+    ],
+)
+def test_it_is_known_when_nobody_can_tell_what_is_left(name, given, feedback, unknown) -> None:
+    call = held(name, **feedback)
+    assert is_unknown(action(name), given, call) is unknown
+    assert not is_unknown(action(name), given, replace(call, began=False))
+
+
+class Blind(FakeLink):
+    """Robots that end at once what is taken back, and never tell how far they are."""
+
+    def invoke(self, robot, action, input):
+        call = super().invoke(robot, action, input)
+        call.began = True
+        return call
+
+    def cancel(self, call) -> None:
+        super().cancel(call)
+        self.answer(call, "canceled")
+
+
+def test_a_person_reads_that_the_rest_will_be_left_out_and_that_it_was() -> None:
+    walk = block("robot_pepper_do_walk", "w", ROBOT="Pepper", DISTANCE=number(1))
+    blocks = workspace(started(walk | {"next": {"block": write(text("after"))}}))
+    link = Blind()
+    link.held = {"walk"}
+    run = Play(compile_behaviour(blocks, [PEPPER]), (PEPPER,), link).start()
+    until(lambda: bool(link.calls))
+    assert run.runtime.saying.warns(("w",)) == ""
+    run.runtime.scheduler.pause()
+    said = "Pepper does not tell how much of “walk” is left"
+    until(lambda: run.runtime.saying.warns(("w",)) == f"{said}; Go on leaves it out")
+    run.runtime.scheduler.go_on()
+    assert run.end().lines == [f"{said}, so it was left out", "after"]
+    assert run.runtime.saying.warns(("w",)) == ""
+    assert len(link.calls) == 1
+
+
+def test_nothing_is_said_of_what_is_done_afterwards() -> None:
+    walk = block("robot_pepper_do_walk", "w", ROBOT="Pepper", DISTANCE=number(1))
+    link = Blind()
+    link.held = {"walk"}
+    run = Play(compile_behaviour(workspace(started(walk)), [PEPPER]), (PEPPER,), link).start()
+    until(lambda: bool(link.calls))
+    link.calls[0].feedback = {"to_go": 0.25}
+    run.runtime.scheduler.pause()
+    until(lambda: link.calls[0].done)
+    run.runtime.scheduler.go_on()
+    until(lambda: len(link.calls) == 2)
+    assert link.invoked[1][2]["distance"] == 0.25
+    link.answer(link.calls[1], "succeeded")
+    assert run.end().lines == []
 
 
 def test_the_unit_says_which_value_is_meant() -> None:

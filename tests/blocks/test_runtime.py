@@ -49,7 +49,7 @@ def test_a_block_waits_for_its_robot(running):
     until(lambda: bool(link.calls))
     assert link.invoked == [("Pepper", "turn", {"direction": "left", "angle": 30})]
     assert run.runtime.scheduler.snapshot().blocks == ("t",)
-    assert run.runtime.says(["t"]) == "Pepper turns left by 30 °"
+    assert run.runtime.saying.says(["t"]) == "Pepper turns left by 30 °"
     link.answer(link.calls[0], "succeeded")
     run.end()
     assert link.invoked[1] == ("Pepper", "say", {"text": "done"})
@@ -64,10 +64,10 @@ def test_what_the_robot_says_appears_in_words_until_it_is_done(running):
     until(lambda: len(link.calls) == 2)
     # The other script's block is done meanwhile, and takes nothing away.
     until(lambda: run.runtime.scheduler.snapshot().blocks == ("x",))
-    assert run.runtime.says(["x"]) == "Pepper says “Touch my head.”"
+    assert run.runtime.saying.says(["x"]) == "Pepper says “Touch my head.”"
     link.answer(link.calls[0], "succeeded")
     run.end()
-    assert run.runtime.says(["l"]) == "Pepper light eyes #37b6ff"
+    assert run.runtime.saying.says(["l"]) == "Pepper light eyes #37b6ff"
 
 
 def test_a_refused_action_is_an_error_on_its_block_with_the_robots_sentence():
@@ -365,7 +365,7 @@ def test_a_pause_and_single_steps(running):
         until(lambda: scheduler.snapshot().paused)
         assert scheduler.snapshot().next_block == f"w{n}"
         assert run.lines == [f"{done}" for done in range(n)]
-        assert run.runtime.reading(f"w{n}") == f"write “{n}” to the console"
+        assert run.runtime.saying.reading(f"w{n}") == f"write “{n}” to the console"
         scheduler.step_once()
     run.end()
     assert run.lines == ["0", "1", "2"]

@@ -38,6 +38,14 @@ def test_running_tells_its_time_and_what_happens() -> None:
     assert (view.can_run, view.can_pause, view.can_step) == (False, True, True)
 
 
+def test_a_paused_program_says_what_go_on_will_leave_out() -> None:
+    said = "Rover does not tell how much of “drive” is left; Go on leaves it out"
+    run = RunState("paused", "Greeting", paused_at="drive 2 m", warning=said)
+    assert view_of(run, ["Rover"], 1.0).detail == said
+    run.warning = ""
+    assert view_of(run, ["Rover"], 1.0).detail == "Robots hold still; the clock stands"
+
+
 def test_the_clock_stands_while_paused() -> None:
     run = RunState("paused", "Greeting", paused_at="wait 2 s", started_s=100.0, pause_began_s=110.0)
     view = view_of(run, ["Pepper"], 200.0)
