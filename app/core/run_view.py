@@ -16,8 +16,8 @@ NOTHING = "Take “when started” from Events and hang blocks below it"
 class RunState:
     """Where the run is. ``state`` is ready, running, paused, stopping, proven or unanswered.
 
-    ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the program's clock stands while it is paused (``held_s``,
-    ``pause_began_s``).
+    ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the
+    program's clock stands while it is paused (``held_s``, ``pause_began_s``).
     """
 
     state: str = "ready"

@@ -14,8 +14,9 @@ class RunnerEvent:
 
     ``run`` is the number of the runner's program. ``blocks`` run now (kind running), are held (paused; the
     first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
-    in words); ``text`` what a person should know (paused), a printed line, an error's sentence, or at the end why it did not end well. ``ok``: it
-    ended, and no block failed. ``silent``: robots that did not answer the program's own stop at its end.
+    in words); ``text`` a printed line, what a person should know (paused), an error's sentence, or at the end
+    why it did not end well. ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the
+    program's own stop at its end.
     """
 
     kind: Kind
