@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import signal
 import sys
@@ -30,10 +31,13 @@ from app.ui.self_drive import SelfDrive
 from app.ui.single_window import Asked
 from app.ui.start_page import read_examples
 from app.ui.theme import MODES, Theme
+from app.ui.window_state import WindowState
 
 LOG_EVERY_MS = 500
 SOON = ("app.ui.palette", "app.ui.blockly_view", "app.ui.settings_sheet", "app.ui.shortcut_sheet")
 """Imported after the first paint, though nobody has asked for them yet."""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -78,11 +82,12 @@ def steps_after(window: MainWindow) -> list[Callable[[], object]]:
 def make_window(session: Session, options: Options) -> tuple[MainWindow, Commands]:
     """The window with its commands, as it was left; nothing runs yet."""
     theme = Theme("light")
-    window = MainWindow(session, theme, PanelShelf(), read_examples(resources.folder() / "examples"))
-    window.state.apply_theme(theme)
+    # first of all: until Qt's event loop runs, it tells no widget that the application's font is another one
+    WindowState(session.settings, _log.warning).apply_theme(theme)
     chosen = next((mode for mode in MODES if mode == options.theme), None)
     if chosen is not None:
         theme.set_mode(chosen)
+    window = MainWindow(session, theme, PanelShelf(), read_examples(resources.folder() / "examples"))
     window.setWindowIcon(QIcon(LogoEngine(theme)))
     commands = Commands(window)
     window.state.place(window)

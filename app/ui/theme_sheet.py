@@ -15,6 +15,9 @@ LABEL_ROLES = (
     "changed", "onAccent", "selectedText",
 )  # fmt: skip
 
+OUR_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
+"""Labels between the kinds of text in the tokens: size and weight."""
+
 
 class Look(Protocol):
     """What the sheet asks of a theme."""
@@ -117,19 +120,14 @@ Workbench > QTabBar::tab {{ width: 0; height: 0; margin: 0; padding: 0; border: 
 
 
 def _labels(look: Look) -> str:
+    kinds = {name: (kind.size_px, kind.weight) for name, kind in look.text_kinds().items()} | OUR_KINDS
     rules = []
-    for name, kind in look.text_kinds().items():
+    for name, (size_px, weight) in kinds.items():
         family = look.family("mono" if name == "code" else "text")
         rules.append(
-            f'QLabel[kind="{name}"] {{ font-family: "{family}"; font-weight: {kind.weight};'
-            f" font-size: {round(look.scaled(kind.size_px))}px; }}"
+            f'QLabel[kind="{name}"] {{ font-family: "{family}"; font-weight: {weight};'
+            f" font-size: {round(look.scaled(size_px))}px; }}"
         )
-    rules.append(
-        f'QLabel[kind="titleLarge"] {{ font-size: {round(look.scaled(14))}px; font-weight: 600; }}'
-        f'QLabel[kind="empty"] {{ font-size: {round(look.scaled(17))}px; font-weight: 600; }}'
-        f'QLabel[kind="card"] {{ font-size: {round(look.scaled(15))}px; font-weight: 600; }}'
-        f'QLabel[kind="lead"] {{ font-size: {round(look.scaled(15))}px; font-weight: 400; }}'
-    )
     rules.extend(f'QLabel[role="{role}"] {{ color: {look.hex(role)}; }}' for role in LABEL_ROLES)
     return "\n".join(rules)
 

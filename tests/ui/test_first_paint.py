@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import subprocess
@@ -10,11 +11,18 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, QObject
+from PySide6.QtGui import QFont, QFontInfo
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from app.core.journal import Journal
+from app.core.session import Session
+from app.core.settings import Settings
+from app.ui import fonts
+from app.ui.application import Options, make_application, make_window
 from app.ui.first_paint import AfterFirstPaint
 from app.ui.panel_shelf import PanelShelf
+from tests.ui.shell_parts import free_address
 
 ROOT = Path(__file__).parents[2]
 
@@ -117,3 +125,31 @@ def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: 
         check=True,
     )
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("mode", ["light", "dark"])
+def test_everything_that_shows_first_has_our_fonts(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
+) -> None:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    monkeypatch.setenv("NEP_MASTER", free_address())
+    application = make_application()
+    fonts.load()
+    application.setStyleSheet("")
+    application.setFont(QFont("DejaVu Serif"))  # as the system gives it: nothing of ours is applied yet
+    journal = Journal(tmp_path / "journal")
+    journal.write("Walk", None, {"blocks": {"blocks": [{"type": "x", "id": "a"}]}}, {})
+    monkeypatch.setattr("app.core.journal._alive", lambda _pid, _born_s: False)
+    (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
+    window, _commands = make_window(Session(Settings(tmp_path), start_companions=False), Options())
+    qtbot.addWidget(window)
+    window.show()
+    assert window.banner.isVisible(), "unsaved work is offered"
+    shown = [each for each in window.findChildren(QWidget) if each.isVisible()]
+    strange = {
+        f"{type(each).__name__} {each.property('kind') or ''}"
+        for each in shown
+        if QFontInfo(each.font()).family() not in {"Inter", "JetBrains Mono"}
+    }
+    assert strange == set()
+    window.close()
