@@ -13,9 +13,10 @@ from typing import Annotated, Literal, Protocol
 
 from app.robots.calls import Call, Canceled, Failed, Link
 from app.robots.declare import Kind, action, event, picture, safe_stop, sensor
-from app.robots.typed import Colour, Range, Title
+from app.robots.moves import MOVEMENT, battery_sensor, distance_sensor, drives, position_sensor
+from app.robots.typed import Colour, Range
 
-MOVEMENT, LIGHTS = "Movement", "Lights"
+LIGHTS = "Lights"
 STEP_S = 1 / 30
 FEEDBACK_STEPS = 6
 SPEED, TURN_SPEED = 0.35, 80.0
@@ -54,23 +55,10 @@ class Wheels(Protocol):
 class DiffDrive:
     """Declares the robot and drives its wheels."""
 
-    pose = sensor(
-        {
-            "x": Annotated[float, Range(unit="m")],
-            "y": Annotated[float, Range(unit="m")],
-            "theta": Annotated[float, Range(unit="deg"), Title("facing")],
-        },
-        title="position",
-        icon="navigation",
-        rate_hz=30,
-    )
-    distance = sensor(
-        Annotated[float, Range(0, 4, unit="m")], title="distance", text="distance", icon="ruler", rate_hz=10
-    )
+    pose = position_sensor(rate_hz=30)
+    distance = distance_sensor(most_m=4)
     bumper = sensor(bool, title="bumper", text="touches something", icon="octagon-alert", rate_hz=10)
-    battery = sensor(
-        Annotated[int, Range(0, 100, unit="%")], title="battery", text="battery", icon="battery-medium"
-    )
+    battery = battery_sensor()
     camera = picture(title="camera", width=320, height=240, rate_hz=15, hfov_deg=56.3)
     bump = event(
         "when %robot bumps on the %side",
@@ -122,54 +110,19 @@ class DiffDrive:
         """Keep moving until the next drive or stop; the watchdog stops it when its program falls silent."""
         self._go(call, speed, turn)
 
-    @action(
-        "move %distance m",
-        MOVEMENT,
-        "footprints",
-        says="moves %distance m",
-        uses=("base",),
-        on_busy="replace",
-        timeout_s=60,
-        risk="locomotes",
-        feedback={
-            "moved": Annotated[float, Range(unit="m")],
-            "to_go": Annotated[float, Range(unit="m"), Title("to go")],
-        },
-        output={"moved": Annotated[float, Range(unit="m")]},
-    )
+    @drives("move %distance m", "footprints", "moves %distance m", unit="m", moved=True)
     def move(self, call: Call, distance: Distance = 0.5) -> Mapping[str, object]:
         """Move straight, backwards when the distance is negative."""
         left = abs(distance)
         made = self._roll(call, distance, lambda moved: {"moved": moved, "to_go": _left(left, moved)})
         return {"moved": round(made, 3)}
 
-    @action(
-        "turn %angle °",
-        MOVEMENT,
-        "rotate-ccw",
-        says="turns %angle °",
-        uses=("base",),
-        on_busy="replace",
-        timeout_s=60,
-        risk="locomotes",
-        feedback={"to_go": Annotated[float, Range(unit="deg"), Title("to go")]},
-    )
+    @drives("turn %angle °", "rotate-ccw", "turns %angle °", unit="deg")
     def turn(self, call: Call, angle: Annotated[float, Range(-360, 360, 5, "deg", "angle")] = 90.0) -> None:
         """Turn on the spot, to the left when positive."""
         self._spin(call, angle, lambda turned: {"to_go": _left(abs(angle), turned)})
 
-    @action(
-        "go to x %x m y %y m",
-        MOVEMENT,
-        "map-pin",
-        title="go to",
-        says="goes to %x, %y m",
-        uses=("base",),
-        on_busy="replace",
-        timeout_s=60,
-        risk="locomotes",
-        feedback={"to_go": Annotated[float, Range(unit="m"), Title("to go")]},
-    )
+    @drives("go to x %x m y %y m", "map-pin", "goes to %x, %y m", unit="m", title="go to")
     def go_to(self, call: Call, x: Distance = 0.0, y: Distance = 0.0) -> None:
         """Turn to a place and move there straight; it does not drive round what is in the way."""
         here_x, here_y, facing = self.wheels.pose()

@@ -15,6 +15,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from app.robots.calls import Call, Canceled, Failed
 from app.robots.declare import Kind, action, safe_stop
+from app.robots.moves import drives, moves
 from app.robots.process import main as drive
 from app.robots.typed import Colour, Range, Suggested, Text, Title, Words
 from app.robots.virtual import from_rize
@@ -22,7 +23,7 @@ from app.robots.virtual.acting import FEEDBACK_S, Acting
 from app.robots.virtual.body import START_PITCH
 from app.robots.virtual.room import Room
 
-SPEECH, MOVEMENT, FACE = "Speech", "Movement", "Face and lights"
+SPEECH, FACE = "Speech", "Face and lights"
 Emotion: TypeAlias = Literal["happy", "surprised", "sad", "angry", "neutral"]
 Side: TypeAlias = Literal["left", "right"]
 Language: TypeAlias = Annotated[
@@ -74,16 +75,11 @@ class VirtualPepper(Acting):
 
     # ---- movement ---------------------------------------------------------------------------------
 
-    @action(
+    @drives(
         "turn %direction by %angle °",
-        MOVEMENT,
         "rotate-ccw",
-        says="turns %direction by %angle °",
-        uses=("base",),
-        on_busy="replace",
-        timeout_s=60,
-        risk="locomotes",
-        feedback={"to_go": Annotated[float, Range(unit="deg")]},
+        "turns %direction by %angle °",
+        unit="deg",
         rize="turn",
         from_rize=from_rize.turn,
     )
@@ -98,16 +94,11 @@ class VirtualPepper(Acting):
         signed = angle if direction == "left" else -angle
         self._roll(call, lambda body: body.turn(signed, speed))
 
-    @action(
+    @drives(
         "walk %distance m",
-        MOVEMENT,
         "footprints",
-        says="walks %distance m",
-        uses=("base",),
-        on_busy="replace",
-        timeout_s=60,
-        risk="locomotes",
-        feedback={"to_go": Annotated[float, Range(unit="m")]},
+        "walks %distance m",
+        unit="m",
         rize="walk",
         from_rize=from_rize.walk,
     )
@@ -122,33 +113,20 @@ class VirtualPepper(Acting):
         if motion.blocked:
             raise Failed(f"walk: something is in the way after {abs(motion.moved):.2f} m")
 
-    @action(
-        "look at %target",
-        MOVEMENT,
-        "eye",
-        title="look at",
-        says="looks at %target",
-        uses=("head",),
-        on_busy="replace",
-        timeout_s=10,
-        risk="moves",
-    )
+    @moves("look at %target", "eye", "looks at %target", "head", timeout_s=10, title="look at")
     def look_at(self, call: Call, target: Target = "face") -> None:
         """Turn the head to a side, or to the face or the ball that is in the picture."""
         with self._life.changed:
             yaw, pitch = self._direction_of(target)
         self._turn_head(call, yaw, pitch)
 
-    @action(
+    @moves(
         "turn head %yaw ° left and %pitch ° down",
-        MOVEMENT,
         "move",
-        title="turn head",
-        says="turns its head",
-        uses=("head",),
-        on_busy="replace",
+        "turns its head",
+        "head",
         timeout_s=10,
-        risk="moves",
+        title="turn head",
     )
     def head(
         self,
@@ -159,33 +137,14 @@ class VirtualPepper(Acting):
         """Turn the head; right and up are negative."""
         self._turn_head(call, yaw, pitch)
 
-    @action(
-        "wave %hand hand",
-        MOVEMENT,
-        "hand",
-        says="waves its %hand hand",
-        uses=("arms",),
-        on_busy="replace",
-        timeout_s=20,
-        risk="moves",
-        rize="wave",
-    )
+    @moves("wave %hand hand", "hand", "waves its %hand hand", "arms", timeout_s=20, rize="wave")
     def wave(self, call: Call, hand: Side = "right") -> None:
         """Greet with one hand."""
         with self._life.changed:
             wave = self._life.body.wave(hand)
         self._until(call, lambda: wave.done, wave.halt)
 
-    @action(
-        "stand straight",
-        MOVEMENT,
-        "person-standing",
-        says="stands straight",
-        uses=("arms", "head"),
-        on_busy="replace",
-        timeout_s=10,
-        risk="moves",
-    )
+    @moves("stand straight", "person-standing", "stands straight", "arms", "head", timeout_s=10)
     def stand(self, call: Call) -> None:
         """Let the arms hang and look ahead."""
         with self._life.changed:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Literal, TypeAlias
 
 from app.robots.declare import detections, event, picture, sensor
-from app.robots.typed import Range, Suggested, Title
+from app.robots.moves import battery_sensor, distance_sensor, position_sensor
+from app.robots.typed import Suggested
 
 Place: TypeAlias = Literal["head", "left_hand", "right_hand"]
 
@@ -13,26 +14,13 @@ Place: TypeAlias = Literal["head", "left_hand", "right_hand"]
 class Senses:
     """The declarations; what fills them is :class:`~app.robots.virtual.life.Life`."""
 
-    battery = sensor(
-        Annotated[int, Range(0, 100, unit="%")], title="battery", text="battery", icon="battery-medium"
-    )
-    distance = sensor(
-        Annotated[float, Range(0, 5, unit="m")], title="distance", text="distance", icon="ruler", rate_hz=10
-    )
+    battery = battery_sensor()
+    distance = distance_sensor(most_m=5)
     head_touched = sensor(bool, title="head touch", text="head is touched", icon="hand")
     sees_face = sensor(bool, title="sees a face", text="sees a face", icon="scan-face", rate_hz=5)
     sees_ball = sensor(bool, title="sees a ball", text="sees a ball", icon="scan", rate_hz=5)
     heard_word = sensor(str, title="last word heard", text="last word heard", icon="ear")
-    pose = sensor(
-        {
-            "x": Annotated[float, Range(unit="m")],
-            "y": Annotated[float, Range(unit="m")],
-            "theta": Annotated[float, Range(unit="deg"), Title("facing")],
-        },
-        title="position",
-        icon="navigation",
-        rate_hz=10,
-    )
+    pose = position_sensor(rate_hz=10)
     camera = picture(title="camera", width=320, height=240, rate_hz=15, hfov_deg=56.3)
     faces = detections(title="faces", camera="camera", icon="scan-face", rate_hz=5)
     balls = detections(title="balls", camera="camera", icon="scan", rate_hz=5)

@@ -1,0 +1,96 @@
+"""Declarations that robots share: how they drive and move their parts, where they are, their battery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from app.robots.declare import FromRize, SensorSpec, action, sensor
+from app.robots.typed import Range, Title
+
+MOVEMENT = "Movement"
+DRIVE_S = 60
+
+
+def drives(
+    text: str,
+    icon: str,
+    says: str,
+    *,
+    unit: str,
+    title: str | None = None,
+    moved: bool = False,
+    rize: str | None = None,
+    from_rize: FromRize | None = None,
+) -> action:
+    """An action that brings the robot to another place: another one replaces it, and it can be taken back.
+
+    It tells in ``unit`` how much is left (``to_go``), so that a pause can do the rest afterwards; with
+    ``moved`` also how much was made.
+    """
+    made: Mapping[str, object] = {"moved": Annotated[float, Range(unit=unit)]} if moved else {}
+    return action(
+        text,
+        MOVEMENT,
+        icon,
+        says=says,
+        title=title,
+        uses=("base",),
+        on_busy="replace",
+        timeout_s=DRIVE_S,
+        risk="locomotes",
+        feedback={**made, "to_go": Annotated[float, Range(unit=unit), Title("to go")]},
+        output=made or None,
+        rize=rize,
+        from_rize=from_rize,
+    )
+
+
+def moves(
+    text: str,
+    icon: str,
+    says: str,
+    *parts: str,
+    timeout_s: float,
+    title: str | None = None,
+    rize: str | None = None,
+) -> action:
+    """An action that moves ``parts`` of the robot, which stays where it is; another one replaces it."""
+    return action(
+        text,
+        MOVEMENT,
+        icon,
+        says=says,
+        title=title,
+        uses=parts,
+        on_busy="replace",
+        timeout_s=timeout_s,
+        risk="moves",
+        rize=rize,
+    )
+
+
+def position_sensor(rate_hz: float) -> SensorSpec:
+    """Where the robot is and where it faces."""
+    return sensor(
+        {
+            "x": Annotated[float, Range(unit="m")],
+            "y": Annotated[float, Range(unit="m")],
+            "theta": Annotated[float, Range(unit="deg"), Title("facing")],
+        },
+        title="position",
+        icon="navigation",
+        rate_hz=rate_hz,
+    )
+
+
+def battery_sensor() -> SensorSpec:
+    """How full the battery is."""
+    full = Annotated[int, Range(0, 100, unit="%")]
+    return sensor(full, title="battery", text="battery", icon="battery-medium")
+
+
+def distance_sensor(most_m: float) -> SensorSpec:
+    """How far it is to what stands ahead."""
+    ahead = Annotated[float, Range(0, most_m, unit="m")]
+    return sensor(ahead, title="distance", text="distance", icon="ruler", rate_hz=10)
