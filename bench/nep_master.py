@@ -3,8 +3,8 @@
     python bench/nep_master.py [--nodes 500] [--topics 2000] [--seconds 10] [--rounds 30]
 
 The master is a process of its own. A second process plays the nodes: a DEALER socket each, which joins with
-its share of publishers and with a subscriber for each of another node's topics, and renews once a second with
-counters that grow, evenly spread in time.
+its share of publishers and with a subscriber for each of another node's topics. Each renews when a node of the
+library would (`Pace`: when the master says, and every second before it has said anything), with counters that grow.
 
     at rest     processor time of the master while all nodes renew, as a share of one core
     answer      from sending `look` to having the whole reply, by a bare socket
@@ -42,7 +42,8 @@ with nep.master("127.0.0.1:0", learn_s=0.0) as master:
 """
 
 NODES = """
-import itertools, os, sys, time, zmq
+import os, sys, time, zmq
+from nep.backends.native.pace import Pace
 from nep.bodies import decode_answer, encode_request
 from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
 from nep.requests import Found, Join, Renew, Renewed
@@ -55,10 +56,11 @@ sockets = []
 for n in range(count):
     socket = context.socket(zmq.DEALER)
     socket.setsockopt(zmq.ROUTING_ID, f"{n:016x}".encode())
+    socket.setsockopt(zmq.RECONNECT_IVL, 50)
     socket.connect("tcp://" + os.environ["NEP_MASTER"])
     sockets.append(socket)
     poller.register(socket, zmq.POLLIN)
-revisions = [0] * count
+revisions, paces = [0] * count, [Pace() for _ in range(count)]
 epoch = 0
 def read(ms):
     # Read answers; whoever is not known, or not any more, joins.
@@ -70,8 +72,10 @@ def read(ms):
             epoch = answer.epoch
             if isinstance(answer, Found | Renewed):
                 revisions[n] = answer.revision
-            if isinstance(answer, Renewed) and answer.again:
-                join(n)
+            if isinstance(answer, Renewed):
+                paces[n].told(answer.next_s, time.monotonic())
+                if answer.again:
+                    join(n)
 def ids(n):
     mine = range(n * each, n * each + each)
     others = [(topic + each) % (count * each) for topic in mine]
@@ -97,17 +101,19 @@ while not all(revisions):
     read(100)
 print("joined", flush=True)
 started = time.monotonic()
-for turn in itertools.count():
-    n, renewal = turn % count, turn // count + 1
+for n, pace in enumerate(paces):
+    pace.due_at = started + n / count
+while True:
+    n = min(range(count), key=lambda n: paces[n].due_at)
+    while (left := paces[n].due_at - time.monotonic()) > 0:
+        read(int(left * 1000))
+    read(0)
     mine, others = ids(n)
-    seen = renewal * 10
+    seen = int((time.monotonic() - started) * 10)
     outs = tuple(PublisherCount(1_000_000 + t, seen, seen * 100, seen, time.time_ns()) for t in mine)
     ins = tuple(SubscriberCount(2_000_000 + t, seen, 0) for t in others)
     sockets[n].send(encode_request(Renew(f"{n:016x}", epoch, revisions[n], outs, ins), 2))
-    due = started + (turn + 1) / count
-    while (left := due - time.monotonic()) > 0:
-        read(int(left * 1000))
-    read(0)
+    paces[n].renews(time.monotonic())
 """
 
 

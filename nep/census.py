@@ -14,6 +14,7 @@ from nep.records import (
     SubscriberCount,
     SubscriberRecord,
 )
+from nep.requests import RENEW_S
 from nep.views import Alert
 
 __all__ = ["Census", "Member", "Publisher", "Subscriber"]
@@ -47,10 +48,14 @@ class Subscriber:
 
 @dataclass
 class Member:
-    """A node with all that it has. `hung`: it did not answer the publishers of these node names."""
+    """A node with all that it has. `hung`: it did not answer the publishers of these node names.
+
+    Its next renewal is due `renew_s` after `renewed_at`: that is what it was told.
+    """
 
     node: NodeRecord
     renewed_at: float
+    renew_s: float = RENEW_S
     is_managed: bool = False
     publishers: dict[int, Publisher] = field(default_factory=dict)
     subscribers: dict[int, Subscriber] = field(default_factory=dict)

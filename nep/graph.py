@@ -12,10 +12,11 @@ seconds of any clock that does not jump.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable, Mapping
 
 from nep.census import Census, Member
 from nep.errors import WireError
+from nep.leases import LEASE_S, Leases
 from nep.outgoing import Outgoing
 from nep.records import Expected, NodeRecord, PublisherRecord, SubscriberRecord
 from nep.renewals import RenewalSaid, same_ids, take_over
@@ -62,11 +63,6 @@ __all__ = [
     "TopicInfo",
 ]
 
-LEASE_S = 3.0
-"""A node that has not renewed for so long is unlisted."""
-SILENT_S = 1.4
-"""A node that has not renewed for so long is probed: a renewal is due every second."""
-
 
 class Graph:
     """See the module. Not thread-safe: it belongs to the master's thread."""
@@ -75,7 +71,7 @@ class Graph:
         self.epoch = epoch
         self._census = Census()
         self._viewer = Viewer(self._census)
-        self._lease_s = lease_s
+        self._leases = Leases(self._census, lease_s)
         self._learnt_at = now + learn_s
         self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str]] = []
 
@@ -87,9 +83,9 @@ class Graph:
         return self._census.revision
 
     @property
-    def members(self) -> Collection[str]:
-        """The ids of all nodes that are registered now."""
-        return self._census.members.keys()
+    def members(self) -> Mapping[str, Member]:
+        """All nodes that are registered now, by their ids."""
+        return self._census.members
 
     @property
     def nodes(self) -> tuple[NodeRecord, ...]:
@@ -110,18 +106,14 @@ class Graph:
         return tuple(out)
 
     def tick(self, now: float) -> tuple[Outgoing, ...]:
-        """End learning and lapsed leases."""
+        """End learning and lapsed leases; see how often nodes shall renew."""
         out: list[Outgoing] = []
         if self._waiting and now >= self._learnt_at:
             waiting, self._waiting = self._waiting, []
             for request, call, sender in waiting:
                 out.extend(self.apply(request, call, now, sender))
-        lapsed = [
-            member.node.id
-            for member in self._census.members.values()
-            if not member.is_managed and now - member.renewed_at >= self._lease_s
-        ]
-        out.extend(self.drop(lapsed))
+        out.extend(self.drop(self._leases.lapsed(now)))
+        self._leases.set_pace(now)
         return tuple(out)
 
     @property
@@ -131,11 +123,12 @@ class Graph:
 
     def silent(self, now: float) -> tuple[Outgoing, ...]:
         """Probes for nodes that missed a renewal: one that cannot be sent proves that its node is dead."""
-        return tuple(
-            Outgoing(member.node.id, Probe(self.epoch, self.revision))
-            for member in self._census.members.values()
-            if not member.is_managed and now - member.renewed_at >= SILENT_S
-        )
+        return self.probes(self._leases.late(now))
+
+    def probes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
+        """Probes for those of these nodes that are registered."""
+        probe = Probe(self.epoch, self.revision)
+        return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._census.members)
 
     def drop(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
         """Unlist nodes that are dead or silent."""
@@ -158,8 +151,10 @@ class Graph:
         member = self._census.members.get(said.node_id)
         if member is None or said.epoch != self.epoch or said.revision < self._census.publishers_revision:
             return None
-        is_usual = take_over(self._census, member, said, now)
-        return self._census.last_seqs(member) if is_usual else None
+        if not take_over(self._census, member, said, now):
+            return None
+        self._leases.renew(member, now)
+        return self._census.last_seqs(member)
 
     # ---- requests
 
@@ -214,8 +209,7 @@ class Graph:
         self._census.add_subscriber(member, request.subscriber)
         found = self._census.publishers_of(request.subscriber.topic)
         # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
-        others = sorted({remote.node_id for remote in found} - {member.node.id})
-        out.extend(Outgoing(node_id, Probe(self.epoch, self.revision)) for node_id in others)
+        out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
         return Found(self.epoch, self.revision, found)
 
     def _join(self, request: Join, now: float, out: list[Outgoing]) -> Reply:
@@ -252,7 +246,8 @@ class Graph:
             for topic in topics
             if self._census.topic_revision(topic) > request.revision
         )
-        return Renewed(self.epoch, self.revision, False, changed, self._census.last_seqs(member))
+        last_seqs, next_s = self._census.last_seqs(member), self._leases.renew(member, now)
+        return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s)
 
     def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
         record = self._census.remove_publisher(request.node_id, request.id)

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import zmq
 
+from nep.badrequests import BadRequests, who_sends
 from nep.bodies import Asked, decode_request
 from nep.collecting import collecting_later
 from nep.errors import ClosedError, NepError, WaitTimeoutError
@@ -19,7 +20,7 @@ from nep.graph import Graph, GraphView
 from nep.listening import Listening
 from nep.masterport import MasterPort
 from nep.outgoing import Outgoing, with_hosts, without
-from nep.renewals import read_renewal, renewed_body
+from nep.renewals import is_renewal, read_renewal, renewed_body
 from nep.requests import Done, Join, Listen, Look, Refused, Reply, ReportAlerts, Request, node_of
 from nep.starting import Owner
 from nep.submission import Submission
@@ -60,7 +61,9 @@ class MasterLoop:
         self._pending: dict[int, Submission] = {}
         self._calls = 0
         self._views = ViewPacker()
-        self._only_renewals, self._tell_at = False, 0.0
+        self._bad = BadRequests()
+        self._renewals: list[tuple[bytes, bytes]] = []
+        self._tell_at = 0.0
         self._is_open = False
         self._closing = False
         self._told_revision = graph.revision
@@ -108,13 +111,14 @@ class MasterLoop:
             while not self._closing:
                 if self._is_open and len(polled) == 1:
                     polled.append((self._port.socket, int(zmq.POLLIN)))
-                self._rest_from_renewals(waker)
                 zmq.zmq_poll(polled, self._until(tick_at))
                 self._waker.clear()
                 self._serve_submissions()
                 if len(polled) > 1:
-                    self._only_renewals = True
                     self._serve_router()
+                    if self._renewals and self._rest_from_renewals(waker):
+                        self._serve_router()
+                    self._answer_renewals()
                 now = time.monotonic()
                 due = self._graph.learning_end
                 if now >= tick_at or (due is not None and now >= due):
@@ -127,10 +131,12 @@ class MasterLoop:
             for submission in (*self._submitted, *self._pending.values()):
                 submission.done.set()
 
-    def _rest_from_renewals(self, waker: tuple[int, int]) -> None:
+    def _rest_from_renewals(self, waker: tuple[int, int]) -> bool:
         """With hundreds of nodes, let renewals gather: waking up costs more than answering one."""
-        if self._only_renewals:
-            zmq.zmq_poll([waker], min(_REST_MS, len(self._graph.members) // _NODES_PER_MS))
+        rest_ms = min(_REST_MS, len(self._graph.members) // _NODES_PER_MS)
+        if rest_ms:
+            zmq.zmq_poll([waker], rest_ms)
+        return bool(rest_ms)
 
     def _until(self, tick_at: float) -> int:
         due = self._graph.learning_end
@@ -142,6 +148,8 @@ class MasterLoop:
     def _tick(self, now: float) -> None:
         self._send(self._graph.tick(now))
         self._send(self._graph.silent(now))
+        self._send(self._graph.probes(_name_of(sender) for sender in self._port.ended(now)))
+        self._graph.apply(ReportAlerts("requests", self._bad.alerts(now)), 0, now, "")
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
             self._closing = True
         if self._listening.hosts and now >= self._follow_at:
@@ -164,34 +172,43 @@ class MasterLoop:
             self._apply(Asked(self._calls, submission.request), "")
 
     def _serve_router(self) -> None:
-        others = bool(self._listening.hosts)
         for _ in range(1000):  # then time for the rest of the loop
             try:
-                (sender, *body), address = self._port.receive(with_address=others)
+                sender, *body = self._port.receive()
             except zmq.Again:
                 return
             except zmq.ZMQError:
                 _logger.exception("the master could not read a request")
                 return
-            self._serve(sender, body, not others or address == "127.0.0.1")
+            if len(body) == 1 and is_renewal(body[0]):
+                self._renewals.append((sender, body[0]))
+            else:
+                self._answer_renewals()  # they came before
+                self._serve(sender, body, self._port.peer())
 
-    def _renew_quickly(self, sender: bytes, body: bytes) -> bool:
-        """Answer a usual renewal; False when it is something else."""
+    def _answer_renewals(self) -> None:
+        """All of them, then all answers: so the network's thread is woken once, too."""
+        renewals, self._renewals = self._renewals, []
+        answers = [self._renew_quickly(sender, body) for sender, body in renewals]
+        for (sender, body), answer in zip(renewals, answers, strict=True):
+            if answer is None:
+                self._serve(sender, [body], "")
+            elif not self._port.send(sender, answer):
+                self._send(self._graph.drop((_name_of(sender),)))
+
+    def _renew_quickly(self, sender: bytes, body: bytes) -> bytes | None:
+        """The answer to a usual renewal; None when it is something else."""
         said = read_renewal(body)
-        is_own = said is not None and said.node_id.encode("utf-8", "surrogateescape") == sender
-        last_seqs = self._graph.renew_quickly(said, time.monotonic()) if said and is_own else None
-        if said is None or last_seqs is None:
-            return False
-        hosts = self._listening.hosts
-        answer = renewed_body(said.call, self._graph.epoch, self._graph.revision, last_seqs, hosts)
-        if not self._port.send(sender, answer):
-            self._send(self._graph.drop((said.node_id,)))
-        return True
+        if said is None or said.node_id.encode("utf-8", "surrogateescape") != sender:
+            return None
+        graph = self._graph
+        last_seqs = graph.renew_quickly(said, time.monotonic())
+        if last_seqs is None:
+            return None
+        hosts, next_s = self._listening.hosts, graph.members[said.node_id].renew_s
+        return renewed_body(said.call, graph.epoch, graph.revision, last_seqs, hosts, next_s)
 
-    def _serve(self, sender: bytes, body: list[bytes], is_near: bool) -> None:
-        if len(body) == 1 and self._renew_quickly(sender, body[0]):
-            return
-        self._only_renewals = False
+    def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         request = asked.request
         if not isinstance(request, str):
@@ -200,9 +217,13 @@ class MasterLoop:
                 asked = Asked(asked.call, "a node speaks for itself only")
             elif isinstance(request, Join) and request.managed:
                 asked = Asked(asked.call, "only what is attached to the master manages nodes")
-            elif isinstance(request, Listen) and not is_near:
+            elif isinstance(request, Listen) and self._listening.hosts and peer != "127.0.0.1":
                 asked = Asked(asked.call, "who may connect is decided on the master's own computer")
-        name = sender.decode("utf-8", "surrogateescape")
+        name = _name_of(sender)
+        if isinstance(asked.request, str):
+            member = self._graph.members.get(name)
+            who = who_sends(name, None if member is None else member.node.name, peer)
+            self._bad.add(*who, asked.request, time.monotonic())
         self._apply(asked, name)
 
     def _apply(self, asked: Asked, sender: str) -> None:
@@ -269,3 +290,7 @@ class MasterLoop:
     def _release(self) -> None:
         self._port.close()
         self._waker.close()
+
+
+def _name_of(sender: bytes) -> str:
+    return sender.decode("utf-8", "surrogateescape")

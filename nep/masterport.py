@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import time
 from collections.abc import Callable
 
 import zmq
@@ -14,12 +16,18 @@ __all__ = ["MasterPort"]
 REQUEST_MAX_BYTES = 64 * 2**20
 """Whoever sends more in one part is disconnected."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
+_RETURN_S = 0.5
+"""A node whose connection ends has so long to be back."""
+_SRCFD = int(zmq.SRCFD)
+_EVENT = struct.Struct("=hi")
+"""What libzmq tells of a connection: the kind of event and the connection's number."""
 
 
 class MasterPort:
     """Raises `AddressInUseError` when `address` cannot be bound."""
 
     def __init__(self, address: str) -> None:
+        self._monitor: zmq.Socket[bytes] | None = None
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.socket = self._context.socket(zmq.ROUTER)
         # Without pyzmq's layer for routing ids and groups, which takes half of the time.
@@ -35,18 +43,56 @@ class MasterPort:
             self.close()
             raise AddressInUseError(address) from error
         self.address = self.socket.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
+        self._monitor = self._monitored()
+        self._senders: dict[int, bytes] = {}
+        """Who was heard last on which connection, by its number in this process."""
+        self._ended: dict[bytes, float] = {}
+        """Whose connection has ended, and when."""
+        self._newest: zmq.Frame | None = None
 
-    def receive(self, *, with_address: bool) -> tuple[list[bytes], str]:
-        """The parts of a request, who asks first, and the address it came from if that is wanted.
-
-        Raises `zmq.Again` when there is none.
-        """
+    def receive(self) -> list[bytes]:
+        """The parts of a request, who asks first. Raises `zmq.Again` when there is none."""
         recv = self.socket.recv
         frames = [recv(_DONTWAIT, False)]
         while frames[-1].more:
             frames.append(recv(_DONTWAIT, False))
-        address = str(frames[0].get("Peer-Address")) if with_address else ""
-        return [frame.bytes for frame in frames], address
+        self._newest = frames[0]
+        parts = [frame.bytes for frame in frames]
+        self._heard(frames[0], parts[0])
+        return parts
+
+    def peer(self) -> str:
+        """The address that the request received last came from; empty when that is not known any more."""
+        try:
+            return "" if self._newest is None else str(self._newest.get("Peer-Address"))
+        except zmq.ZMQError:
+            return ""
+
+    def _heard(self, frame: zmq.Frame, sender: bytes) -> None:
+        try:
+            connection = frame.get(_SRCFD)
+        except zmq.ZMQError:  # its connection ended as soon as it was there
+            return
+        before = self._senders.get(connection)
+        if before != sender:
+            if before is not None:  # so the connection that had this number has ended
+                self._ended.setdefault(before, time.monotonic())
+            self._senders[connection] = sender
+
+    def ended(self, now: float) -> list[bytes]:
+        """Whose connection ended a moment ago, each once; they may have another one by now."""
+        while self._monitor is not None:
+            try:
+                event = self._monitor.recv_multipart(_DONTWAIT)[0]
+            except zmq.Again:
+                break
+            sender = self._senders.pop(_EVENT.unpack(event)[1], None)
+            if sender is not None:
+                self._ended.setdefault(sender, now)
+        ended = [sender for sender, at in self._ended.items() if now - at >= _RETURN_S]
+        for sender in ended:
+            del self._ended[sender]
+        return ended
 
     def send(self, to: bytes, body: bytes) -> bool:
         """Send a body; False when its node has no connection any more."""
@@ -59,7 +105,18 @@ class MasterPort:
             return error.errno != zmq.EHOSTUNREACH
         return True
 
+    def _monitored(self) -> zmq.Socket[bytes]:
+        """Where libzmq tells of connections that end."""
+        monitor = self._context.socket(zmq.PAIR)
+        monitor.setsockopt(zmq.RCVHWM, 0)  # libzmq's thread would wait for us if this were full
+        self.socket.monitor("inproc://ended", zmq.EVENT_DISCONNECTED)
+        monitor.connect("inproc://ended")
+        return monitor
+
     def close(self) -> None:
         """Close the socket, and wait until what was sent is on its way."""
+        if self._monitor is not None:
+            self.socket.disable_monitor()
+            self._monitor.close(0)
         self.socket.close()
         self._context.term()

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 from nep.census import Census, Member
 from nep.packing import pack, unpack
-from nep.requests import Renew
+from nep.requests import RENEW_S, Renew
 
-__all__ = ["RenewalSaid", "read_renewal", "renewed_body", "same_ids", "take_over"]
+__all__ = ["RenewalSaid", "is_renewal", "read_renewal", "renewed_body", "same_ids", "take_over"]
 
 _BEGINS = b"\x83\xa2do\xa5renew"
 """How our own renewals begin. Another order of the fields is as right, and takes the usual way."""
@@ -30,6 +30,11 @@ class RenewalSaid(NamedTuple):
     publishers: _Counts
     subscribers: _Counts
     cpu_ratio: float | None
+
+
+def is_renewal(body: bytes) -> bool:
+    """Whether a body seems to be one of our own renewals: it is worth `read_renewal`."""
+    return body.startswith(_BEGINS)
 
 
 def read_renewal(body: bytes) -> RenewalSaid | None:
@@ -98,10 +103,17 @@ def _take_over(census: Census, member: Member, said: RenewalSaid, now: float) ->
 
 
 def renewed_body(
-    call: int, epoch: int, revision: int, last_seqs: Mapping[int, int], hosts: tuple[str, ...]
+    call: int,
+    epoch: int,
+    revision: int,
+    last_seqs: Mapping[int, int],
+    hosts: tuple[str, ...],
+    next_s: float = RENEW_S,
 ) -> bytes:
     """The body of a `Renewed` with which nothing has changed."""
     what: dict[str, object] = {"epoch": epoch, "revision": revision, "last_seqs": last_seqs}
     if hosts:
         what["hosts"] = hosts
+    if next_s != RENEW_S:
+        what["next_s"] = next_s
     return pack({"is": "renewed", "re": call, "what": what})

@@ -20,6 +20,9 @@ from nep.records import (
 )
 from nep.views import Alert, GraphView
 
+RENEW_S = 1.0
+"""How often a node renews, unless the master says otherwise."""
+
 # ---- requests
 
 
@@ -197,7 +200,8 @@ class Renewed:
     """A lease is renewed. `again`: the master does not know this node as it is, it shall join again.
 
     `topics` are those of the node's subscribers that changed since its revision; `last_seqs` are the newest
-    messages of the publishers it subscribes to, as of their last renewal.
+    messages of the publishers it subscribes to, as of their last renewal. The next renewal is due in `next_s`
+    seconds: the master lets the nodes of a large graph renew less often.
     """
 
     epoch: int
@@ -206,6 +210,7 @@ class Renewed:
     topics: tuple[TopicPublishers, ...] = ()
     last_seqs: Mapping[int, int] = field(default_factory=dict)
     hosts: tuple[str, ...] = ()
+    next_s: float = RENEW_S
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""MasterLink: what a node has registered with one master: renews it every second, hears of publishers.
+"""MasterLink: what a node has registered with one master: renews it when due, hears of publishers.
 
 It keeps everything that is registered, so that a master that was started again learns all of it at once.
 """
@@ -16,12 +16,14 @@ from nep.backends.native.inlet import NativeInlet
 from nep.backends.native.io import IoThread, Rest
 from nep.backends.native.local import quickest
 from nep.backends.native.outlet import NativeOutlet
+from nep.backends.native.pace import Pace
 from nep.backends.native.sockets import LOOPBACK, Socket, host_towards
 from nep.errors import AddressInUseError, ClosedError, MasterUnreachable, RequestRefusedError
 from nep.load import CpuLoad
 from nep.network import nearest
 from nep.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
 from nep.requests import (
+    RENEW_S,
     Added,
     AddPublisher,
     AddSubscriber,
@@ -42,11 +44,12 @@ from nep.requests import (
 )
 from nep.views import GraphView
 
-__all__ = ["RENEW_S", "MasterLink"]
+__all__ = ["MasterLink"]
 
 _logger = logging.getLogger("nep")
 
-RENEW_S = 1.0
+_FOLLOW_S = 1.0
+"""How often a node looks whether its publishers have to move."""
 _JOIN_AGAIN_S = 0.5
 
 
@@ -62,10 +65,10 @@ class MasterLink:
         self._publishers: dict[int, tuple[PublisherRecord, NativeOutlet]] = {}
         self._subscribers: dict[int, tuple[SubscriberRecord, NativeInlet]] = {}
         self._confirmed: set[int] = set()
-        self._epoch = 0
-        self._revision = 0
+        self._epoch, self._revision = 0, 0
         self._join_again_at = 0.0
-        self._renew_at = 0.0
+        self._pace = Pace()
+        self._follow_at = 0.0
         self._was_connected = False
         self._is_closed = False
         self._is_near = is_loopback(address)
@@ -179,13 +182,16 @@ class MasterLink:
             return Rest()
         is_connected = self._calls.is_connected
         if is_connected and not self._was_connected:
-            self._renew_at = now
+            self._pace.due_at = now
         self._was_connected = is_connected
-        if now >= self._renew_at:
-            self._renew_at = now + RENEW_S
+        is_due = now >= self._pace.due_at
+        if is_due or now >= self._follow_at:
+            self._follow_at = now + _FOLLOW_S
             self._follow_addresses()
+        if is_due:
+            self._pace.renews(now)
             self._renew()
-        return Rest(due=self._renew_at)
+        return Rest(due=min(self._pace.due_at, self._follow_at))
 
     def _follow_addresses(self) -> None:
         """Move publishers when this computer or the master has another address, or they want other ports."""
@@ -222,7 +228,7 @@ class MasterLink:
     def _obey(self, answer: Reply | Push, now: float) -> None:
         if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served:
             self._served = answer.hosts
-            self._renew_at = now
+            self._pace.due_at = now
         if isinstance(answer, PublisherCame):
             for inlet in self._inlets(answer.publisher.publisher.topic):
                 inlet.connect((self._near(answer.publisher),))
@@ -257,6 +263,7 @@ class MasterLink:
             self._join(now)
             return
         self._revision = answer.revision
+        self._pace.told(answer.next_s, now)
         for topic in answer.topics:
             for inlet in self._inlets(topic.topic):
                 inlet.reconcile(self._in_reach(topic.publishers))
@@ -265,6 +272,7 @@ class MasterLink:
 
     def _join(self, now: float) -> None:
         """Register everything again, once at a time."""
+        self._pace.told(RENEW_S, now)  # this master has not said anything else yet
         if now < self._join_again_at or self._is_closed:
             return
         self._join_again_at = now + _JOIN_AGAIN_S

@@ -1,0 +1,105 @@
+"""What comes to the master and is no request: answered, counted, logged rarely, shown as an alert."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+import zmq
+
+import nep
+from nep import bodies
+from nep.badrequests import BadRequests, who_sends
+from nep.masters import Master
+from nep.packing import pack
+from nep.requests import Refused
+from tests.nep.programs import eventually
+
+
+def test_each_sender_is_counted_and_told_for_some_seconds() -> None:
+    bad = BadRequests()
+    assert bad.alerts(0.0) == ()
+    for _ in range(3):
+        bad.add("a", "“A”", "the body is no map", 10.0)
+    bad.add("b", "“B”", "the body is no msgpack", 10.0)
+    first, second = bad.alerts(10.0)
+    assert (first.id, second.id) == ("request:a", "request:b")
+    assert first.sentence == (
+        "“A” sends what the master does not understand (3 times so far): the body is no map"
+    )
+    assert second.sentence.endswith("(once): the body is no msgpack")
+    assert first.hint
+    bad.add("a", "“A”", "the body is no map", 19.0)
+    (alert,) = bad.alerts(21.0)
+    assert "4 times" in alert.sentence
+    assert bad.alerts(29.5) == ()
+
+
+def test_alerts_do_not_change_with_each_bad_request() -> None:
+    bad = BadRequests()
+    bad.add("a", "“A”", "reason", 10.0)
+    before = bad.alerts(10.0)
+    bad.add("a", "“A”", "reason", 10.1)
+    assert bad.alerts(10.9) is before
+    assert "2 times" in bad.alerts(11.0)[0].sentence
+
+
+def test_strangers_without_end_take_no_memory_without_end() -> None:
+    bad = BadRequests()
+    for n in range(10_000):
+        bad.add(f"s{n}", f"S{n}", "reason " * 1000, 10.0)
+    assert len(bad._senders) == 100
+    told = bad.alerts(10.0)
+    assert len(told) == 6
+    assert told[0].sentence == "95 more programs send what the master does not understand"
+    assert max(len(each.sentence) for each in told) < 400
+
+
+def test_what_a_stranger_wrote_does_not_write_lines_of_its_own() -> None:
+    bad = BadRequests()
+    bad.add("a", "“A”", "'x\nERROR all is lost\x1b[31m' is no request of this version", 10.0)
+    assert bad.alerts(10.0)[0].sentence.isprintable()
+
+
+def test_strangers_count_by_computer_and_nodes_by_themselves() -> None:
+    assert who_sends("00000000000000ff", "camera", "10.0.0.1") == ("00000000000000ff", "“camera”")
+    assert who_sends("00000000000000ff", None, "10.0.0.1")[0] == "00000000000000ff"
+    assert who_sends("\x00\x17", None, "10.0.0.1") == ("10.0.0.1", "A program on 10.0.0.1")
+    assert who_sends("\x00\x18", None, "") == ("", "A program on a computer that is not known")
+
+
+def test_the_master_logs_the_first_then_rarely_and_shows_an_alert(
+    master: Master, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.WARNING, "nep.master")
+    context = zmq.Context()
+    with nep.node("tester") as node:
+        for n in range(25):  # each time as another stranger
+            with context.socket(zmq.DEALER) as socket:
+                socket.setsockopt(zmq.LINGER, 0)
+                socket.connect(f"tcp://{master.address}")
+                socket.send(b"\xc1" if n % 2 else pack({"do": "fly", "call": 3}))
+                assert socket.poll(2000)
+                assert isinstance(bodies.decode_answer(socket.recv())[1], Refused)
+        eventually(lambda: any("(25 times so far)" in each.sentence for each in node.graph().alerts))
+        (alert,) = node.graph().alerts
+    context.term()
+    assert alert.id == "request:127.0.0.1"
+    assert alert.sentence.startswith("A program on 127.0.0.1 sends what the master does not understand")
+    assert "'fly' is no request of this version" in alert.sentence
+    logged = [each.getMessage() for each in caplog.records]
+    assert len(logged) == 2
+    assert "(once)" in logged[0]
+    assert "(10 times so far)" in logged[1]
+
+
+def test_what_only_begins_as_a_renewal_counts_too(master: Master) -> None:
+    context = zmq.Context()
+    with context.socket(zmq.DEALER) as socket:
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.connect(f"tcp://{master.address}")
+        socket.send(pack({"do": "renew", "call": 3, "what": [1]}))
+        assert socket.poll(2000)
+        assert isinstance(bodies.decode_answer(socket.recv())[1], Refused)
+    context.term()
+    eventually(lambda: bool(master.view().alerts))

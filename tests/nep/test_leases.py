@@ -1,0 +1,163 @@
+"""How often nodes renew: every second in small graphs, less often and together in large ones."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections import Counter
+from itertools import pairwise
+
+import pytest
+
+import nep
+from nep import leases
+from nep.backends.native.pace import Pace
+from nep.census import Census
+from nep.graph import Graph
+from nep.leases import LEASE_S, Leases
+from nep.masters import Master
+from nep.records import NodeRecord
+from nep.requests import Join, Renew, Renewed
+from tests.nep.programs import eventually, running
+
+
+def census_of(nodes: int, managed: int = 0) -> Census:
+    census = Census()
+    for n in range(nodes + managed):
+        census.meet(NodeRecord(f"n{n}", f"N{n}", "host", 1), 0.0, is_managed=n >= nodes)
+    return census
+
+
+def told(nodes: int, managed: int = 0, rounds: int = 4, within_s: float = 1.0) -> list[list[float]]:
+    """When each node renewed, round by round, when all of them started `within_s`."""
+    census = census_of(nodes, managed)
+    found = Leases(census, LEASE_S)
+    due = [within_s * n / nodes for n in range(nodes)]
+    times = []
+    for _ in range(rounds):
+        times.append(due)
+        found.set_pace(min(due))
+        order = sorted(range(nodes), key=lambda n: due[n])
+        next_due = list(due)
+        for n in order:
+            found.set_pace(due[n])
+            next_due[n] = due[n] + found.renew(census.members[f"n{n}"], due[n])
+        due = next_due
+    return times
+
+
+@pytest.mark.parametrize(("nodes", "managed"), [(1, 0), (100, 0), (10, 1000)])
+def test_nodes_of_ordinary_graphs_renew_every_second(nodes: int, managed: int) -> None:
+    times = told(nodes, managed)
+    for before, after in pairwise(times):
+        assert [b - a for a, b in zip(before, after, strict=True)] == pytest.approx([1.0] * nodes)
+
+
+@pytest.mark.parametrize(("nodes", "renew_s"), [(250, 2.0), (500, 4.0), (2000, 5.0)])
+@pytest.mark.parametrize("within_s", [0.01, 1.0])
+def test_nodes_of_large_graphs_renew_less_often_together_and_spread(
+    nodes: int, renew_s: float, within_s: float
+) -> None:
+    times = told(nodes, rounds=8, within_s=within_s)
+    waits = [b - a for a, b in zip(times[-2], times[-1], strict=True)]
+    assert all(1.0 <= wait <= renew_s + 0.1 for wait in waits)
+    assert sum(waits) / nodes == pytest.approx(renew_s, rel=0.1)
+    together = Counter(round(at, 3) for at in times[-1])
+    assert len(together) <= renew_s * 10 + 1
+    assert max(together.values()) <= 2 + 1.2 * nodes / (renew_s * 10)
+
+
+def test_a_node_that_comes_a_little_late_stays_in_its_place() -> None:
+    census = census_of(500)
+    found = Leases(census, LEASE_S)
+    found.set_pace(0.0)
+    member = census.members["n0"]
+    at = 10.03
+    for late_s in (0.04, 0.0, 0.03, 0.01):
+        at += found.renew(member, at) + late_s
+    assert at == pytest.approx(26.01)
+
+
+def test_whoever_was_told_to_wait_is_late_and_lapses_that_much_later() -> None:
+    census = census_of(500)
+    found = Leases(census, LEASE_S)
+    found.set_pace(0.0)
+    assert found.renew(census.members["n0"], 0.0) == pytest.approx(4.0)
+    assert "n0" not in found.late(4.39)
+    assert "n0" in found.late(4.41)
+    assert "n0" not in found.lapsed(5.9)
+    assert "n0" in found.lapsed(6.1)
+    assert "n1" in found.lapsed(3.0)  # it was told nothing yet
+
+
+def test_a_master_tells_how_long_to_wait() -> None:
+    graph = Graph(7, 0.0, learn_s=0.0)
+    for n in range(500):
+        graph.apply(Join(NodeRecord(f"n{n}", f"N{n}", "host", 1)), 1, 0.0, f"n{n}")
+    graph.tick(0.0)
+    (reply,) = graph.apply(Renew("n0", 7, graph.revision), 1, 1.0, "n0")
+    assert isinstance(reply.answer, Renewed)
+    assert reply.answer.next_s == pytest.approx(4.0)
+    (reply,) = graph.apply(Renew("unknown", 7, graph.revision), 1, 1.0, "unknown")
+    assert reply.answer == Renewed(7, graph.revision, again=True)
+
+
+def test_a_node_obeys_and_goes_on_without_answers() -> None:
+    pace = Pace()
+    pace.renews(10.0)
+    assert pace.due_at == 11.0
+    pace.told(4.0, 10.1)
+    assert pace.due_at == pytest.approx(14.1)
+    pace.renews(14.1)
+    assert pace.due_at == pytest.approx(18.1)
+    pace.told(1.0, 14.2)
+    assert pace.due_at == pytest.approx(15.2)
+
+
+@pytest.mark.parametrize(("told_s", "waits_s"), [(0.0, 1.0), (-5.0, 1.0), (1e9, 30.0), (float("nan"), 1.0)])
+def test_nothing_that_a_master_says_makes_a_node_race_or_sleep(told_s: float, waits_s: float) -> None:
+    pace = Pace()
+    pace.told(told_s, 10.0)
+    assert pace.due_at == 10.0 + waits_s
+
+
+PUBLISH = """
+import nep, sys
+node = nep.node("publisher")
+pub = node.new_pub("topic")
+print("ready")
+for line in sys.stdin:
+    pub.publish(line.strip())
+    print("said")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="uses POSIX signals")
+def test_a_killed_program_is_gone_within_3_s_though_it_may_be_silent_for_longer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(leases, "_RENEWALS_A_S", 0.01)
+    monkeypatch.setattr(leases, "_LONGEST_RENEW_S", 20.0)
+    with Master("127.0.0.1:0", learn_s=0.0) as master:
+        monkeypatch.setenv("NEP_MASTER", master.address)
+        with running(PUBLISH) as program, nep.node("tester") as node:
+            program.line()
+            program.say("x")
+            program.line()
+            eventually(lambda: node.graph().topics["topic"].publishers[0].count == 1)
+            program.signal(signal.SIGKILL)
+            assert eventually(lambda: "topic" not in node.graph().topics) < 3.0
+            assert node.graph().nodes == {}
+
+
+def test_a_node_that_waits_is_known_at_once_to_a_new_master(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(leases, "_RENEWALS_A_S", 0.01)
+    monkeypatch.setattr(leases, "_LONGEST_RENEW_S", 20.0)
+    master = Master("127.0.0.1:0", learn_s=0.0).start()
+    with nep.node("n", master=master.address) as node:
+        pub = node.new_pub("topic")
+        pub.publish(1)
+        eventually(lambda: master.view().topics["topic"].publishers[0].count == 1)
+        master.close()
+        with Master(master.address, learn_s=0.0) as second:
+            assert eventually(lambda: "topic" in second.view().topics) < 2.0
