@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 
 from app.blocks.going import Going
 from app.blocks.link import LAST_STATES, STATES, Call
@@ -53,7 +54,7 @@ class Network:
         self._arrived = threading.Condition()
         self._closed = threading.Event()
         self._ending = False
-        self._going = Going(self._rest, self.invoke)
+        self._going = Going(self._rest, self._stand, self.invoke)
         for robot in robots:
             self._meet(robot)
         for name, sensor in (*sensors, *events):
@@ -144,6 +145,16 @@ class Network:
     def go_on(self) -> None:
         """The pause is over: what was in motion is asked for again."""
         self._going.go_on()
+
+    def slow(self) -> AbstractContextManager[None]:
+        """While the calling script stays at a block in slow motion: what it left in motion stands still."""
+        return self._going.slow()
+
+    def _stand(self, robot: Robot) -> None:
+        """Stop a robot that drives; not while it does something else, which a stop would end as well."""
+        busy = [call for call in list(self._calls.values()) if call.robot == robot.name]
+        if all(self._going.is_motion(call) for call in busy):
+            self._tell_stop(robot)
 
     def _rest(self, robot: Robot) -> None:
         """Stop one robot; what else it does ends as if the pause had taken it back."""

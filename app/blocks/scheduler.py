@@ -30,7 +30,7 @@ class Scheduler:
         self._parked: deque[Script] = deque()  # before a block
         self._resuming: deque[Script] = deque()  # inside a block, after a wait
         self._paused = False
-        self._pace_s = 0.0
+        self.pace_s = 0.0  # slow motion: see `set_pace`
         self._stepping: Script | None = None
         self._stopping = False
 
@@ -89,8 +89,8 @@ class Scheduler:
             script.block = block
             if self._stepping is script:
                 self._stepping = None
-            if self._pace_s and not self._paused:
-                self._stay(script, lambda: self._pace_s, step_ends=True)
+            if self.pace_s and not self._paused:
+                self._stay(script, lambda: self.pace_s, step_ends=True)
             if self._stepping is script:
                 return  # a step was asked for while it stayed here
             if not self._parked and not self._resuming and not self._paused:
@@ -181,7 +181,7 @@ class Scheduler:
 
     def set_pace(self, seconds: float) -> None:
         """Slow motion: so long each script stays at a block before it is done; 0 for none."""
-        self._pace_s = max(0.0, seconds)
+        self.pace_s = max(0.0, seconds)
         self.poke()
 
     def step_once(self) -> None:

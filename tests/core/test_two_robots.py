@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -169,3 +170,22 @@ def test_a_step_does_not_leave_a_robot_driving(session: Session, node: nep.Node)
         tick_until(session, lambda: not wheels.still())
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "proven")
+
+
+def test_slow_motion_lets_a_robot_drive_no_further(session: Session, node: nep.Node) -> None:
+    """It drives for half a second, not also while the blocks behind it wait for their turn."""
+    with Driver(turtle.ROBOT, "Turtle", node) as driver:
+        there(session, "Turtle")
+        wheels = driver.body.wheels  # type: ignore[attr-defined]
+        first = wheels.pose()[:2]
+        drive = block("robot_diffdrive_do_drive", "d", ROBOT="Turtle", SPEED=number(-0.2), TURN=number(0))
+        wait = block("control_wait", "w", SECONDS=number(0.5))
+        halt = block("robot_diffdrive_do_drive", "h", ROBOT="Turtle", SPEED=number(0), TURN=number(0))
+        session.document.edited(workspace(started(drive, wait, halt)))
+        session.runs.set_pace(1.5)
+        session.runs.run()
+        tick_until(session, lambda: session.runs.running_blocks == ("h",), FOUND_S)
+        tick_until(session, wheels.still, 1.0)
+        tick_until(session, lambda: not session.runs.active, FOUND_S)
+        way = math.dist(first, wheels.pose()[:2])
+        assert 0.05 < way < 0.2  # 0.1 m; at both stays it would be 0.4 m or more
