@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 
 from app import resources
 from app.ui.blockly_view import BlocklyView
@@ -84,6 +86,21 @@ class Person:
 
     def press(self, key: Qt.Key, modifiers=Qt.NoModifier) -> None:
         QTest.keyClick(self.target, key, modifiers)
+
+    def wheel(self, by: int) -> None:
+        """Turn the wheel over the middle of the blocks; a negative way shows what is below."""
+        middle = QPointF(self.target.rect().center())
+        event = QWheelEvent(
+            middle,
+            QPointF(self.target.mapToGlobal(middle)),
+            QPoint(),
+            QPoint(0, by),
+            Qt.NoButton,
+            Qt.NoModifier,
+            Qt.NoScrollPhase,
+            False,
+        )
+        QApplication.sendEvent(self.target, event)
 
     def open_category(self, name: str) -> None:
         shown = "document.querySelector('.nepTab:not([hidden])')"
