@@ -34,40 +34,36 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
         unit=parameter.unit or "",
         name=parameter.title,
     )
-    whole = parameter.kind == "integer"
-    digits = decimals_of(step_of(parameter))
-    parts: list[QWidget] = [slider]
-
-    def value() -> object:
-        typed = slider.field.text()
-        if typed != f"{slider.value:.{digits}f}":
-            return read_number(typed, whole=whole)
-        return round(slider.value) if whole else float(slider.value)
+    dial = _dial(theme, parameter, slider) if parameter.kind == "angle" else None
 
     def show(given: object) -> None:
         number = _number(given)
         if number is not None and low <= number <= high:
             slider.set_value(number)
-            for part in parts[1:]:
-                part.set_value(number)  # type: ignore[attr-defined]  # the dial
+            if dial is not None:
+                dial.set_value(number)
 
     def changed(tell: Tell) -> None:
         connect(slider.changed, tell)
         connect(slider.field.textEdited, tell)
 
-    widget: QWidget = slider
-    if parameter.kind == "angle":
-        dial = _dial(theme, parameter, slider)
-        parts.append(dial)
-        widget = _beside(dial, slider, parameter.title)
     return Control(
-        widget,
-        value,
+        slider if dial is None else _beside(dial, slider, parameter.title),
+        lambda: _value_of(slider, parameter),
         show,
         changed,
         finished=lambda tell: connect(slider.field.editingFinished, tell),
         sentence=lambda: slider.field.sentence,
     )
+
+
+def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
+    """What the slider says, or what was typed beside it, also when that is wrong."""
+    whole = parameter.kind == "integer"
+    typed = slider.field.text()
+    if typed != f"{slider.value:.{decimals_of(step_of(parameter))}f}":
+        return read_number(typed, whole=whole)
+    return round(slider.value) if whole else float(slider.value)
 
 
 def step_of(parameter: Parameter) -> float:

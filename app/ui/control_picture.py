@@ -1,7 +1,6 @@
 """A picture for a robot: a file, the newest picture of a topic, or an address; its thumbnail beside it.
 
-It is sent as NEP's pictures in JSON are: ``data:image/jpeg;base64,…``, or the bare base64 text where the
-description asks for that (``contentEncoding`` and no ``format``). An address that was typed is sent as it is.
+An address that was typed is sent as it is, a picture as `app.ui.picture_file.encoded` makes it.
 """
 
 from __future__ import annotations
@@ -11,35 +10,23 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QRectF, QSize, Qt, QTimer, QUrl, Signal
-from PySide6.QtGui import (
-    QDragEnterEvent,
-    QDropEvent,
-    QImage,
-    QImageReader,
-    QPainter,
-    QPainterPath,
-    QPaintEvent,
-)
-from PySide6.QtWidgets import QFileDialog, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QTimer, QUrl, Signal
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
+from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
 
 from app.robots.description import Parameter
 from app.ui.control import Control, connect, line_field
 from app.ui.flow import Flow
-from app.ui.icons import paint_icon
+from app.ui.picture_file import FILES, encoded, read_picture
+from app.ui.picture_thumbnail import Thumbnail
 from app.ui.theme import Theme
-from app.ui.widgets import Button, label, paint
+from app.ui.widgets import Button, label
 from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream
 
-FILES = "Pictures (*.png *.jpg *.jpeg *.gif *.bmp *.webp)"
-THUMBNAIL = QSize(72, 54)
 LOOK_MS = 200
-LONGEST_SIDE, QUALITY = 1280, 85
-MOST_PIXELS = 60_000_000
-MOST_FILE_BYTES = 40_000_000
 
 
 class Pictures(Protocol):
@@ -62,81 +49,6 @@ class NoPictures:
     def stream(self, topic: str) -> ImageStream:
         """There is none to look at: KeyError."""
         raise KeyError(topic)
-
-
-def read_picture(path: Path) -> tuple[QImage | None, str]:
-    """A picture file, turned as its camera says, or the sentence that says why it can't be used."""
-    try:
-        too_big = path.stat().st_size > MOST_FILE_BYTES
-    except OSError as error:
-        return None, f"“{path.name}” can't be read: {(error.strerror or 'unknown').lower()}."
-    reader = QImageReader(str(path))
-    reader.setAutoTransform(True)
-    size = reader.size()
-    if too_big or size.width() * size.height() > MOST_PIXELS:
-        return None, f"“{path.name}” is too large; use one below {MOST_FILE_BYTES // 1_000_000} MB."
-    image = reader.read()
-    if image.isNull():
-        return None, f"“{path.name}” is no picture that can be read."
-    return image, ""
-
-
-def encoded(image: QImage, *, bare: bool = False) -> str:
-    """A picture as JPEG in text, at most 1280 pixels at its longer side."""
-    if max(image.width(), image.height()) > LONGEST_SIDE:
-        keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
-        image = image.scaled(LONGEST_SIDE, LONGEST_SIDE, keep, smooth)
-    held = QByteArray()
-    buffer = QBuffer(held)
-    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    image.convertToFormat(QImage.Format.Format_RGB32).save(buffer, "JPG", QUALITY)  # type: ignore[call-overload]
-    text = base64.b64encode(held.data()).decode("ascii")
-    return text if bare else f"data:image/jpeg;base64,{text}"
-
-
-class Thumbnail(QWidget):
-    """A small picture, or an icon while there is none."""
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self._image: QImage | None = None
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("The chosen picture")
-
-    @property
-    def image(self) -> QImage | None:
-        """What it shows."""
-        return self._image
-
-    def show_image(self, image: QImage | None) -> None:
-        """Show another picture, or none."""
-        self._image = image
-        self.update()
-
-    def sizeHint(self) -> QSize:
-        return THUMBNAIL
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect, radius = QRectF(self.rect()), self._theme.radius("small")
-        paint.box(painter, rect, radius, theme.colour("sunken"), theme.colour("border"))
-        if self._image is None:
-            square = QRectF(rect.center().x() - 10, rect.center().y() - 10, 20, 20)
-            paint_icon(painter, square, "image", theme.colour("textTertiary"))
-        else:
-            inner = rect.adjusted(1, 1, -1, -1)
-            shape = QPainterPath()
-            shape.addRoundedRect(inner, radius - 1, radius - 1)
-            painter.setClipPath(shape)
-            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-            size = self._image.size().scaled(
-                inner.size().toSize(), Qt.AspectRatioMode.KeepAspectRatioByExpanding
-            )
-            place = QRectF(0, 0, size.width(), size.height())
-            place.moveCenter(inner.center())
-            painter.drawImage(place, self._image)
-        painter.end()
 
 
 class PictureChoice(QWidget):

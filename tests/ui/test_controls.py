@@ -17,9 +17,10 @@ from app.robots.inputs import Parameter, parameter_of
 from app.robots.parts import Action
 from app.ui.angle_dial import AngleDial
 from app.ui.control_colour import ColourChoice, HueStrip
-from app.ui.control_picture import MOST_FILE_BYTES, PictureChoice, encoded, read_picture
+from app.ui.control_picture import PictureChoice
 from app.ui.forms import ActionForm
 from app.ui.long_text import LEAST_HEIGHT, LongText
+from app.ui.picture_file import MOST_FILE_BYTES, encoded, read_picture
 from app.ui.theme import Theme
 from app.ui.widgets import SliderWithUnit
 from tests.ui import fakes
