@@ -127,18 +127,21 @@ class RobotHandle:
             self._await(robot, action, call, words)
             if not call.held or call.state != "canceled":
                 return call
-            unknown = is_unknown(action, input, call)
-            if unknown:
-                left_out = f"{self._name} does not tell how much of “{action.title}” is left"
-                self._runtime.saying.warn(f"{left_out}; Go on leaves it out")
-            self._runtime.scheduler.hold()
-            self._runtime.saying.warn("")
+            self._stay(action, is_unknown(action, input, call))
             rest = rest_of(action, input, call)
             if rest is None:
-                if unknown:
-                    self._runtime.write(f"{left_out}, so it was left out")
                 return call
             input = rest
+
+    def _stay(self, action: Action, unknown: bool) -> None:
+        """Until the pause ends; a person reads that the rest of a move will be left out, and that it was."""
+        known = f"{self._name} does not tell how much of “{action.title}” is left"
+        saying = self._runtime.saying
+        saying.warn(f"{known}; Go on leaves it out" if unknown else "")
+        self._runtime.scheduler.hold()
+        saying.warn("")
+        if unknown:
+            self._runtime.write(f"{known}, so it was left out")
 
     def _await(self, robot: Robot, action: Action, call: Call, words: str) -> None:
         scheduler = self._runtime.scheduler

@@ -23,6 +23,7 @@ from app.ui.long_text import LEAST_HEIGHT, LongText
 from app.ui.picture_file import MOST_FILE_BYTES, encoded, read_picture
 from app.ui.theme import Theme
 from app.ui.widgets import SliderWithUnit
+from app.ui.widgets.menus import Menu
 from tests.ui import fakes
 
 KEEP = Option(0, "keep"), Option(1, "turn")
@@ -296,6 +297,18 @@ def test_a_file_that_is_no_picture_says_so_and_is_not_sent(qtbot, theme, tmp_pat
     with (tmp_path / "big.png").open("wb") as big:
         big.truncate(MOST_FILE_BYTES + 1)
     assert "too large" in read_picture(tmp_path / "big.png")[1]
+
+
+def test_the_cameras_are_offered_in_a_menu(qtbot, theme) -> None:
+    form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=Cameras())
+    choice = child(form, PictureChoice)
+    QTest.mouseClick(choice.camera, Qt.MouseButton.LeftButton)
+    (menu,) = choice.findChildren(Menu)
+    qtbot.waitUntil(menu.isVisible)
+    (camera,) = menu.actions()
+    camera.trigger()
+    menu.close()
+    assert choice.field.text() == "newest picture of /Pepper/camera"
 
 
 def test_the_newest_picture_of_a_topic_at_the_moment_of_try_is_sent(qtbot, theme) -> None:
