@@ -16,7 +16,7 @@ import zmq
 
 import nep.errors
 from nep.addresses import host_of, master_address
-from nep.doctor import processes
+from nep.doctor import installs, processes
 from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact
 from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
@@ -83,6 +83,7 @@ def gather(
         tuple(_folder(purpose, path) for purpose, path in (state, *folders)),
         tuple(_clocks(view)),
         loopback_problem(),
+        installs.install_of(master_pid) if master_pid is not None else None,
     )
 
 

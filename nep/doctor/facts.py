@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from nep.doctor.installs import Install
 from nep.views import GraphView
 
 __all__ = ["ClockFact", "Facts", "FileFact", "FolderFact", "PackageFact", "PortFact", "ProcessFact"]
@@ -77,7 +78,8 @@ class Facts:
     took. `masters` are all processes here that run a master, each with its port. `nep_file` is where the
     package `nep` is imported from; `strange_files` in it are the original NEP's. `shadow` is a file that
     hides it from programs that are started here. `loopback` says why programs of this computer cannot reach
-    each other, "" when they can.
+    each other, "" when they can. `master_install` is where the master that answers was started from, None
+    when that is not known.
     """
 
     now_s: float
@@ -98,3 +100,4 @@ class Facts:
     folders: tuple[FolderFact, ...] = ()
     clocks: tuple[ClockFact, ...] = ()
     loopback: str = ""
+    master_install: Install | None = None

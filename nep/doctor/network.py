@@ -37,13 +37,14 @@ def masters(facts: Facts) -> Iterator[Finding]:
     number = facts.address.rpartition(":")[2]
     if facts.view is not None:
         yield _running(facts, holder)
+        yield from _of_another_version(facts, holder)
     elif holder is not None and holder.is_master:
         yield Finding(
             "master:hung",
             "error",
             f"The master at {facts.address}{_process(holder)} does not answer; it hangs or is halted.",
             "End it and start a new one; programs that have found each other go on meanwhile.",
-            command=f"kill {holder.pid}" if facts.platform != "win32" else f"taskkill /F /PID {holder.pid}",
+            command=_kill(facts, holder),
         )
     elif port is not None and port.is_taken:
         other = _other_port(number)
@@ -87,6 +88,30 @@ def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
             "This computer is very busy; look for the program that is.",
         )
     return Finding("master", "ok", f"{sentence}.")
+
+
+def _of_another_version(facts: Facts, holder: ProcessFact | None) -> Iterator[Finding]:
+    """A master that another version of NEP Studio has started, or this one before it was installed anew."""
+    install, own = facts.master_install, facts.versions.get("NEP Studio", "")
+    if install is None or holder is None or not own[:1].isdigit():
+        return
+    if install.version != own:
+        why = f"is of NEP Studio {install.version} ({install.place}); this is {own}"
+    elif holder.since_s is not None and holder.since_s < install.since_s:
+        why = f"has run since before NEP Studio {own} was installed, so it is of the one before"
+    else:
+        return
+    yield Finding(
+        "master:version",
+        "warning",
+        f"The master at {facts.address}{_process(holder)} {why}. What is new or mended may not work with it.",
+        "End it: an open Studio starts a new one, else type “nep master”. Programs that have found each other go on.",
+        command=_kill(facts, holder),
+    )
+
+
+def _kill(facts: Facts, holder: ProcessFact) -> str:
+    return f"kill {holder.pid}" if facts.platform != "win32" else f"taskkill /F /PID {holder.pid}"
 
 
 def _several(facts: Facts) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ import pytest
 
 from nep.doctor import Facts, findings, report, to_plain, worst
 from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact
+from nep.doctor.installs import Install
 from nep.graph import Alert, GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 NOW = 1_800_000_000.0
@@ -57,6 +58,35 @@ def test_a_healthy_computer_has_no_warning():
         "A master runs at 127.0.0.1:7780 (process 41) for 2.0 h: 2 nodes, 0 topics."
     )
     assert "The master holds port 7000" in found()["port:7000"].sentence
+
+
+def test_a_master_of_another_version_is_told_with_its_mend():
+    versions = {"NEP Studio": "0.2.0"}
+    older = Install("0.1.0", NOW - 90_000, "/opt/old")
+    one = found(versions=versions, master_install=older)["master:version"]
+    assert one.sentence == (
+        "The master at 127.0.0.1:7780 (process 41) is of NEP Studio 0.1.0 (/opt/old); this is 0.2.0."
+        " What is new or mended may not work with it."
+    )
+    assert (one.severity, one.command) == ("warning", "kill 41")
+    assert one.mend.startswith("End it: an open Studio starts a new one")
+    there = found(versions=versions, master_install=older, platform="win32")["master:version"]
+    assert there.command == "taskkill /F /PID 41"
+
+
+def test_a_master_from_before_the_installation_is_told():
+    versions = {"NEP Studio": "0.2.0"}
+    one = found(versions=versions, master_install=Install("0.2.0", NOW - 60, "/here"))["master:version"]
+    assert "since before NEP Studio 0.2.0 was installed" in one.sentence
+    same = Install("0.2.0", NOW - 90_000, "/here")
+    assert "master:version" not in found(versions=versions, master_install=same)
+
+
+@pytest.mark.parametrize("changes", [{}, {"versions": {"NEP Studio": "(not installed)"}}, {"view": None}])
+def test_nothing_is_said_of_a_version_that_is_not_known(changes):
+    known = {"versions": {"NEP Studio": "0.2.0"}, "master_install": Install("0.1.0", NOW, "/opt/old")}
+    known = known | changes if changes else {"versions": {"NEP Studio": "0.2.0"}}
+    assert "master:version" not in found(**known)
 
 
 def test_no_master_says_how_to_start_one():

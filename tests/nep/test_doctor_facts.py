@@ -14,7 +14,7 @@ import typer
 
 import nep
 from nep.cli.doctor import doctor
-from nep.doctor import gather, hindrance, processes
+from nep.doctor import gather, hindrance, installs, processes
 from nep.doctor.collect import loopback_problem
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -57,6 +57,64 @@ def test_a_free_port_is_free():
     facts = gather(f"127.0.0.1:{port}")
     assert not facts.master_port.is_taken
     assert processes.is_free(port)
+
+
+def installed(environment: Path, version: str, place: str = "lib/python3.11/site-packages") -> Path:
+    info = environment / place / f"nep_studio-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: nep-studio\nVersion: {version}\n")
+    return info
+
+
+@pytest.mark.parametrize("place", ["lib/python3.11/site-packages", "Lib/site-packages"])
+def test_a_version_is_read_from_the_environment_of_a_program(tmp_path, place):
+    info = installed(tmp_path, "0.0.9", place)
+    os.utime(info / "METADATA", (1000, 1000))
+    assert installs.install_in(tmp_path) == installs.Install("0.0.9", 1000.0, str(tmp_path))
+    (info / "METADATA").unlink()
+    assert installs.install_in(tmp_path) is None
+
+
+def test_an_environment_without_or_with_two_tells_no_version(tmp_path):
+    assert installs.install_in(tmp_path) is None
+    installed(tmp_path, "0.0.9")
+    installed(tmp_path, "0.1.0")
+    assert installs.install_in(tmp_path) is None
+
+
+@pytest.mark.parametrize(
+    ("command", "active", "environment"),
+    [
+        (["/x/.venv/bin/python3", "-m", "nep", "master"], "", "/x/.venv"),
+        ([".venv/bin/python", "/x/.venv/bin/nep", "master"], "", "/home/me/.venv"),
+        (["python3", "-m", "nep", "master"], "/y/env", "/y/env"),
+        (["python3", "-m", "nep", "master"], "", "/usr"),
+        (["nep", "master"], "", "/usr"),
+        ([], "", "/usr"),
+    ],
+)
+def test_the_environment_of_a_program_is_found(command, active, environment):
+    found = installs.environment_of(command, "/usr/bin/python3.11", "/home/me", active)
+    assert found == Path(environment)
+
+
+def test_a_program_of_an_installer_tells_no_environment():
+    assert installs.environment_of(["nep-studio"], "/opt/nep-studio", "/") is None
+
+
+def test_the_version_of_a_running_master_is_gathered(tmp_path, master, monkeypatch):
+    asked = []
+    known = installs.Install("0.0.9", 1000.0, str(tmp_path))
+    monkeypatch.setattr(installs, "install_of", lambda pid: asked.append(pid) or known)
+    assert gather(master.address).master_install == known
+    assert asked == [os.getpid()]
+    assert gather("127.0.0.1:1").master_install is None
+
+
+def test_a_program_that_has_ended_tells_no_version():
+    done = subprocess.Popen([sys.executable, "-c", ""])
+    done.wait()
+    assert installs.install_of(done.pid) is None
 
 
 def test_a_far_masters_port_is_not_looked_for_here():
