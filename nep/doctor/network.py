@@ -105,7 +105,8 @@ def _of_another_version(facts: Facts, holder: ProcessFact | None) -> Iterator[Fi
         "master:version",
         "warning",
         f"The master at {facts.address}{_process(holder)} {why}. What is new or mended may not work with it.",
-        "End it: an open Studio starts a new one, else type “nep master”. Programs that have found each other go on.",
+        "End it: an open Studio starts a new one, else type “nep master”. Programs that have found each other"
+        " go on.",
         command=_kill(facts, holder),
     )
 
