@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.ui.blockly_person import workspace
 
-pytest_plugins = ("tests.ui.blockly_fixtures",)
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
 
 SHOWN = ".nepTab:not([hidden])"
 DRAWN = f"[...document.querySelectorAll('{SHOWN} [data-id]')].filter(e => e.getClientRects().length)"

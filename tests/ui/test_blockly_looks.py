@@ -88,6 +88,38 @@ def test_an_error_has_its_sentence_beside_the_block(view, person):
     them.wait_for("document.querySelectorAll('.nepBubble, .nepState').length", 0)
 
 
+def test_an_error_never_comes_without_its_sentence(view, person):
+    them = person(state=PICTURE)
+    them.ask(
+        "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') &&"
+        " seen.push(document.body.textContent.includes('Pepper does not answer.')))"
+        ".observe(document.body, {subtree: true, childList: true}); })()"
+    )
+    view.set_errors({"say_touch": "Pepper does not answer."})
+    them.wait_for("seen.length > 0")
+    assert them.ask("seen[0]") is True
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_large_text_leaves_the_find_bar_whole_beside_the_toolbox(view, person, percent):
+    view.set_theme({**TOKENS, "textPercent": percent}, False)
+    them = person(state=PICTURE)
+    view.open_find()
+    them.box(".nepFind")
+    on_top = (
+        "[...document.querySelectorAll('.nepFind :is(input, button)')].map(e => [e, e.getBoundingClientRect()])"
+        ".filter(([e, r]) => [[r.left + 2, r.top + 9], [r.right - 2, r.bottom - 9]].some(([x, y]) =>"
+        " !e.contains(document.elementFromPoint(x, y)))).length"
+    )
+    them.wait_for("document.querySelectorAll('.nepFind button').length", 3)
+    them.wait_for(on_top, 0)
+    beside = (
+        "document.querySelector('.nepFind').getBoundingClientRect().left -"
+        " document.querySelector('.nepTab:not([hidden]) .blocklyToolbox').getBoundingClientRect().right"
+    )
+    assert them.ask(beside) >= 0
+
+
 def test_absent_robots_are_grey_with_the_reason(view, person):
     them = person(state=PICTURE)
     view.set_absent(["wave"])

@@ -46,10 +46,11 @@ export class States {
     this.outline();
   }
 
+  /** The outline and its sentence in one step: nobody sees one without the other. */
   setErrors(errors: Record<string, string>): void {
     this.errors = new Map(Object.entries(errors));
     this.outline();
-    this.placeSoon();
+    this.place();
   }
 
   setAbsent(ids: string[]): void {
