@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from nep.codecs import codec as codec_named
 from nep.errors import NepError
 from nep.message import Message
 
@@ -22,6 +21,9 @@ SHARE = 0.1
 ADVANCE_S = 1.0
 RESERVE_S = 0.5
 SUSPECT_S = 30.0
+LOOK_S = 0.0002
+"""The clock of work takes as long as trying a message: it is looked at this often."""
+SOME, SOME_BYTES = 256, 64_000
 
 
 @dataclass(slots=True)
@@ -91,19 +93,18 @@ class Checks:
         if found.bad:
             self._suspects[topic] = now
         left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVE_S)
-        for message in messages[:-1]:
-            if self._work() - began >= left:
-                break
-            problem = _problem(message, keep=False)
-            found.checked += 1
-            if problem:
-                found.bad += 1
-                found.sentence = found.sentence or problem
-                if found.bad == 1:
-                    self._suspects[topic] = now
-                    left = self._advance_s
+        place, some, worked, older = 0, 1, 0.0, len(messages) - 1
+        while place < older and worked < left:
+            was_well, before = not found.bad, worked
+            end = min(older, place + some)
+            place = _try_some(messages, place, end, found)
+            if was_well and found.bad:
+                self._suspects[topic] = now
+                left = self._advance_s
+            worked = self._work() - began
+            some = min(2 * some, SOME) if worked - before < LOOK_S else max(1, some // 2)
         found.unchecked = len(messages) - found.checked
-        self._advance_s -= self._work() - began
+        self._advance_s -= worked
 
     def _is_suspect(self, topic: str, now: float) -> bool:
         seen = self._suspects.get(topic)
@@ -111,6 +112,21 @@ class Checks:
             del self._suspects[topic]
             return False
         return seen is not None
+
+
+def _try_some(messages: Sequence[Message], place: int, end: int, found: Checked) -> int:
+    """Try these messages, or less when they are large; the place of the first that was not tried."""
+    size_bytes = 0
+    while place < end and size_bytes < SOME_BYTES:
+        message = messages[place]
+        problem = _problem(message, keep=False)
+        found.checked += 1
+        if problem:
+            found.bad += 1
+            found.sentence = found.sentence or problem
+        size_bytes += message.size_bytes
+        place += 1
+    return place
 
 
 def _problem(message: Message, *, keep: bool) -> str:
@@ -121,7 +137,7 @@ def _problem(message: Message, *, keep: bool) -> str:
         if keep:
             _ = message.payload
         else:
-            codec_named(message.codec).decode(message.data, message.extension)
+            message.kind.decode(message.raw, message.extension)
     except NepError as error:
         return str(error)
     return ""

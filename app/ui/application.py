@@ -20,7 +20,7 @@ from app import resources
 from app.core.journal import left_behind
 from app.core.session import Session
 from app.core.settings import home
-from app.ui import fonts, messages, single_window
+from app.ui import fonts, messages, single_window, turns
 from app.ui.commands import Commands
 from app.ui.first_paint import AfterFirstPaint
 from app.ui.incoming_files import IncomingFiles
@@ -61,6 +61,7 @@ def make_application() -> QApplication:
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
+    turns.shorten()
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontShowIconsInMenus)
     application = QApplication(sys.argv[:1])

@@ -77,6 +77,33 @@ def test_one_bad_message_makes_the_rest_of_its_batch_worth_the_reserve() -> None
     assert found.checked > module.RESERVE_S / 0.01
 
 
+class Reads(Clock):
+    """A clock that counts how often it is read."""
+
+    count = 0
+
+    def __call__(self) -> float:
+        self.count += 1
+        return super().__call__()
+
+
+def test_the_clock_of_work_is_not_read_for_every_message() -> None:
+    clock = Reads(step_s=1e-6)
+    checks = Checks(Clock(), clock)
+    checks.look("/a", messages(*[GOOD] * 5000, BAD, *[GOOD] * 5000))
+    found = checks.take()["/a"]
+    assert (found.checked, found.bad, found.unchecked) == (10_001, 1, 0)
+    assert clock.count < 100
+
+
+def test_it_is_read_after_each_large_message_whatever_came_before() -> None:
+    clock = Reads(step_s=1e-6)
+    checks = Checks(Clock(), clock)
+    checks.look("/a", messages(*[GOOD] * 1000, *[b" " * 64_000 + GOOD] * 200))
+    assert checks.take()["/a"].checked == 1200
+    assert clock.count > 190
+
+
 def test_a_clock_that_jumps_back_takes_nothing_away() -> None:
     clock = Clock()
     checks = Checks(clock, clock)
