@@ -102,7 +102,8 @@ class Companions:
         """Start a virtual robot of that name and model.
 
         One of that name that is there is used, also one that another Studio started. The wish is kept for
-        some seconds: `follow` starts a robot as soon as it is known that there is none, or none any more.
+        some seconds: `follow` starts a robot as soon as it is known that there is none, or none any more. Where
+        the master is started here, nobody can be there yet.
         """
         now = self._clock()
         self._wishes[name] = _Wish(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
@@ -115,7 +116,7 @@ class Companions:
         now = self._clock()
         for name, wish in list(self._wishes.items()):
             there = self._is_there(name)
-            if there is None and now >= wish.known_until:
+            if there is None and (self._master.first or now >= wish.known_until):
                 there = False
             if there is False:
                 del self._wishes[name]

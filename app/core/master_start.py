@@ -37,6 +37,8 @@ class MasterStart:
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
         self._wait_s, self._again_at, self._told = AGAIN_S, 0.0, ""
+        self.first = False
+        """Whether there was no master before the one that is started here, so nobody can be there yet."""
 
     @property
     def runs(self) -> bool:
@@ -78,6 +80,7 @@ class MasterStart:
         hindered = doctor.hindrance(self._address)
         if hindered is not None:
             return f"{hindered.sentence} {hindered.mend}"
+        self.first = True
         try:
             self._process = start_process(self._address, owner_pid=os.getpid())
         except (NepError, OSError) as error:

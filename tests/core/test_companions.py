@@ -102,6 +102,15 @@ def test_it_waits_until_it_is_known_who_is_there(world: World) -> None:
     assert not world.started
 
 
+def test_it_does_not_wait_where_no_master_was_before(world: World) -> None:
+    world.there = None
+    world.companions.start_virtual_robot()
+    assert not world.started
+    world.companions._master.first = True
+    world.after(0.03)
+    assert len(world.started) == 1
+
+
 def test_it_does_not_wait_any_longer_than_some_seconds(world: World) -> None:
     world.there = None
     world.companions.start_virtual_robot()

@@ -52,7 +52,7 @@ def test_a_master_that_runs_is_joined(master) -> None:
     start = MasterStart(master.address, told.append)
     start.ensure()
     start.close()
-    assert (told, start.runs) == ([], False)
+    assert (told, start.runs, start.first) == ([], False, False)
 
 
 def test_one_is_started_when_nobody_is_there(monkeypatch) -> None:
@@ -65,6 +65,7 @@ def test_one_is_started_when_nobody_is_there(monkeypatch) -> None:
     start.ensure()
     start.ensure()  # one start at a time
     eventually(lambda: start.runs, 20)
+    assert start.first
     assert nep.is_running(address, 5)
     start.close()
     assert told == []
