@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+import nep
 from app.core import companions
 from app.core.companions import KNOWN_WITHIN_S, WISH_KEPT_S, Companions
 from app.core.fleet import Fleet
+from app.core.session import Session
+from app.core.settings import Settings
 from app.core.watches import Watches
+from app.robots import simulated
+from app.robots.driver import Driver
+from nep.masters import Master
 from nep.views import GraphView, PublisherInfo, TopicInfo
+from tests.core.waiting import tick_until
 
 
 class Process:
@@ -138,6 +146,21 @@ def test_starting_it_anew_is_no_second_wish(world: World) -> None:
     world.processes[0].alive = False
     world.after(0.03)
     assert len(world.started) == 1
+
+
+def test_a_second_studio_uses_the_pepper_that_is_there(master: Master, tmp_path: Path) -> None:
+    with nep.node("first", master=master.address) as node, Driver(simulated.ROBOT, "Pepper", node):
+        second = Session(
+            Settings(tmp_path), address=master.address, journal_folder=tmp_path / "j", start_companions=False
+        )
+        second.start()
+        try:
+            second.companions.start_virtual_robot()  # in its first moment: it knows nobody yet
+            assert second.graph is None
+            tick_until(second, lambda: second.fleet.connected, 20)
+            assert second.companions._robots == {}
+        finally:
+            second.close()
 
 
 def test_the_fleet_tells_who_is_there_once_it_was_told() -> None:
