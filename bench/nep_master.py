@@ -3,8 +3,8 @@
     python bench/nep_master.py [--nodes 500] [--topics 2000] [--seconds 10] [--rounds 30]
 
 The master is a process of its own. A second process plays the nodes: a DEALER socket each, which joins with
-its share of publishers and with a subscriber for each of another node's topics. Each renews when a node of the
-library would (`Pace`: when the master says, and every second before it has said anything), with counters that grow.
+its share of publishers and with a subscriber for each of another node's topics. Each renews with counters
+that grow, when a node of the library does (`Pace`): every second, or when the master says.
 
     at rest     processor time of the master while all nodes renew, as a share of one core
     answer      from sending `look` to having the whole reply, by a bare socket

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
+from operator import itemgetter
 from types import UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
@@ -126,8 +127,12 @@ def _of_dataclass(kind: type) -> Reader:
         (each.name, hints[each.name] if hints[each.name] in _PLAIN else None, _reader(hints[each.name]), each)
         for each in fields(kind)
     ]
+    quickly = _quickly(kind, hints)
 
     def parse(value: object) -> object:
+        made_quickly = quickly(value) if type(value) is dict else None
+        if made_quickly is not None:
+            return made_quickly
         if not isinstance(value, Mapping):
             raise _MisfitError(f"is a '{type(value).__name__}', not a map")
         found: dict[str, object] = {}
@@ -146,6 +151,46 @@ def _of_dataclass(kind: type) -> Reader:
         return made(kind, found)
 
     return parse
+
+
+def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object]], object | None]:
+    """Makes a `kind` of a map with just its fields, each of just its type: nearly all are so in a graph.
+
+    None for all others, also for those with something wrong deeper down: who asks finds out what.
+    """
+    plain = {name: _plain_types(hint) for name, hint in hints.items()}
+    names = [name for name, types in plain.items() if types]
+    others = [(name, _reader(hints[name])) for name, types in plain.items() if not types]
+    of_plain = itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
+    known: set[tuple[type, ...]] = set()
+    """Combinations of types that were found right; there are two for each field that may be None."""
+
+    def quickly(value: dict[str, object]) -> object | None:
+        if len(value) != len(plain):
+            return None
+        try:
+            types = tuple(map(type, of_plain(value)))
+            if types not in known:
+                if not all(each in plain[name] for name, each in zip(names, types, strict=True)):
+                    return None
+                known.add(types)
+            fresh: object = made(kind, value)
+            for name, reader in others:
+                fresh.__dict__[name] = reader(value[name])
+        except (LookupError, _MisfitError):
+            return None
+        return fresh
+
+    return quickly
+
+
+def _plain_types(hint: Any) -> frozenset[type]:  # noqa: ANN401 - a type hint is any object
+    """The types of which values are taken as they are; none when values have to be looked into."""
+    if hint in _PLAIN:
+        return frozenset({hint})
+    if get_origin(hint) in {UnionType, Union} and set(get_args(hint)) <= _PLAIN:
+        return frozenset(get_args(hint))
+    return frozenset()
 
 
 def _default(field: Field[Any]) -> object:

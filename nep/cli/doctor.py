@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import typer
 
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, show_json
-from nep.doctor import Finding, findings, gather, to_plain, worst
+
+if TYPE_CHECKING:
+    from nep.doctor import Finding
 
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
 _SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))
@@ -19,6 +23,8 @@ def doctor(master: MasterOption = None, as_json: JsonOption = False) -> None:
 
     Ends with 0 when all is well, 1 with a warning, 2 when something is wrong.
     """
+    from nep.doctor import findings, gather, to_plain, worst  # noqa: PLC0415 - other commands need not wait
+
     found = findings(gather(master))
     if as_json:
         show_json(to_plain(found))

@@ -14,10 +14,7 @@ import typer
 from nep.addresses import host_of, is_loopback, master_address
 from nep.cli.alert_printer import AlertLog, AlertPrinter
 from nep.cli.screen import console, say
-from nep.doctor import hindrance
-from nep.doctor.collect import loopback_problem
 from nep.errors import AddressInUseError, NepError
-from nep.gateway.attachment import GatewayAttachment
 from nep.masters import Attachment, Master, is_running
 from nep.network import ANY, own_addresses
 
@@ -57,6 +54,11 @@ def master(
 
     Messages never pass through it; while it is away, programs that have found each other go on.
     """
+    # 60 ms that the other commands need not wait for:
+    from nep.doctor import hindrance  # noqa: PLC0415
+    from nep.doctor.collect import loopback_problem  # noqa: PLC0415
+    from nep.gateway.attachment import GatewayAttachment  # noqa: PLC0415
+
     address = _address(port)
     logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
     attachments: list[Attachment] = [AlertPrinter(), AlertLog()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -59,18 +60,20 @@ def json_painter() -> Callable[[str, str], Text]:
 
 def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None:
     """A table on the standard output."""
+    is_terminal = sys.stdout.isatty()  # else a file or a program: nothing to fold for
+    room = shutil.get_terminal_size().columns if is_terminal else _ENDLESS
+    lines = list(rows)
+    widths = _widths(columns, lines, room)
+    if len(lines) > _LONG and _fit(lines, widths):
+        sys.stdout.write("".join(f"{line}\n" for line in _laid_out(columns, lines, widths)))
+        return
     from rich import box  # noqa: PLC0415 - see `console`
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
     out = console()
-    if not out.is_terminal:  # a file or a program: nothing to fold for
-        out.width = _ENDLESS
-    lines = list(rows)
-    widths = _widths(columns, lines, out.width)
-    if len(lines) > _LONG and _fit(lines, widths):
-        out.file.write("".join(f"{line}\n" for line in _laid_out(columns, lines, widths)))
-        return
+    if not is_terminal:
+        out.width = room
     table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
     for column, width in zip(columns, widths, strict=True):
         table.add_column(
