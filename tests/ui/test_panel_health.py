@@ -118,6 +118,25 @@ def test_it_comes_with_robots_below_the_sensors(qtbot, window: MainWindow, comma
     assert not bench.tabifiedDockWidgets(health)
 
 
+def test_there_is_room_for_it_in_the_smallest_window_and_it_stays_in_a_wider_one(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    window.show()
+    window.resize(1100, 700)
+    commands.run("layout.behaviour")
+    bench = window.bench
+    assert bench is not None
+    commands.run("robots.show")
+    docks = bench.docks
+    for size in ((1100, 700), (1440, 900)):
+        window.resize(*size)
+        qtbot.waitUntil(lambda: abs(docks["health"].height() - 190) <= 1)
+        qtbot.waitUntil(lambda: abs(docks["sensors"].height() - 140) <= 1)
+        assert docks["health"].isVisible()
+        assert docks["robot"].height() >= 100
+        assert docks["health"].geometry().bottom() <= bench.height()
+
+
 def test_closed_it_stays_closed_also_after_a_restart(qtbot, window: MainWindow, commands: Commands) -> None:
     window.show()
     commands.run("layout.behaviour")
