@@ -62,6 +62,7 @@ TABLE: tuple[Row, ...] = (
     *(Row(f"panel.{n}", "", f"Go to panel {n}", f"Ctrl+{n}") for n in range(1, 10)),
     Row("tab.next", "View", "Next behaviour", "Ctrl+Tab", above=True),
     Row("tab.previous", "View", "Previous behaviour", "Ctrl+Shift+Tab"),
+    Row("view.freeze", "View", "Freeze what shows", "", "snowflake", check=True, above=True),
     Row("theme.light", "View", "Light", "", "sun", group="theme", above=True),
     Row("theme.dark", "View", "Dark", "", "moon", group="theme"),
     Row("theme.system", "View", "As the system", "", "monitor", group="theme"),

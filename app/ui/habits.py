@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from app.core.settings import RecentFile
 from app.errors import SettingsError
 from app.ui.actions import Actions, Handler
+from app.ui.developer_tools import DeveloperTools
 from app.ui.files import Files
+from app.ui.freezing import freeze_or_go_on
 from app.ui.main_window import MainWindow
 from app.ui.menu_lists import MenuLists
 from app.ui.palette_entries import Offers
@@ -67,6 +69,7 @@ class Habits:
             "layout.keep": self._keep_layout,
             "layout.rename": self._rename_layout,
             "layout.delete": self._delete_layout,
+            "view.freeze": self._freeze,
             "panel.next": lambda: window.panel_focus.next(1),
             "panel.previous": lambda: window.panel_focus.next(-1),
             **{f"panel.{n}": lambda n=n: window.panel_focus.number(n) for n in PANEL_KEYS},  # type: ignore[misc]
@@ -84,6 +87,7 @@ class Habits:
         """Keep these actions and menus up to date."""
         self.actions, window = actions, self._window
         self._lists = MenuLists(window, actions, menus, self._files.open)
+        self.tools = DeveloperTools(window, self._lists, actions)
         self._lists.built_in, self._lists.own = self._built_in, self._use_layout
         window.bar.search.clicked.connect(self.open_palette)
         self.shortcuts.changed.connect(self._show_keys)
@@ -232,6 +236,10 @@ class Habits:
         if name:
             undo = arrangements.delete(window.bench, name)
             window.toast.say(f"Deleted the layout “{name}”", "Undo", undo)
+
+    def _freeze(self) -> None:
+        freeze_or_go_on(self._window.bench)
+        self.tools.refresh()
 
     # -- the look ---------------------------------------------------------------------------------
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from PySide6.QtWidgets import QWidget
+
 from app.ui.actions import Actions
 from app.ui.main_window import MainWindow
 from app.ui.reasons import why_not
-from app.ui.widgets.menus import Menu
+from app.ui.widgets.menus import Menu, drop_below
+
+ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.reset")
 
 
 class MenuLists:
@@ -34,6 +38,22 @@ class MenuLists:
         for name, menu in menus.items():
             menu.aboutToShow.connect(lambda name=name: self._refresh(name))
             menu.aboutToHide.connect(actions.enable_all)
+        self._arranging = Menu(window.theme, window, "Layouts")
+        self._arranging.aboutToHide.connect(actions.enable_all)
+
+    def drop_layouts(self, anchor: QWidget) -> None:
+        """Open below a button which layouts there are, and what can be done with this one."""
+        self.actions.disable(lambda name: why_not(self._window, name))
+        self._list_layouts(self._arranging)
+        self._arranging.addSeparator()
+        for name in ARRANGING:
+            self._arranging.addAction(self.actions[name])
+        drop_below(self._arranging, anchor)
+
+    def drop_panels(self, anchor: QWidget) -> None:
+        """Open below a button which panels there are."""
+        self._list_panels()
+        drop_below(self._panels, anchor)
 
     def _refresh(self, menu: str) -> None:
         self.actions.disable(lambda name: why_not(self._window, name))
@@ -41,7 +61,7 @@ class MenuLists:
             self._list_recent()
         elif menu == "View":
             self._list_panels()
-            self._list_layouts()
+            self._list_layouts(self._layouts)
 
     def _list_recent(self) -> None:
         self._recent.clear()
@@ -56,20 +76,20 @@ class MenuLists:
         self._recent.addSeparator()
         self._recent.addAction(self.actions["file.forget_recent"])
 
-    def _list_layouts(self) -> None:
-        self._layouts.clear()
+    def _list_layouts(self, menu: Menu) -> None:
+        menu.clear()
         window = self._window
         arrangements, shown = window.arrangements, window.showing
         for layout in window.layouts:
-            entry = self._layouts.addAction(window.theme.icon(layout.icon), layout.title)
+            entry = menu.addAction(window.theme.icon(layout.icon), layout.title)
             entry.setCheckable(True)
             entry.setChecked(shown == layout.name and not arrangements.own(layout.name))
             entry.triggered.connect(lambda _on=False, name=layout.name: self.built_in(name))
         own = arrangements.all()
         if own:
-            self._layouts.addSeparator()
+            menu.addSeparator()
         for each in own:
-            entry = self._layouts.addAction(each.name)
+            entry = menu.addAction(each.name)
             entry.setCheckable(True)
             entry.setChecked(shown == each.base and arrangements.own(each.base) == each.name)
             entry.triggered.connect(lambda _on=False, name=each.name: self.own(name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.ui.freezing import freezable
 from app.ui.main_window import MainWindow
 from app.ui.theme import TEXT_PERCENT
 
@@ -27,6 +28,8 @@ def why_not(window: MainWindow, name: str) -> str:
         return "The start page has no panels"
     if name in {"layout.rename", "layout.delete"} and not window.arrangements.own(window.showing):
         return "This layout came with Studio" if window.bench is not None else "The start page has no panels"
+    if name == "view.freeze" and not freezable(window.bench):
+        return "Nothing here can be frozen"
     if name == "file.forget_recent" and not window.session.settings.recent_known:
         return "The list is empty"
     return _of_text(window.theme.text_percent, name)

@@ -153,9 +153,9 @@ class ToolBar(Bar):
         row.addSpacing(-4)
         row.addWidget(self.stop)
 
-    def add_tool(self, tool: QWidget) -> None:
-        """Put a button at the left end."""
-        self.tools.addWidget(tool)
+    def add_tool(self, tool: QWidget, place: int = -1) -> None:
+        """Put a button at the left end, at that place among those there, else after them."""
+        self.tools.insertWidget(place, tool)
 
     def show_view(self, view: RunView) -> None:
         """Show one of the six states, small."""

@@ -1,0 +1,114 @@
+"""The left end of the tool bar: freezing, the layout's name, the panels."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMenu, QPushButton, QWidget
+
+from app.ui import menu_lists
+from app.ui.commands import Commands
+from app.ui.developer_tools import DeveloperTools
+from app.ui.main_window import MainWindow
+from app.ui.reasons import why_not
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.fixture
+def tools(qtbot, window: MainWindow, commands: Commands) -> DeveloperTools:
+    window.show()
+    commands.run("layout.developer")
+    return commands.habits.tools
+
+
+def live(window: MainWindow, name: str) -> QPushButton:
+    """Let a panel show something that it can hold."""
+    panel = window.benches["developer"].docks[name].panel
+    panel.freeze = QPushButton(panel)
+    panel.freeze.setCheckable(True)
+    panel.freeze.show()
+    return panel.freeze
+
+
+def click(button) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def test_freeze_holds_all_that_is_live_and_lets_it_go_on(tools, window, commands) -> None:
+    one, other = live(window, "inspector"), live(window, "image")
+    one.setChecked(True)
+    tools.refresh()
+    assert not tools.freeze.isChecked(), "not all of it"
+    click(tools.freeze)
+    assert (one.isChecked(), other.isChecked(), tools.freeze.isChecked()) == (True, True, True)
+    assert commands.actions["view.freeze"].isChecked()
+    click(tools.freeze)
+    assert (one.isChecked(), other.isChecked(), tools.freeze.isChecked()) == (False, False, False)
+
+
+def test_where_nothing_is_live_nothing_freezes(tools, window) -> None:
+    live(window, "inspector").hide()
+    tools.refresh()
+    assert not tools.freeze.isEnabled()
+    assert why_not(window, "view.freeze") == "Nothing here can be frozen"
+    live(window, "image")
+    tools.refresh()
+    assert tools.freeze.isEnabled()
+    assert why_not(window, "view.freeze") == ""
+
+
+@pytest.fixture
+def dropped(monkeypatch: pytest.MonkeyPatch) -> list[tuple[QMenu, QWidget]]:
+    """The menus that were opened, each with the button that it is below."""
+    seen: list[tuple[QMenu, QWidget]] = []
+    monkeypatch.setattr(menu_lists, "drop_below", lambda menu, anchor: seen.append((menu, anchor)))
+    return seen
+
+
+def test_the_layout_says_its_name_and_offers_the_others(tools, window, dropped) -> None:
+    window.arrangements.keep_as(window.bench, "developer", "Two cameras")
+    tools.refresh()
+    assert tools.layout.text() == "Two cameras"
+    assert tools.layout.accessibleName() == "Layout Two cameras"
+    click(tools.layout)
+    ((menu, below),) = dropped
+    assert below is tools.layout
+    entries = {each.text(): each for each in menu.actions() if each.text()}
+    assert list(entries)[:3] == ["Behaviour", "Developer", "Two cameras"]
+    assert entries["Two cameras"].isChecked()
+    assert "Put the panels back" in entries
+    entries["Developer"].trigger()
+    tools.refresh()
+    assert tools.layout.text() == "Developer"
+
+
+def test_what_cant_be_done_with_a_layout_is_grey_only_in_its_menu(tools, commands, dropped) -> None:
+    click(tools.layout)
+    ((menu, _below),) = dropped
+    assert not commands.actions["layout.delete"].isEnabled()
+    menu.aboutToHide.emit()
+    assert commands.actions["layout.delete"].isEnabled()
+
+
+def test_panels_are_opened_and_closed(tools, window, dropped) -> None:
+    click(tools.panels)
+    ((menu, below),) = dropped
+    assert below is tools.panels
+    entry = next(each for each in menu.actions() if each.text() == "Console")
+    assert entry.isChecked()
+    entry.trigger()
+    assert "console" not in window.bench.open_names()
+
+
+def test_large_text_in_a_narrow_window_leaves_the_menus_to_the_view_menu(tools, window) -> None:
+    window.resize(1100, 700)
+    assert tools.layout.isVisible()
+    window.theme.set_text_percent(200)
+    try:
+        assert not tools.layout.isVisible()
+        assert tools.freeze.isVisible()
+    finally:
+        window.theme.set_text_percent(100)
+    assert tools.layout.isVisible()
