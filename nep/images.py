@@ -96,17 +96,25 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
     """The picture as a `uint8` array (height, width, 3) in BGR order. Raises `DecodeError`."""
     encoding = extension.get("encoding")
     try:
-        if encoding in _RAW_CHANNELS:
-            return _decode_raw(data, str(encoding), extension.get("shape"))
+        if isinstance(encoding, str) and encoding in _RAW_CHANNELS:
+            return _decode_raw(data, encoding, extension.get("shape"))
         np = _numpy()
         if not data.nbytes:
             raise DecodeError("image", 0, "there is nothing in it")
-        frame = _opencv().imdecode(np.frombuffer(data, np.uint8), 1)  # 1 = IMREAD_COLOR
+        return _read(np.frombuffer(data, np.uint8))
     except ImportError as error:
         raise DecodeError("image", data.nbytes, _NEEDS) from error
-    if frame is None:
+
+
+def _read(data: NDArray[np.uint8]) -> object:
+    """The picture in a file's bytes. Raises `DecodeError`."""
+    opencv = _opencv()
+    try:
+        picture: object = opencv.imdecode(data, 1)  # 1 = IMREAD_COLOR
+    except (opencv.error, MemoryError) as error:  # a head may tell of a million rows
+        raise DecodeError("image", data.nbytes, "they are a picture larger than can be read") from error
+    if picture is None:
         raise DecodeError("image", data.nbytes, "they are no picture that OpenCV reads")
-    picture: object = frame
     return picture
 
 

@@ -186,7 +186,10 @@ class Images:
                     return
                 work = self._take_waiting()
             for streams, message, arrived_s, size in work:
-                picture, error = decode(message, arrived_s, size)
+                try:
+                    picture, error = decode(message, arrived_s, size)
+                except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
+                    picture, error = None, f"“{message.topic}” sends a picture that can't be shown: {problem}"
                 with self.lock:
                     for stream in streams:
                         _give(stream, message, picture, error)

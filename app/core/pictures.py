@@ -18,6 +18,8 @@ Size = tuple[int, int]
 Pixel = int | tuple[int, int, int]
 RAW_CHANNELS = {"bgr8": 3, "rgb8": 3, "mono8": 1}
 REDUCED = (8, 4, 2)
+MOST_PIXELS = 120_000_000
+"""More than any camera has; decoding takes up to four bytes of memory for each, whatever was sent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,8 +69,8 @@ def decode(message: Message, received_s: float, fit: Size | None = None) -> tupl
         found = _bgra(frame)
     except NepError as error:
         return None, str(error)
-    except (cv2.error, MemoryError) as error:  # such as a head that tells of a million rows
-        return None, f"“{message.topic}” sends a picture that can't be decoded: {_short(error)}"
+    except (cv2.error, MemoryError) as error:
+        return None, f"“{message.topic}” sends a picture that can't be shown: {_short(error)}"
     if found is None:
         return None, f"“{message.topic}” has pictures of {frame.shape} {frame.dtype}; they can't be shown"
     bgra, numbers = found
@@ -104,8 +106,8 @@ def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
     import numpy as np  # noqa: PLC0415
 
     encoding = message.extension.get("encoding")
-    if encoding in RAW_CHANNELS:
-        whole = _raw(message, str(encoding))
+    if isinstance(encoding, str) and encoding in RAW_CHANNELS:
+        whole = _raw(message, encoding)
         size = (whole.shape[1], whole.shape[0])
         factor = _factor(size, fit)
         if factor > 1:
@@ -116,10 +118,16 @@ def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
         return whole, size
     if not message.data.nbytes:
         raise DecodeError("image", 0, "there is nothing in it")
+    shape = (images.picture_info(message.data) or {}).get("shape")
+    if isinstance(shape, list) and shape[0] * shape[1] > MOST_PIXELS:
+        raise DecodeError("image", message.size_bytes, f"{shape[1]} × {shape[0]} pixels are too many")  # noqa: RUF001
     told = _told_size(message)
     factor = _factor(told, fit) if told is not None else 1
     flag = _flag(message, factor, cv2)
-    frame = cv2.imdecode(np.frombuffer(message.data, np.uint8), flag)
+    try:
+        frame = cv2.imdecode(np.frombuffer(message.data, np.uint8), flag)
+    except (cv2.error, MemoryError) as error:  # such as a head that tells of a million rows
+        raise DecodeError("image", message.size_bytes, _short(error)) from error
     if frame is None:
         raise DecodeError("image", message.size_bytes, "they are no picture that OpenCV reads")
     if factor == 1 or told is None:

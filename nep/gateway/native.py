@@ -20,7 +20,7 @@ from nep.pubsub import Publisher, Subscriber
 _AGAIN_S = 1.0
 """A topic that could not be joined is tried again after this: trying costs the gateway's thread time."""
 _Made = TypeVar("_Made", Publisher, Subscriber)
-_READABLE = frozenset({"jpeg", "png", None})
+_READABLE = ("jpeg", "png", None)  # no set: a message may tell anything, also what can't be looked up in one
 """Encodings of pictures that the originals read; without one, the bytes are a file that says it itself."""
 
 

@@ -84,6 +84,22 @@ def test_what_is_no_picture_gives_a_sentence_and_keeps_the_last_picture(images: 
     until(lambda: stream.error is None)
 
 
+def test_a_message_that_nobody_foresaw_ends_no_other_pictures(images: Images, monkeypatch) -> None:
+    def strange(message: Message, *more: object):
+        if message.seq == 1:
+            raise KeyError("no such thing")
+        return decode(message, *more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("app.core.images.decode", strange)
+    stream = images.stream("/camera")
+    images.offer([jpeg((1, 2, 3), seq=1)])
+    until(lambda: stream.error is not None)
+    assert stream.error == "“/camera” sends a picture that can't be shown: 'no such thing'"
+    images.offer([jpeg((4, 5, 6), seq=2)])
+    until(lambda: stream.picture is not None)
+    assert stream.error is None
+
+
 def test_two_panels_may_look_at_one_topic(images: Images) -> None:
     one, two = images.stream("/camera"), images.stream("/camera")
     images.offer([jpeg((1, 2, 3))])

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import zlib
+
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from app.core.pictures import decode, png_of
-from nep.errors import DecodeError
+from nep.errors import DecodeError, NepError
 from nep.message import Message
 
 
@@ -101,15 +106,34 @@ def test_what_is_no_picture_is_a_sentence(sent: Message, words: str) -> None:
     assert words in error
 
 
-def test_a_head_that_tells_of_too_many_pixels_is_a_sentence_and_no_crash() -> None:
+def png_of_size(side: int) -> Message:
+    """A small PNG whose head tells of many pixels."""
     data = bytearray(cv2.imencode(".png", scene(8, 8))[1].tobytes())
-    data[16:24] = (60_000).to_bytes(4, "big") * 2
-    import zlib
-
+    data[16:24] = side.to_bytes(4, "big") * 2
     data[29:33] = zlib.crc32(bytes(data[12:29])).to_bytes(4, "big")
-    picture, error = decode(message(bytes(data)), 0.0)
+    return message(bytes(data))
+
+
+def test_no_memory_is_taken_for_pixels_that_no_camera_has() -> None:
+    picture, error = decode(png_of_size(20_000), 0.0)
     assert picture is None
-    assert error
+    assert error is not None
+    assert "20000 × 20000 pixels are too many" in error  # noqa: RUF001
+    assert decode(png_of_size(20_000), 0.0, (320, 240)) == (None, error), "nor for a small view"
+
+
+def test_a_head_that_tells_of_too_many_pixels_is_a_sentence_and_no_crash() -> None:
+    jpeg = bytearray(cv2.imencode(".jpg", scene(8, 8))[1].tobytes())
+    at = jpeg.index(b"\xff\xc0") + 5  # height and width in the frame's head
+    jpeg[at : at + 4] = (65_000).to_bytes(2, "big") * 2
+    for huge in (png_of_size(60_000), message(bytes(jpeg))):
+        picture, error = decode(huge, 0.0)
+        assert picture is None
+        assert error
+        with pytest.raises(DecodeError):
+            _ = huge.payload
+    with pytest.raises(DecodeError):
+        png_of(message(bytes(jpeg)))
 
 
 def test_a_snapshot_is_what_was_received() -> None:
@@ -125,3 +149,45 @@ def test_a_snapshot_is_what_was_received() -> None:
     assert np.array_equal(back, cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
     with pytest.raises(DecodeError):
         png_of(message(b"nothing"))
+
+
+JPEG = cv2.imencode(".jpg", scene(40, 30))[1].tobytes()
+PNG = cv2.imencode(".png", scene(40, 30))[1].tobytes()
+ANYTHING = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**64)
+    | st.floats()
+    | st.text(max_size=8)
+    | st.binary(max_size=8),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=2),
+    max_leaves=6,
+)
+KINDS = st.sampled_from(["jpeg", "png", "bgr8", "rgb8", "mono8", "tiff"])
+SHAPES = st.lists(st.integers(-3, 2**40) | st.integers(0, 6), max_size=4)
+SENT = (
+    st.binary(max_size=60)
+    | st.builds(lambda data, end: data[:end], st.sampled_from([JPEG, PNG]), st.integers(0, 900))
+    | st.builds(
+        lambda data, at, byte: data[:at] + bytes([byte]) + data[at + 1 :],
+        st.sampled_from([JPEG, PNG]), st.integers(0, 60), st.integers(0, 255),
+    )
+)  # fmt: skip
+
+
+@given(
+    SENT,
+    st.fixed_dictionaries({}, optional={"encoding": KINDS | ANYTHING, "shape": SHAPES | ANYTHING}),
+    st.none() | st.tuples(st.integers(0, 5000), st.integers(0, 5000)),
+)
+@settings(max_examples=400, deadline=None)
+def test_whatever_is_sent_as_a_picture_is_one_or_a_sentence(data, extension, fit) -> None:
+    sent = message(data, **extension)
+    picture, error = decode(sent, 0.0, fit)
+    assert (picture is None) is isinstance(error, str)
+    if picture is not None:
+        assert picture.bgra.dtype == np.uint8
+        assert picture.bgra.shape[2] == 4
+    for read in (lambda: sent.payload, lambda: png_of(sent)):
+        with contextlib.suppress(NepError, OSError):
+            read()

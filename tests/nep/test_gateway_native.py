@@ -89,8 +89,9 @@ def test_pictures_that_originals_cannot_read_become_jpeg(scene):
     assert scene.native.data_of(again) == jpeg
 
 
-def test_a_picture_that_nobody_can_read_is_an_alert_and_no_end(scene):
-    broken = Message("cam", b"123", "image", "image", extension={"encoding": "bgr8", "shape": [4, 6, 3]})
+@pytest.mark.parametrize("encoding", ["bgr8", ["bgr8"], {"bgr8": 1}, 7, b"jpeg"])
+def test_a_picture_that_nobody_can_read_is_an_alert_and_no_end(scene, encoding):
+    broken = Message("cam", b"123", "image", "image", extension={"encoding": encoding, "shape": [4, 6, 3]})
     assert scene.native.data_of(broken) is None
     assert [alert.id for alert in scene.alerts] == ["message:cam"]
 
