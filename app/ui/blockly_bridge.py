@@ -25,6 +25,7 @@ class BlocklyBridge(QObject):
     answered = Signal(int, str)  # token of a flush, workspace as JSON
     went_wrong = Signal(str)
     block_focused = Signal(bool)  # whether the keys go to a block
+    sensors_offered = Signal(str)  # the sensors in the open toolbox as JSON: [[robot, sensor], …]
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -62,6 +63,10 @@ class BlocklyBridge(QObject):
     @Slot(bool)
     def on_block(self, has: bool) -> None:
         self.block_focused.emit(has)
+
+    @Slot(str)
+    def offers(self, sensors: str) -> None:
+        self.sensors_offered.emit(sensors)
 
     @Slot(str)
     def failed(self, sentence: str) -> None:

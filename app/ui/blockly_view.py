@@ -6,6 +6,7 @@ shown) or die (its process can be killed): it is given everything again and the 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from PySide6.QtCore import Signal
@@ -28,6 +29,7 @@ class BlocklyView(BlocklyHost):
     changed = Signal(str, dict)  # a tab's key and its newest workspace, 150 ms after the last real edit
     history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
     block_selected = Signal(str)  # a block's id; "" when nothing is selected
+    sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "en") -> None:
         super().__init__(parent, language)
@@ -40,6 +42,7 @@ class BlocklyView(BlocklyHost):
         self._bridge.undo_changed.connect(self.history_changed)
         self._bridge.block_chosen.connect(self.block_selected)
         self._bridge.answered.connect(self._answered)
+        self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
 
@@ -186,6 +189,7 @@ class BlocklyView(BlocklyHost):
         for done in waiting.values():
             done(self.workspace)
         self.history_changed.emit(False, False)
+        self.sensors_offered.emit(())
 
     def _send_tab(self) -> None:
         """Let the page show this tab: its program when the page does not hold it, and what its blocks say."""
@@ -223,3 +227,9 @@ def _program(text: str) -> dict[str, object]:
     """The page's JSON, however long its stacks are."""
     made = deep_json.loads(text)
     return made if isinstance(made, dict) else {}
+
+
+def _pairs(text: str) -> tuple[tuple[str, str], ...]:
+    """The page's robots and their sensors."""
+    made = json.loads(text)
+    return tuple((str(robot), str(sensor)) for robot, sensor in made)

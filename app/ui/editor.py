@@ -18,6 +18,7 @@ class Editor(Protocol):
     history_changed: SignalInstance
     key_pressed: SignalInstance
     recovered: SignalInstance
+    sensors_offered: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...

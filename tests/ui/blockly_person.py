@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -46,6 +47,12 @@ class Person:
 
     def wait_for(self, script: str, expected: object = True) -> None:
         self._qtbot.waitUntil(lambda: self.ask(script) == expected, timeout=WAIT_MS)
+
+    def until(self, true: Callable[[], object], what: str) -> None:
+        def seen() -> None:
+            assert true(), what
+
+        self._qtbot.waitUntil(seen, timeout=WAIT_MS)
 
     def newest(self) -> dict:
         got: list[dict] = []

@@ -107,7 +107,8 @@ def test_large_text_leaves_the_find_bar_whole_beside_the_toolbox(view, person, p
     view.open_find()
     them.box(".nepFind")
     on_top = (
-        "[...document.querySelectorAll('.nepFind :is(input, button)')].map(e => [e, e.getBoundingClientRect()])"
+        "[...document.querySelectorAll('.nepFind :is(input, button)')]"
+        ".map(e => [e, e.getBoundingClientRect()])"
         ".filter(([e, r]) => [[r.left + 2, r.top + 9], [r.right - 2, r.bottom - 9]].some(([x, y]) =>"
         " !e.contains(document.elementFromPoint(x, y)))).length"
     )
@@ -191,6 +192,23 @@ def test_without_a_robot_the_toolbox_says_so(view, person):
         "[...document.querySelectorAll('.nepHeading')].map(e => [...e.children].map(c => c.textContent))"
     )
     them.wait_for(headings, [["Blocks", ""], ["", "No robot", "connected"]])
+
+
+def test_the_window_hears_which_sensors_the_open_toolbox_shows(view, person):
+    them = person(START)
+    told: list[tuple] = []
+    view.sensors_offered.connect(told.append)
+    them.open_category("Sensors")
+    them.until(lambda: told, "the sensors are told")
+    assert ("Pepper", "battery") in told[-1]
+    count = len(told)
+    them.open_category("Events")
+    them.until(lambda: told[-1] == (), "none are shown")
+    them.open_category("Sensors")
+    them.until(lambda: told[-1], "they are shown again")
+    view.show_tab("other", {"blocks": {"languageVersion": 0, "blocks": []}})
+    them.until(lambda: told[-1] == (), "the other behaviour shows none")
+    assert len(told) == count + 3
 
 
 def test_live_values_are_in_the_flyout_too(view, person):

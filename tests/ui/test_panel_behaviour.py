@@ -22,6 +22,7 @@ class Editor(QWidget):
     history_changed = Signal(bool, bool)
     key_pressed = Signal(str)
     recovered = Signal()
+    sensors_offered = Signal(tuple)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -119,6 +120,30 @@ def test_sensor_blocks_say_their_newest_value(panel, window) -> None:
     document.sensors, document.edits = (), 6
     panel.refresh()
     assert window.session.fleet.looked_at == []
+
+
+def test_sensors_in_the_open_toolbox_are_watched_until_it_closes(panel, window) -> None:
+    window.session.document.sensors, window.session.document.edits = (), 5
+    panel.refresh()
+    assert window.session.fleet.looked_at == []
+    editor(panel).sensors_offered.emit((("Pepper", "battery"), ("NAO", "battery")))
+    assert window.session.fleet.looked_at == ["Pepper"]
+    assert editor(panel).last("set_live_values") == {"Pepper/battery": "84 %"}
+    editor(panel).sensors_offered.emit(())
+    assert window.session.fleet.looked_at == []
+    assert editor(panel).last("set_live_values") == {}
+
+
+def test_a_robot_that_comes_while_its_sensors_are_shown_is_watched(panel, window) -> None:
+    window.session.document.sensors, window.session.document.edits = (), 5
+    panel.refresh()
+    links = window.session.fleet.links
+    window.session.fleet.links = []
+    editor(panel).sensors_offered.emit((("Pepper", "battery"),))
+    assert window.session.fleet.looked_at == []
+    window.session.fleet.links = links
+    ticks(window, panel, 6)
+    assert window.session.fleet.looked_at == ["Pepper"]
 
 
 def test_python_shows_the_newest_program_and_copies_it(panel, window) -> None:

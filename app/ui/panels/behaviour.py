@@ -76,6 +76,7 @@ class BehaviourPanel(PanelWidget):
         self._given: dict[str, tuple[int, int]] = {}
         self._watches: dict[str, Watch] = {}
         self._sensors: tuple[tuple[str, str], ...] = ()
+        self._offered: tuple[tuple[str, str], ...] = ()  # in the toolbox, while it is open
         self._ticks = 0
 
     def replaces_title(self) -> QWidget:
@@ -140,6 +141,7 @@ class BehaviourPanel(PanelWidget):
         )
         editor.history_changed.connect(self._history)
         editor.key_pressed.connect(self._key)
+        editor.sensors_offered.connect(self._offer)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()
@@ -154,7 +156,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.set_absent(program.absent)
         self._sensors = tuple(program.sensors)
-        self._look_at({robot for robot, _ in self._sensors})
+        self._show_live()
         if self.mode == "python":
             self.program.show_program(program.source)
 
@@ -165,10 +167,16 @@ class BehaviourPanel(PanelWidget):
             if self.session.fleet.link(name) is not None:
                 self._watches[name] = self.session.fleet.look_at(name)
 
+    def _offer(self, sensors: tuple[tuple[str, str], ...]) -> None:
+        self._offered = sensors
+        self._show_live()
+
     def _show_live(self) -> None:
-        """What sensor blocks say now: "84 %" on the battery."""
+        """What sensor blocks say now: "84 %" on the battery, in the behaviour and in the open toolbox."""
+        sensors = dict.fromkeys((*self._sensors, *self._offered))
+        self._look_at({robot for robot, _ in sensors})
         if self.editor is not None:
-            words, old = live_words(self.session.fleet, self._sensors)
+            words, old = live_words(self.session.fleet, sensors)
             self.editor.set_live_values(words, old)
 
     def _show_empty(self) -> None:
@@ -263,6 +271,7 @@ class BehaviourPanel(PanelWidget):
         self.set_mode("python" if state.get("mode") == "python" else "blocks")
 
     def shut(self) -> None:
+        self._sensors = self._offered = ()
         self._look_at(set())
 
 

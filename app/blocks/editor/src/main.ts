@@ -22,6 +22,7 @@ interface Bridge {
   flushed(token: number, json: string): void;
   failed(sentence: string): void;
   on_block(has: boolean): void;
+  offers(sensors: string): void;
 }
 
 declare const QWebChannel: new (transport: unknown, done: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
@@ -30,6 +31,7 @@ declare const qt: {webChannelTransport: unknown};
 class Editor {
   private readonly tabs: Tabs;
   private readonly help = new HelpCard();
+  private offered = '[]';
   private readonly find = new FindBar(() => this.shown.workspace);
 
   constructor(private readonly bridge: Bridge) {
@@ -43,6 +45,7 @@ class Editor {
       },
       history: (tab, canUndo, canRedo) => ofShown(tab, () => bridge.history(canUndo, canRedo)),
       selected: (tab, id) => ofShown(tab, () => bridge.selected(id)),
+      offered: (tab) => ofShown(tab, () => this.tellOffered()),
     });
     new ResizeObserver(() => this.shown.resize()).observe(document.body);
     // A hidden page draws no frames, and Blockly tells of edits only after a frame.
@@ -101,6 +104,13 @@ class Editor {
     this.help.close();
     this.tabs.show(it);
     this.find.again();
+    this.tellOffered();
+  }
+
+  /** The window watches the sensors in the toolbox as long as it shows them. */
+  private tellOffered(): void {
+    const offered = JSON.stringify(this.shown.offered);
+    if (offered !== this.offered) this.bridge.offers(this.offered = offered);
   }
 
   private setTheme(tokens: Tokens, dark: boolean): void {

@@ -208,10 +208,14 @@ function bubblePath(width: number, height: number): string {
   return `M8 0h${w}a8 8 0 0 1 8 8v${h}a8 8 0 0 1-8 8h-${w}a8 8 0 0 1-8-8v${-(h - 16)}l-8-8 8-8a8 8 0 0 1 8-8z`;
 }
 
+/** The robot and its sensor that a block reads. */
+export function sensorOf(block: Blockly.Block): [robot: string, sensor: string] {
+  return [String(block.getFieldValue('ROBOT') ?? ''), block.type.split('_get_')[1] ?? ''];
+}
+
 function sensorKey(block: Blockly.Block): string {
-  const property = block.type.split('_get_')[1] ?? '';
   const part = block.getFieldValue('FIELD');
-  return `${String(block.getFieldValue('ROBOT') ?? '')}/${property}${typeof part === 'string' ? `/${part}` : ''}`;
+  return [...sensorOf(block), ...(typeof part === 'string' ? [part] : [])].join('/');
 }
 
 function absentSentence(block: Blockly.Block): string {

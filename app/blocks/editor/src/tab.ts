@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {FieldChoice} from './choices';
 import {Far} from './far';
 import {Functions} from './functions';
+import {offeredSensors, onFlyout} from './offered';
 import {CHECKER, Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
 import {States} from './states';
@@ -15,6 +16,8 @@ export interface TabListener {
   changed(tab: Tab, json: string): void;
   history(tab: Tab, canUndo: boolean, canRedo: boolean): void;
   selected(tab: Tab, id: string): void;
+  /** Other sensors may be shown in the toolbox. */
+  offered(tab: Tab): void;
 }
 
 export class Tab {
@@ -53,6 +56,8 @@ export class Tab {
     this.functions = new Functions(this.workspace);
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.onFound = () => this.states.showLive();
+    const flyout = this.workspace.getFlyout();
+    if (flyout) onFlyout(flyout, () => listener.offered(this));
     this.workspace.registerButtonCallback('CREATE_VARIABLE', (button) =>
       Blockly.Variables.createVariableButtonHandler(button.getTargetWorkspace()));
   }
@@ -164,6 +169,11 @@ export class Tab {
   search(): void {
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.focusSearch();
+  }
+
+  /** The sensors that the open toolbox shows. */
+  get offered(): [robot: string, sensor: string][] {
+    return offeredSensors(this.workspace.getFlyout());
   }
 
   /** Whether a block is in the hand here. */

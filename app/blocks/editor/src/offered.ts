@@ -1,0 +1,25 @@
+// The sensors that the open toolbox shows: their values are wanted while it is open.
+import * as Blockly from 'blockly/core';
+import {sensorTypes} from './definitions';
+import {sensorOf} from './states';
+
+/** Calls `look` after whatever opens, fills or closes it. */
+export function onFlyout(flyout: Blockly.IFlyout, look: () => void): void {
+  const {show, setVisible} = flyout;
+  flyout.show = (contents) => {
+    show.call(flyout, contents);
+    queueMicrotask(look);
+  };
+  flyout.setVisible = (visible) => {
+    setVisible.call(flyout, visible);
+    queueMicrotask(look);
+  };
+}
+
+/** Robot and sensor of each block in it; none while it is closed. */
+export function offeredSensors(flyout: Blockly.IFlyout | null): [robot: string, sensor: string][] {
+  if (!flyout?.isVisible()) return [];
+  const blocks = [...sensorTypes()].flatMap((type) => flyout.getWorkspace().getBlocksByType(type, true));
+  const found = new Map(blocks.map((block) => [sensorOf(block).join('/'), sensorOf(block)]));
+  return [...found.values()].sort(([a, b], [c, d]) => (`${a}/${b}` < `${c}/${d}` ? -1 : 1));
+}
