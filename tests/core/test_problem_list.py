@@ -84,12 +84,21 @@ def speaks_again(saved):
     return saved
 
 
+def said_and_walks() -> list[dict[str, object]]:
+    return [
+        block("robot_pepper_do_say", ROBOT="Pepper", TEXT=text("x")),
+        block("robot_pepper_do_walk", ROBOT="Pepper"),
+    ]
+
+
 def test_another_model_does_it_when_it_knows_every_block() -> None:
     other = sample("Rosie")
     said = workspace(started(block("robot_pepper_do_say", ROBOT="Pepper", TEXT=text("x"))))
     walks = workspace(started(block("robot_pepper_do_walk", ROBOT="Pepper")))
     assert can_do(said, "Pepper", "pepper", other)
     assert not can_do(walks, "Pepper", "pepper", other)
+    both = workspace(started(*said_and_walks()))
+    assert not can_do(both, "Pepper", "pepper", other), "one of two is not enough"
     assert not can_do(said, "Nobody", "pepper", other), "nothing asks it"
     made = use_robot(said, "Pepper", "pepper", other)
     program = compile_behaviour(made, [other], name="Test")
