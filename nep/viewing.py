@@ -48,16 +48,17 @@ class Viewer:
 
 def _node_info(member: Member) -> NodeInfo:
     node = member.node
-    return NodeInfo(
-        node.id,
-        node.name,
-        node.host,
-        node.pid,
-        node.language,
-        node.generation,
-        node.since_ns,
-        member.cpu_ratio,
-    )
+    every_field: dict[str, object] = {
+        "id": node.id,
+        "name": node.name,
+        "host": node.host,
+        "pid": node.pid,
+        "language": node.language,
+        "generation": node.generation,
+        "since_ns": node.since_ns,
+        "cpu_ratio": member.cpu_ratio,
+    }
+    return made(NodeInfo, every_field)
 
 
 def _look_at(
@@ -86,7 +87,7 @@ def _look_at(
         if subscriber.lost is not None:
             lost = (lost or 0) + subscriber.lost
             received += subscriber.received or 0
-    every_field = {
+    every_field: dict[str, object] = {
         "name": name,
         "msg_type": first.msg_type if first else subscribing[0][1].record.msg_type,
         "codec": first.codec if first else "",
@@ -109,7 +110,7 @@ def _counted(publishing: list[tuple[Member, Publisher]]) -> list[tuple[Member, P
 
 def _publisher_info(member: Member, publisher: Publisher, rates: tuple[float, float] | None) -> PublisherInfo:
     record = publisher.record
-    every_field = {
+    every_field: dict[str, object] = {
         "id": record.id,
         "node_id": member.node.id,
         "endpoints": record.endpoints,
@@ -125,7 +126,7 @@ def _publisher_info(member: Member, publisher: Publisher, rates: tuple[float, fl
 
 
 def _subscriber_info(member: Member, subscriber: Subscriber) -> SubscriberInfo:
-    every_field = {
+    every_field: dict[str, object] = {
         "id": subscriber.record.id,
         "node_id": member.node.id,
         "received": subscriber.received,

@@ -17,6 +17,7 @@ class ViewPacker:
     """Keeps the bytes of each node and topic as long as its value is the same."""
 
     def __init__(self) -> None:
+        self._pack = msgpack.Packer(use_bin_type=True, default=vars).pack
         self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
 
     def body(self, answer: Reply | Push, call: int) -> bytes:
@@ -55,17 +56,10 @@ class ViewPacker:
 
     def _part(self, name: str, key: str, value: NodeInfo | TopicInfo) -> bytes:
         kept = self._parts.get(name)
-        if kept is not None and (kept[0] is value or kept[0] == value):
+        # A topic that has not changed is the same value; comparing two that are not takes as long as packing.
+        if kept is not None and (kept[0] is value or (isinstance(value, NodeInfo) and kept[0] == value)):
             return kept[1]
-        packed = pack(key) + pack(_plain(value))
+        # All fields, also those that have their default: to look for these takes longer.
+        packed: bytes = self._pack(key) + self._pack(vars(value))
         self._parts[name] = (value, packed)
         return packed
-
-
-def _plain(value: NodeInfo | TopicInfo) -> dict[str, object]:
-    """The fields as they are, also those that have their default: to look for these takes longer."""
-    plain = dict(vars(value))
-    if isinstance(value, TopicInfo):
-        plain["publishers"] = [vars(each) for each in value.publishers]
-        plain["subscribers"] = [vars(each) for each in value.subscribers]
-    return plain
