@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
@@ -12,7 +12,7 @@ from app.ui.layouts import Layout
 from app.ui.logo import Logo
 from app.ui.palette_field import PaletteField
 from app.ui.theme import Theme
-from app.ui.widgets import Chip, Segments, StopButton
+from app.ui.widgets import Chip, Segments, StopButton, paint
 
 
 class AppBar(QWidget):
@@ -87,5 +87,5 @@ class AppBar(QWidget):
         painter = QPainter(self)
         rect = self.rect()
         painter.fillRect(rect, self._theme.colour("window"))
-        painter.fillRect(0, rect.height() - 1, rect.width(), 1, self._theme.colour("border"))
+        paint.hairline(painter, QRectF(rect), Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()

@@ -146,5 +146,5 @@ class DockTitle(QWidget):
         painter.setClipRect(rect)
         tall = rect.adjusted(0, 0, 0, 2 * radius)
         paint.box(painter, tall, radius, theme.colour("panel"), theme.colour("border"))
-        painter.fillRect(QRectF(0, rect.bottom() - 1, rect.width(), 1), theme.colour("border"))
+        paint.hairline(painter, rect, Qt.Edge.BottomEdge, theme.colour("border"))
         painter.end()

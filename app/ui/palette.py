@@ -52,7 +52,7 @@ class _Field(QLineEdit):
         square = QRectF(18, middle - side / 2, side, side)
         paint_icon(painter, square, "search", self._theme.colour("textSecondary"))
         paint.key_cap(painter, self._theme, self.width() - 19, middle, "Esc")
-        painter.fillRect(0, self.height() - 1, self.width(), 1, self._theme.colour("border"))
+        paint.hairline(painter, QRectF(self.rect()), Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()
 
 
@@ -74,7 +74,7 @@ class _Foot(QWidget):
         theme, painter = self._theme, QPainter(self)
         font, quiet = theme.font("body"), theme.colour("textSecondary")
         middle, left = self.height() / 2, 18.0
-        painter.fillRect(0, 0, self.width(), 1, theme.colour("border"))
+        paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, theme.colour("border"))
         count = paint.width_of(font, self.counted)
         for keys, said in self.KEYS:
             wide = sum(paint.key_width(theme, key) + 5 for key in keys) + paint.width_of(font, said)

@@ -220,5 +220,5 @@ class Bar(QWidget):
         painter = QPainter(self)
         rect = self.rect()
         painter.fillRect(rect, self._theme.colour("panel"))
-        painter.fillRect(0, rect.height() - 1, rect.width(), 1, self._theme.colour("border"))
+        paint.hairline(painter, QRectF(rect), Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()

@@ -35,7 +35,7 @@ class Art(QWidget):
         area = QRectF(self.rect())
         painter.setClipPath(upper_corners(area, self._theme.radius("card") - 1))
         self.picture(painter, area)
-        painter.fillRect(QRectF(0, area.bottom() - 1, area.width(), 1), self._theme.colour("border"))
+        paint.hairline(painter, area, Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()
 
 

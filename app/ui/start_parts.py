@@ -89,7 +89,7 @@ class ExampleCard(QAbstractButton):
         painter.fillRect(art, theme.colour("workspace"))
         paint_rows(painter, art.adjusted(19, 16, -19, 0), theme, self._rows)
         painter.restore()
-        painter.fillRect(QRectF(1, art.bottom() - 1, rect.width() - 2, 1), theme.colour("border"))
+        paint.hairline(painter, art, Qt.Edge.BottomEdge, theme.colour("border"))
         title, text = self._fonts()
         line = QRectF(17, art.bottom() + 14, rect.width() - 34, title)
         paint.words(painter, line, self.text(), theme.font("button"), theme.colour("text"))
@@ -245,5 +245,5 @@ class DevelopersLine(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        painter.fillRect(0, 0, self.width(), 1, self._theme.colour("border"))
+        paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, self._theme.colour("border"))
         painter.end()

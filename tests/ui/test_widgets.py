@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QFontMetricsF, QWheelEvent
+from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
@@ -26,6 +26,7 @@ from app.ui.widgets import (
     StatusItem,
     StopButton,
     Switch,
+    paint,
 )
 from app.ui.widgets.slider import decimals_of
 
@@ -307,3 +308,24 @@ def test_an_empty_place_that_is_low_says_its_words_without_the_picture(qtbot, th
     qtbot.waitUntil(lambda: title.geometry().bottom() <= text.mapTo(empty, QPoint(0, 0)).y())
     empty.resize(384, 300)
     assert empty._tile.isVisible()
+
+
+@pytest.mark.parametrize(("ratio", "thick"), [(1.0, 1), (1.25, 1), (1.5, 1), (2.0, 2)])
+@pytest.mark.parametrize("edge", [Qt.Edge.TopEdge, Qt.Edge.BottomEdge, Qt.Edge.LeftEdge, Qt.Edge.RightEdge])
+def test_a_hairline_is_as_thin_at_every_place_and_scale(
+    qapp, ratio: float, thick: int, edge: Qt.Edge
+) -> None:
+    for place in range(1, 9):
+        image = QImage(60, 60, QImage.Format.Format_RGB32)
+        image.setDevicePixelRatio(ratio)
+        image.fill(QColor("white"))
+        painter = QPainter(image)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        paint.hairline(painter, QRectF(place, place, 20, 20), edge, QColor("black"))
+        painter.end()
+        dark = [(x, y) for x in range(60) for y in range(60) if image.pixelColor(x, y).value() < 255]
+        assert all(image.pixelColor(x, y) == QColor("black") for x, y in dark), "none is blurred"
+        across = (
+            {y for _x, y in dark} if edge in {Qt.Edge.TopEdge, Qt.Edge.BottomEdge} else {x for x, _y in dark}
+        )
+        assert len(across) == thick

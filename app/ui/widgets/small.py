@@ -96,9 +96,10 @@ class Line(QWidget):
         if length:
             (self.setFixedHeight if upright else self.setFixedWidth)(length)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        painter.fillRect(event.rect(), self._theme.colour("border"))
+        edge = Qt.Edge.LeftEdge if self.width() == 1 else Qt.Edge.TopEdge
+        paint.hairline(painter, QRectF(self.rect()), edge, self._theme.colour("border"))
         painter.end()
 
 
