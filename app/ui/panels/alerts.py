@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFrame, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 
 from app.ui.icons import paint_icon
+from app.ui.panel_rows import PanelRows
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyState, label, paint
@@ -91,27 +92,11 @@ class AlertsPanel(PanelWidget):
         self.rows: list[AlertRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        inside = QWidget()
-        inside.setProperty("bare", "true")
-        self._column = QVBoxLayout(inside)
-        self._column.setContentsMargins(8, 8, 8, 8)
-        self._column.setSpacing(6)
-        self._column.addStretch(1)
-        scroll = QScrollArea()
-        scroll.setAccessibleName("Alerts")
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(inside)
         self.empty = EmptyState(
             self.theme, "circle-check", "All is well", "What goes wrong appears here, with its next step."
         )
-        self.pages = QStackedWidget()
-        self.pages.addWidget(self.empty)
-        self.pages.addWidget(scroll)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages = PanelRows(self.empty, "Alerts")
+        self.pages.fill(self)
 
     def refresh(self) -> None:
         alerts = self.session.alerts
@@ -127,14 +112,12 @@ class AlertsPanel(PanelWidget):
         known = {row.alert.id: row for row in self.rows}
         self.rows = [known.pop(each.id) if each.id in known else self._made(each) for each in active]
         for row in known.values():
-            self._column.removeWidget(row)
-            row.deleteLater()
+            self.pages.drop(row)
         for place, (row, alert) in enumerate(zip(self.rows, active, strict=True)):
             if row.alert != alert:
                 row.renew(alert)
-            if self._column.indexOf(row) != place:
-                self._column.insertWidget(place, row)
-        self.pages.setCurrentIndex(1 if active else 0)
+            self.pages.put(place, row)
+        self.pages.show_rows(bool(active))
         self.chip.set(str(len(active)) if active else "", active[0].severity if active else "ok")
 
     def _made(self, alert: Alert) -> AlertRow:

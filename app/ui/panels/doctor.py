@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QPainter, QPaintEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui.icons import paint_icon
+from app.ui.panel_rows import PanelRows
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyState, IconButton, label, paint
@@ -82,26 +83,11 @@ class DoctorPanel(PanelWidget):
         self.header = [self.again]
         self._copy = QAction("Copy the report", self)
         self._copy.triggered.connect(self.copy_report)
-        inside = QWidget()
-        inside.setProperty("bare", "true")
-        self._column = QVBoxLayout(inside)
-        self._column.setContentsMargins(8, 8, 8, 8)
-        self._column.setSpacing(6)
-        self._column.addStretch(1)
-        scroll = QScrollArea()
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(inside)
         self.empty = EmptyState(
             self.theme, "stethoscope", "Looking at the connections", "This takes a second or two."
         )
-        self.pages = QStackedWidget()
-        self.pages.addWidget(self.empty)
-        self.pages.addWidget(scroll)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.pages)
+        self.pages = PanelRows(self.empty, "Connection doctor")
+        self.pages.fill(self)
 
     def refresh(self) -> None:
         doctor = self.session.doctor
@@ -119,16 +105,15 @@ class DoctorPanel(PanelWidget):
         if list(doctor.findings) != [row.finding for row in self.rows]:
             self._show(doctor.findings)
         self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.looked_s)))
-        self.pages.setCurrentIndex(1 if self.rows else 0)
+        self.pages.show_rows(bool(self.rows))
 
     def _show(self, found: Sequence[Finding]) -> None:
         for row in self.rows:
-            self._column.removeWidget(row)
-            row.deleteLater()
+            self.pages.drop(row)
         self.rows = [FindingRow(self.theme, finding) for finding in found]
         for place, row in enumerate(self.rows):
             row.button.clicked.connect(lambda _on=False, finding=row.finding: self._mend(finding))
-            self._column.insertWidget(place, row)
+            self.pages.put(place, row)
         bad = [each.severity for each in found if each.severity in BORDERS]
         if bad:
             self.chip.set(str(len(bad)), STATUS[bad[0]])

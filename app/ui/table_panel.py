@@ -1,0 +1,118 @@
+"""TablePanel: a panel that is one table, with a filter in its title; where it has no rows it says why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Generic, TypeVar
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QStackedWidget, QWidget
+
+from app.ui.doctor_line import DoctorLine
+from app.ui.filter_field import FilterField
+from app.ui.panels.base import Density, PanelContext, PanelWidget
+from app.ui.table import TableModel
+from app.ui.table_view import TableView
+from app.ui.widgets import EmptyAction, EmptyState, Line, label
+
+Row = TypeVar("Row")
+
+
+class TablePanel(PanelWidget, Generic[Row]):
+    """Whoever derives makes the table and says what `rebuild` shows and `open_row` opens.
+
+    `pages` has the table and `empty`, which `show_table` changes; `line` parts it from `foot`, a few words
+    below.
+    """
+
+    def __init__(self, context: PanelContext, row: str, icon: str) -> None:
+        """A table whose rows are each a ``row`` ("topic"); ``icon`` is that of the empty state."""
+        self._row, self._rows = row, f"{row}s"
+        super().__init__(context, self._rows.capitalize())
+        theme = self.theme
+        self.model = self.make_model()
+        self.table = self.make_table(self.model)
+        self.filter = FilterField(theme, f"Filter {self._rows}")
+        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.filter.textChanged.connect(self.rebuild)
+        self.header: list[QWidget] = [self.filter]
+        self.table.setAccessibleName(self.title())
+        self.table.opened.connect(self.open_row)
+        self.table.filter_wanted.connect(self.focus_filter)
+        self.table.order_changed.connect(self.rebuild)
+        self.foot = label("", "small", role="textTertiary", wrap=True)
+        self.foot.setContentsMargins(12, 5, 12, 6)
+        self.foot.setMinimumWidth(0)
+        self.line = Line(theme)
+        self.empty = EmptyState(theme, icon, "", "")
+        self.doctor = DoctorLine(theme, context.run)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.table)
+        self.pages.addWidget(self.empty)
+        self.setFocusProxy(self.table)
+
+    def make_model(self) -> TableModel[Row]:
+        """The model of the rows; asked once."""
+        raise NotImplementedError
+
+    def make_table(self, model: TableModel[Row]) -> TableView[Row]:
+        """The table that shows them; asked once."""
+        raise NotImplementedError
+
+    def rebuild(self) -> None:
+        """Show the rows that the filter leaves, in the table's order."""
+        raise NotImplementedError
+
+    def open_row(self, key: str) -> None:
+        """A person opened the row of this key."""
+        raise NotImplementedError
+
+    def filter_words(self) -> list[str]:
+        """What a row must have, each of them, to be shown."""
+        return self.filter.text().casefold().split()
+
+    def show_table(self, any_rows: bool, filtered: bool) -> None:
+        """Show the table, or why it has no rows."""
+        self.pages.setCurrentIndex(0 if any_rows else 1)
+        self.doctor.setVisible(not any_rows and not filtered)
+        if any_rows:
+            return
+        if filtered:
+            self.empty.say(
+                f"No {self._row} has these words", f"Clear the filter to see all {self._rows}.", "search"
+            )
+            self.empty.set_actions([EmptyAction("Clear the filter", self.filter.clear, "x")])
+        elif self.session.master.kind == "none":
+            self.empty.say("No master is running", "A master lets programs find each other.", "radio-tower")
+            start = self.session.companions.ensure_master
+            self.empty.set_actions([EmptyAction("Start a master here", start, "play", primary=True)])
+        else:
+            self.say_empty()
+
+    def say_empty(self) -> None:
+        """Say in `empty` that there is nothing yet: a master is there, or is looked for."""
+        raise NotImplementedError
+
+    def focus_filter(self) -> bool:
+        self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.filter.selectAll()
+        return True
+
+    def set_density(self, density: Density) -> None:
+        super().set_density(density)
+        self.table.set_row_height(self.row_height(), large=density == "comfortable")
+
+    def theme_changed(self) -> None:
+        self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
+
+    def more_actions(self) -> list[QAction]:
+        columns = QAction(self.theme.icon("columns-2"), "Columns", self)
+        columns.setMenu(self.table.column_menu())
+        return [columns]
+
+    def save_state(self) -> dict[str, object]:
+        return self.table.saved_state()
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self.table.restore(state)
