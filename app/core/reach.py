@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.core.alerts import Alerts
+from app.errors import SettingsError
 from nep.addresses import host_of, is_loopback
 from nep.errors import NepError
 from nep.masters import listen
@@ -15,7 +16,7 @@ from nep.network import OwnAddress, own_addresses
 from nep.views import GraphView
 
 KEPT = "listen_at"
-ALERT = "reach"
+ALERT, NOT_KEPT = "reach", "reach:kept"
 
 
 class Keeps(Protocol):
@@ -77,8 +78,22 @@ class Reach:
 
     def let_in(self, hosts: Sequence[str]) -> None:
         """Serve other computers at these addresses, none: no more. Kept for the next start."""
-        self._settings.set(KEPT, list(hosts))
-        self._tell(tuple(hosts))
+        self._tell(tuple(hosts))  # first: whoever shuts others out must not wait for a disk
+        try:
+            self._settings.set(KEPT, list(hosts))
+        except SettingsError as error:
+            words = "Other computers may connect again" if not hosts else "They can't connect any more"
+            self._alerts.put(
+                NOT_KEPT,
+                "warn",
+                "Who may connect is not kept.",
+                f"{words} after the next start: {error}.",
+                button="Choose again",
+                action="network.others",
+                count=0,
+            )
+        else:
+            self._alerts.cure(NOT_KEPT)
 
     def follow(self, view: GraphView) -> None:
         """See what the master does; another one is told what a person chose."""

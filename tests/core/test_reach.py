@@ -98,6 +98,24 @@ def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
     reach.close()
 
 
+def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
+    reach, alerts = make()
+    (tmp_path / "settings.json").mkdir()  # as a full disk: nothing can be written there
+    for hosts, words in ((["192.168.1.20"], "They can't connect any more"), ([], "Other computers may")):
+        reach.let_in(hosts)
+        world.answer(reach)
+        assert world.asked[-1][0] == tuple(hosts)
+        assert reach.hosts == tuple(hosts)
+        (alert,) = alerts.active
+        assert alert.title == "Who may connect is not kept."
+        assert alert.detail.startswith(words)
+    (tmp_path / "settings.json").rmdir()
+    reach.let_in(["192.168.1.20"])
+    world.answer(reach)
+    assert not alerts.active
+    reach.close()
+
+
 def test_the_master_of_another_computer_is_not_told(make, world):
     near, _alerts = make()
     near.let_in(["192.168.1.20"])  # kept, for the master of this computer
