@@ -1,5 +1,6 @@
 // Fewer entries, plain words.
 import * as Blockly from 'blockly/core';
+import {offerRemoving} from './removing';
 
 const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockCollapseExpand', 'blockDisable',
   'blockHelp', 'commentCreate', 'commentDelete', 'commentDuplicate'];
@@ -19,6 +20,7 @@ const WORDS: Readonly<Record<string, string>> = {
 };
 
 export function trimMenu(language: string): void {
+  offerRemoving();
   for (const id of REMOVED) {
     if (Blockly.ContextMenuRegistry.registry.getItem(id)) Blockly.ContextMenuRegistry.registry.unregister(id);
   }

@@ -1,5 +1,6 @@
 // The workspace as JSON: loading, saving, telling the window about real edits.
 import * as Blockly from 'blockly/core';
+import {leniently} from './checker';
 import type {Far} from './far';
 import {type BlockState, KEPT, keep, keepWhole, unkeep} from './kept';
 import {wordsLater} from './quick';
@@ -13,17 +14,6 @@ export interface Listener {
 }
 
 const QUIET_MS = 150;
-
-/** Accepts every connection while a file is loaded: a program is shown as it was saved, types or not. */
-class Checker extends Blockly.ConnectionChecker {
-  static lenient = false;
-
-  override doTypeChecks(a: Blockly.Connection, b: Blockly.Connection): boolean {
-    return Checker.lenient || super.doTypeChecks(a, b);
-  }
-}
-Blockly.registry.register(Blockly.registry.Type.CONNECTION_CHECKER, 'nep', Checker);
-export const CHECKER = 'nep';
 
 export class Program {
   /** Parts of the file that Blockly does not know; written back as they were. */
@@ -138,20 +128,18 @@ export class Program {
     const tops = (blocks as {blocks?: unknown} | undefined)?.blocks;
     this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
       !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
-    Checker.lenient = true;
     // What costs at each block, once: the scrollbars, and how wide the same words are.
     this.workspace.setResizesEnabled(false);
     Blockly.utils.dom.startTextWidthCache();
     try {
       this.loadOthers(others, how);
       this.workspace.setResizesEnabled(false);
-      wordsLater(() => {
+      leniently(() => wordsLater(() => {
         for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
-      });
+      }));
     } finally {
       Blockly.utils.dom.stopTextWidthCache();
       this.workspace.setResizesEnabled(true);
-      Checker.lenient = false;
       this.far.lookSoon();
     }
   }

@@ -3,7 +3,7 @@ import * as Blockly from 'blockly/core';
 import {FieldButton} from './fields';
 
 const MOST_ITEMS = 50;
-const MOST_INPUTS = 12;
+export const MOST_INPUTS = 12;
 
 /** An input of a function: its id stays, its name changes. */
 export interface FunctionInput {
@@ -119,7 +119,7 @@ const FUNCTION = {
     this.own = inputs.map((each) => ({...each}));
     if (inputs.length) row.appendField('with', 'WITH');
     this.own.forEach((each, number) => row.appendField(nameField(this, each), `INPUT${number}`));
-    buttons(this, row, 'input', (by) => changeInputs(this, by));
+    buttons(this, row, 'input', (by) => shapeInputs(this, by, this.own.length - 1));
   },
 };
 
@@ -135,9 +135,14 @@ function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field 
   return field;
 }
 
-function changeInputs(block: DefinitionBlock, by: number): void {
+/** One input more, or without the one at this place, as one step that can be undone. */
+export function changeInputs(block: DefinitionBlock, by: number, place: number): void {
+  reshape(block, () => shapeInputs(block, by, place));
+}
+
+function shapeInputs(block: DefinitionBlock, by: number, place: number): void {
   if (by < 0) {
-    block.showInputs(block.own.slice(0, -1));
+    block.showInputs(block.own.filter((_each, number) => number !== place));
   } else if (block.own.length < MOST_INPUTS) {
     const name = freshName('input', block.own.map((each) => each.name));
     block.showInputs([...block.own, {id: Blockly.utils.idGenerator.genUid(), name}]);

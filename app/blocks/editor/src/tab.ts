@@ -1,10 +1,11 @@
 // One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
 import * as Blockly from 'blockly/core';
+import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
 import {Far} from './far';
 import {Functions} from './functions';
 import {offeredSensors, onFlyout} from './offered';
-import {CHECKER, Program, holdsAny} from './program';
+import {Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
 import {States} from './states';
 import {makeTheme} from './theme';

@@ -1,0 +1,102 @@
+// Taking any item out of a list, any input off a function: entries of the menu, for mouse and keys.
+import * as Blockly from 'blockly/core';
+import {leniently} from './checker';
+import {definitionOf} from './definitions';
+import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, changeInputs} from './shapes';
+
+interface Item {
+  list: Blockly.BlockSvg;
+  number: number;
+}
+
+type State = Blockly.serialization.blocks.State;
+
+/** The item of a list that this block is, or is a grey value of. */
+function itemOf(start: Blockly.Block | null): Item | null {
+  let block = start;
+  for (let parent = block?.getParent(); block && parent; parent = block.getParent()) {
+    const place = definitionOf(parent.type)?.mutator === 'nep_items' ? parent.getInputWithBlock(block)?.name : '';
+    const number = /^ITEM(\d+)$/.exec(place ?? '')?.[1];
+    if (number !== undefined) return {list: parent as Blockly.BlockSvg, number: Number(number)};
+    if (!block.isShadow()) return null;
+    block = parent;
+  }
+  return null;
+}
+
+/** The list without this item and what is in it: made anew in the place of the old, as one step that undo takes back. */
+function removeItem({list, number}: Item): void {
+  const group = Blockly.Events.getGroup();
+  if (!group) Blockly.Events.setGroup(true);
+  const holder = (list.outputConnection ?? list.previousConnection)?.targetConnection ?? null;
+  const saved = Blockly.serialization.blocks.save(list, {addCoordinates: true}) as State;
+  const {workspace} = list;
+  list.dispose(false);
+  const made = leniently(() => {
+    const block = Blockly.serialization.blocks.append(without(saved, number), workspace, {recordUndo: true});
+    const own = block.outputConnection ?? block.previousConnection;
+    if (holder && own) holder.connect(own);
+    return block as Blockly.BlockSvg;
+  });
+  if (!group) Blockly.Events.setGroup(false);
+  const left = made.getInput(`ITEM${Math.max(0, number - 1)}`)?.connection?.targetBlock();
+  const next = left instanceof Blockly.BlockSvg ? left : made;
+  // After Blockly has given the keys of the old list to what is near.
+  window.setTimeout(() => !next.isDeadOrDying() && Blockly.getFocusManager().focusNode(next));
+}
+
+function without(saved: State, number: number): State {
+  const items = (saved.extraState as {items: number}).items;
+  const inputs: NonNullable<State['inputs']> = {};
+  for (const [name, each] of Object.entries(saved.inputs ?? {})) {
+    const at = Number(/^ITEM(\d+)$/.exec(name)?.[1] ?? -1);
+    if (at !== number) inputs[at > number ? `ITEM${at - 1}` : name] = each;
+  }
+  return {...saved, inputs, extraState: {...saved.extraState, items: items - 1}};
+}
+
+// ---- the menu
+
+/** The grey value that the keys were on: Blockly opens the menu of the block that holds it. */
+let asked: Blockly.BlockSvg | null = null;
+let found: Item | null = null;
+
+const open = Blockly.BlockSvg.prototype.showContextMenu;
+Blockly.BlockSvg.prototype.showContextMenu = function (this: Blockly.BlockSvg, event: Event) {
+  const first = asked === null;
+  asked ??= this;
+  try {
+    open.call(this, event);
+  } finally {
+    if (first) asked = null;
+  }
+};
+
+function wanted(block: Blockly.BlockSvg, event: Event): Item | null {
+  const pressed = event instanceof PointerEvent && event.target instanceof Element ? event.target : null;
+  const id = pressed?.closest<SVGElement>('[data-id]')?.dataset['id'];
+  return itemOf((id ? block.workspace.getBlockById(id) : null) ?? asked ?? block);
+}
+
+export function offerRemoving(): void {
+  const scopeType = Blockly.ContextMenuRegistry.ScopeType.BLOCK;
+  Blockly.ContextMenuRegistry.registry.register({
+    id: 'nepRemoveItem', weight: 5, scopeType,
+    displayText: () => `Take item ${(found?.number ?? 0) + 1} out of the list`,
+    preconditionFn: ({block}, event) => {
+      found = block && !block.isInFlyout ? wanted(block, event) : null;
+      return found ? 'enabled' : 'hidden';
+    },
+    callback: () => found && removeItem(found),
+  });
+  for (let place = 0; place < MOST_INPUTS; place += 1) {
+    const inputOf = (block?: Blockly.BlockSvg) =>
+      block && DEFINITIONS.includes(block.type) && !block.isInFlyout ? (block as unknown as DefinitionBlock).own[place] : undefined;
+    Blockly.ContextMenuRegistry.registry.register({
+      id: `nepRemoveInput${place}`, weight: 5 + place / 100, scopeType,
+      displayText: ({block}) => `Take the input “${inputOf(block)?.name ?? ''}” away`,
+      preconditionFn: ({block}) => inputOf(block) ? 'enabled' : 'hidden',
+      callback: ({block}) => block && changeInputs(block as unknown as DefinitionBlock, -1, place),
+    });
+  }
+}
