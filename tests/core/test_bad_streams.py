@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,10 +15,7 @@ import pytest
 import nep
 from app.core.mailbox import MESSAGES_PER_TOPIC
 from app.core.session import Session
-from app.core.settings import Settings
-from app.core.source import GraphSeen, Job
 from nep.masters import Master
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
 from tests.core.waiting import tick_until
 from tests.e2e.waiting import until
 
@@ -202,104 +199,3 @@ def test_a_session_closes_soon_while_messages_flood_in(session: Session, master:
     finally:
         flood.kill()
         flood.communicate()
-
-
-class Recorded:
-    """A source that only tells what the test posts."""
-
-    address = "127.0.0.1:1"
-
-    def start(self) -> None: ...
-    def watch(self, topic: str) -> None: ...
-    def unwatch(self, topic: str) -> None: ...
-    def submit(self, what: str, job: Job) -> None: ...
-    def close(self) -> None: ...
-
-    def missed(self) -> Mapping[str, int]:
-        return {}
-
-
-class Clocks:
-    """Both clocks of a session, in the test's hand."""
-
-    def __init__(self) -> None:
-        self.now, self.wall_ns = 100.0, 1_700_000_000_000_000_000
-
-    def go_on(self, seconds: float) -> None:
-        self.now += seconds
-        self.wall_ns += round(seconds * 1e9)
-
-
-@pytest.fixture
-def clocks() -> Clocks:
-    return Clocks()
-
-
-@pytest.fixture
-def quiet(tmp_path: Path, clocks: Clocks) -> Iterator[Session]:
-    session = Session(
-        Settings(tmp_path),
-        address=Recorded.address,
-        source=Recorded(),
-        journal_folder=tmp_path,
-        clock=lambda: clocks.now,
-        clock_ns=lambda: clocks.wall_ns,
-        start_companions=False,
-    )
-    yield session
-    session.close()
-
-
-def graph(revision: int, names: Mapping[str, str], stamp_ns: int) -> GraphView:
-    nodes = {node: NodeInfo(node, node, "there", 5, "python", "native", 0) for node in set(names.values())}
-    one = {
-        name: TopicInfo(
-            name,
-            "json",
-            "json",
-            (PublisherInfo(1, node, (), False, 1, 1, 1, 1, 1.0, 1.0),),
-            rate_hz=1.0,
-            last_stamp_ns=stamp_ns,
-        )
-        for name, node in names.items()
-    }
-    return GraphView(1, revision, nodes, one)
-
-
-def test_10_000_short_lived_topics_leave_nothing_behind(quiet: Session, clocks: Clocks) -> None:
-    post: Callable[[object], None] = quiet._mailbox.post_event
-    most = 0
-    for wave in range(100):
-        names = {f"/short/{wave}/{number}": f"node {wave}" for number in range(100)}
-        post(GraphSeen(graph(wave + 2, names, clocks.wall_ns), 0.001))
-        quiet.tick()
-        clocks.go_on(0.5)
-        most = max(most, len(quiet.topics))
-    assert most <= 100 * (10 / 0.5 + 3)  # what vanished is shown for ten seconds, no longer
-    post(GraphSeen(graph(1000, {}, 0), 0.001))
-    quiet.tick()
-    for _ in range(4):
-        clocks.go_on(11.0)
-        quiet.tick()
-    assert len(quiet.topics) == len(quiet.nodes) == 0
-    assert len(quiet.console.records) < 10_000
-    assert not quiet.alerts.active
-
-
-@pytest.mark.parametrize("jump_s", [-3600.0, 3600.0, -1e9])
-def test_a_clock_that_jumps_makes_no_age_negative_and_loses_nothing(
-    quiet: Session, clocks: Clocks, jump_s: float
-) -> None:
-    names = {"/steady": "steady"}
-    quiet._mailbox.post_event(GraphSeen(graph(2, names, clocks.wall_ns), 0.001))
-    quiet.tick()
-    clocks.wall_ns += round(jump_s * 1e9)
-    for number in range(5):
-        clocks.go_on(0.5)
-        quiet._mailbox.post_event(GraphSeen(graph(2, names, clocks.wall_ns), 0.001))
-        quiet.tick()
-        age = quiet.topics["/steady"].age_s
-        assert age is not None, number
-        assert age >= 0.0
-    assert quiet.topics["/steady"].gone_s is None
-    assert not quiet.alerts.active
