@@ -51,10 +51,10 @@ def venv_python(folder: Path, platform: str) -> Path:
 
 
 def stamp(folder: Path, extra: str) -> str:
-    """What the environment must be made of: changes when pyproject.toml or constraints.txt does."""
+    """What the environment must be made of: changes when pyproject.toml or a file of pinned packages does."""
     digest = hashlib.sha256()
-    for name in ("pyproject.toml", "constraints.txt"):
-        digest.update((folder / name).read_bytes())
+    for path in (folder / "pyproject.toml", *sorted((folder / "requirements").glob("*.txt"))):
+        digest.update(path.read_bytes())
     return f"{digest.hexdigest()} {extra}"
 
 
@@ -81,9 +81,16 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
                 raise Trouble("the virtual environment could not be made; Python's own words are above")
     quiet = [] if sys.stdout.isatty() else ["--quiet"]
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *quiet]
+    # A file that is not the one that we tested with is refused, wherever it comes from. Ours has no hash:
+    # it is this folder, and what builds it is pinned with the others.
+    steps = (
+        [*pip, "--require-hashes", "-r", f"requirements/{extra}.txt"],
+        [*pip, "--no-deps", "--no-build-isolation", "-e", "."],
+    )
     with timed("installing the pinned packages (the first time some 250 MB are brought)"):
-        if computer.do([*pip, "-c", "constraints.txt", "-e", f".[{extra}]"], computer.environ, None) != 0:
-            raise Trouble("the packages could not be installed; pip's own words are above")
+        for step in steps:
+            if computer.do(step, computer.environ, None) != 0:
+                raise Trouble("the packages could not be installed; pip's own words are above")
     probe = [str(python), "-c", "import PySide6.QtWebEngineWidgets"]
     with timed("loading Qt WebEngine once"):
         if computer.do(probe, computer.environ, None) != 0:

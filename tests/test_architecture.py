@@ -265,13 +265,25 @@ def test_the_commands_of_the_distribution_exist() -> None:
 
 
 def pinned() -> dict[str, list[Requirement]]:
-    """The lines of constraints.txt by normalised name."""
+    """What is installed for us by normalised name; each is one version with its files' hashes."""
     found: dict[str, list[Requirement]] = {}
-    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines():
-        if line and not line.startswith("#"):
-            item = Requirement(line)
-            found.setdefault(normalised(item.name), []).append(item)
+    text = (ROOT / "requirements" / "dev.txt").read_text(encoding="utf-8")
+    for line in text.replace("\\\n", " ").splitlines():
+        requirement, *hashes = line.split("--hash=")
+        item = Requirement(requirement)
+        assert re.fullmatch(r"==[\w.]+", str(item.specifier)), line
+        assert hashes
+        assert all(re.fullmatch(r"sha256:[0-9a-f]{64}", each.strip()) for each in hashes), line
+        found.setdefault(normalised(item.name), []).append(item)
     return found
+
+
+def test_studio_and_its_tests_are_installed_from_the_same_files() -> None:
+    studio, dev = (
+        set((ROOT / "requirements" / f"{extra}.txt").read_text(encoding="utf-8").split("\n"))
+        for extra in ("studio", "dev")
+    )
+    assert studio <= dev
 
 
 def normalised(name: str) -> str:

@@ -141,7 +141,8 @@ def test_a_python_that_is_too_old_or_new_is_refused_with_the_range() -> None:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A checkout with an environment in it."""
-    for name in ("pyproject.toml", "constraints.txt"):
+    (tmp_path / "requirements").mkdir()
+    for name in ("pyproject.toml", "requirements/studio.txt", "requirements/dev.txt"):
         (tmp_path / name).write_text(name, encoding="utf-8")
     (tmp_path / ".venv" / "bin").mkdir(parents=True)
     (tmp_path / ".venv" / "bin" / "python").touch()
@@ -157,11 +158,20 @@ def test_packages_are_installed_once_and_again_when_the_pins_change(folder: Path
     system = FakeSystem()
     for _ in range(2):
         assert dev.make_environment(fake_pip(system), folder, "dev") == folder / ".venv" / "bin" / "python"
-    assert [("install" in command) for command in system.ran] == [True, False, False]
-    assert "compileall" in system.ran[2], "the first start is to be as quick as the later ones"
-    (folder / "constraints.txt").write_text("other", encoding="utf-8")
+    assert [("install" in command) for command in system.ran] == [True, True, False, False]
+    assert "compileall" in system.ran[3], "the first start is to be as quick as the later ones"
+    (folder / "requirements" / "dev.txt").write_text("other", encoding="utf-8")
     dev.make_environment(fake_pip(system), folder, "dev")
-    assert len(system.ran) == 6
+    assert len(system.ran) == 8
+
+
+@pytest.mark.parametrize("extra", ["studio", "dev"])
+def test_packages_are_taken_by_their_hashes_and_ours_brings_no_others(folder: Path, extra: str) -> None:
+    system = FakeSystem()
+    dev.make_environment(fake_pip(system), folder, extra)
+    packages, ours = (command for command in system.ran if "install" in command)
+    assert packages[-3:] == ("--require-hashes", "-r", f"requirements/{extra}.txt")
+    assert ours[-4:] == ("--no-deps", "--no-build-isolation", "-e", ".")
 
 
 def test_what_demo_installed_is_not_enough_for_tests_but_the_other_way_round(folder: Path) -> None:

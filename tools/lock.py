@@ -1,0 +1,67 @@
+"""Write down which packages are installed, with their hashes: requirements/studio.txt and dev.txt.
+
+    python tools/lock.py             add what pyproject.toml asks for now; what is pinned stays as it is
+    python tools/lock.py --upgrade   the newest versions that pyproject.toml allows
+
+uv resolves for every system and Python at once, which pip can't; install it by `pip install uv`. The files
+are for pip, so that nobody else needs uv.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+ROOT = Path(__file__).resolve().parents[1]
+OLDEST_PYTHON = "3.10"
+EDITABLE = ("editables",)
+"""What hatchling asks for when it installs a checkout; it can't be told from pyproject.toml."""
+
+
+def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
+    """What pins one extra; what builds the project itself is read from standard input."""
+    found = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
+    found += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
+    found += ["--extra", extra, "--output-file", str(output)]
+    if extra != "studio":
+        found += ["--constraint", str(output.with_name("studio.txt"))]
+    if upgrade:
+        found.append("--upgrade")
+    return [*found, "pyproject.toml", "-"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write both files; 2 when uv is missing."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--upgrade", action="store_true", help="take the newest versions that are allowed")
+    options = parser.parse_args(arguments)
+    uv = shutil.which("uv")
+    if uv is None:
+        print("lock: uv is missing; install it by 'pip install uv'", file=sys.stderr)
+        return 2
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    builds = "\n".join((*project["build-system"]["requires"], *EDITABLE))
+    for extra in ("studio", "dev"):
+        output = ROOT / "requirements" / f"{extra}.txt"
+        output.parent.mkdir(exist_ok=True)
+        done = subprocess.run(
+            command(uv, extra, output, options.upgrade), cwd=ROOT, input=builds, text=True, check=False
+        )
+        if done.returncode != 0:
+            return done.returncode
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
