@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 from app.robots.calls import Call
@@ -11,7 +11,7 @@ from app.robots.inputs import near_miss
 from app.robots.members import as_part, text
 from app.robots.parts import Action, Robot
 from app.robots.task import Answer, Task
-from app.robots.tasks import Tasks
+from app.robots.tasks import Tasks, still_moving
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 _LONGEST_ID = 200
@@ -49,9 +49,14 @@ class Desk:
             error = f"there is no “{operation}”; a command is invoke, cancel, stop or alive"
             self._answering(wanted, str(operation), "")(Answer("failed", error=error))
 
-    def beat(self) -> None:
-        """Tell that the robot lives while it does something: programs notice when it no longer does."""
-        self._publish({"op": "alive", "id": "", "action": "", "state": "running"})
+    def beat(self, not_ended: Sequence[str] = ()) -> None:
+        """Tell that the robot lives while it does something: programs notice when it no longer does.
+
+        `not_ended` are the actions whose functions go on although they were told to end.
+        """
+        error = still_moving(self._robot.name, not_ended) if not_ended else None
+        told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
+        self._publish(told | {"not_ended": list(not_ended), "error": error})
 
     def task(
         self,

@@ -86,8 +86,8 @@ class Driver:
         stop_body: Callable[[], None] = getattr(body, stop)
         answer = partial(self._publish, self.robot.topics.answer)
 
-        def beat() -> None:
-            desk.beat()  # which is made with the tasks, below
+        def beat(not_ended: tuple[str, ...]) -> None:
+            desk.beat(not_ended)  # which is made with the tasks, below
 
         self._tasks = tasks = Tasks(
             self.name,

@@ -36,6 +36,8 @@ class Answer:
 class Task:
     """Something to run: `run` gets its :class:`Call` in a thread, `answer` is called in the deciding one.
 
+    `stopped` says that a stop of the robot told it to end; `answered` that its final answer was given, also
+    while its function goes on.
     `program` asked for it and must stay alive while it runs; one that `goes_on` (a speed) also afterwards.
     """
 
@@ -55,6 +57,7 @@ class Task:
     due_s: float | None = None
     ending: Answer | None = None
     answered: bool = False
+    stopped: bool = False
 
     def end(self, how: Answer) -> None:
         """Ask the running function to end; `how` is what will be answered, whatever it returns."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from app.robots.calls import Call, Canceled, Clock, Failed
@@ -18,8 +18,12 @@ from app.robots.watchdog import Watchdog
 
 BEAT_S = 0.5
 """While something runs or waits, the robot says at least so often that it lives."""
-_LONGEST_QUEUE = 50
+STOP_ANSWER_S = 0.5
+"""A stop is answered after so long at the latest (or the robot's own `within_s`, when that is longer), also
+when something goes on: well before Studio gives up (`app.core.runs.STOP_TIMEOUT_S`) and calls it silent."""
 _GRACE_S = 1.0
+"""So long a function may take to put things away after a cancel, a time-out or one that takes its place."""
+_LONGEST_QUEUE = 50
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
 
@@ -35,12 +39,18 @@ class Tasks:
         *,
         within_s: float,
         watchdog_s: float | None,
-        beat: Callable[[], None] | None = None,
+        beat: Callable[[tuple[str, ...]], None] | None = None,
     ) -> None:
-        """`beat` is called in the deciding thread twice a second while anything runs or waits."""
+        """`beat` is called in the deciding thread twice a second while anything runs or waits.
+
+        It is given the actions whose functions were told to end and go on, and is called once more with none
+        of them as soon as the last one has ended.
+        """
         self._name, self._stop_body, self._clock, self._beat = name, stop, clock, beat
         self._next_beat_s = 0.0
-        self._patience_s = max(1.0, 5 * within_s)
+        self._told_not_ended: tuple[str, ...] = ()
+        self._stop_is_late = False
+        self._patience_s = max(STOP_ANSWER_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
         self._inbox: deque[Callable[[], None]] = deque()
         self._wake = threading.Event()
@@ -80,8 +90,9 @@ class Tasks:
 
     def submit(self, task: Task) -> None:
         """Run a task as soon as what it uses is free; refuse it, or end others, by its busy policy."""
-        if self._stopper is not None:
-            task.finish(Answer("failed", error=f"{task.action}: {self._name} is stopping"))
+        refused = self._refusal()
+        if refused is not None:
+            task.finish(Answer("failed", error=f"{task.action}: {refused}"))
             return
         clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
         if clashing and task.on_busy == "reject":
@@ -123,17 +134,24 @@ class Tasks:
         self._watchdog.hear(program, self._clock.now(), watch=watch)
 
     def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
-        """End everything; `answer` is called when the robot stands still and every function has ended."""
+        """End everything; `answer` is called when the robot stands still and every function has ended.
+
+        What does not end within STOP_ANSWER_S is named in the answers, and nothing is accepted until it has.
+        """
+        limit = self._clock.now() + self._patience_s
         if answer is not None:
-            self._stop_answers.append((self._clock.now() + self._patience_s, answer))
+            self._stop_answers.append((limit, answer))
         self._watchdog.reset()
         ended = Answer("canceled", error=why)
         self._drop(list(self._queue), ended)
         for task in self._running:
-            self._end(task, ended)
-        if self._stopper is None:
-            self._stopper = threading.Thread(target=self._run_stop, name=f"{self._name} stop", daemon=True)
-            self._stopper.start()
+            if task.ending is None:
+                task.end(ended)
+                task.due_s = limit
+            elif task.due_s is not None:
+                task.due_s = min(task.due_s, limit)
+            task.stopped = True
+        self._start_stop()
 
     # ---- the deciding thread ----------------------------------------------------------------------
 
@@ -155,26 +173,46 @@ class Tasks:
 
     @property
     def _is_busy(self) -> bool:
-        return bool(self._running or self._queue)
+        return bool(self._running or self._queue or self._stopper is not None)
+
+    def _refusal(self) -> str | None:
+        """Why nothing is accepted now; None when it is."""
+        stopped = [task for task in self._running if task.stopped]
+        if self._stop_is_late or any(task.answered for task in stopped):
+            return still_moving(self._name, self._not_ended())
+        return f"{self._name} is stopping" if self._stopper is not None or stopped else None
+
+    def _not_ended(self) -> tuple[str, ...]:
+        """What goes on although it should have ended, and was answered so."""
+        names = [task.action for task in self._running if task.answered]
+        return tuple(names + ["the stop itself"] * self._stop_is_late)
+
+    def _tell_beat(self, now: float) -> None:
+        """Say in time that the robot lives, and at once when a function that would not end has ended."""
+        if self._beat is None:
+            return
+        not_ended = self._not_ended()
+        if (self._is_busy and now >= self._next_beat_s) or not_ended != self._told_not_ended:
+            self._next_beat_s, self._told_not_ended = now + BEAT_S, not_ended
+            self._beat(not_ended)
 
     def _look_at_clock(self, now: float) -> None:
-        if self._beat is not None and self._is_busy and now >= self._next_beat_s:
-            self._next_beat_s = now + BEAT_S
-            self._beat()
         for task in self._running:
             if task.due_s is not None and now >= task.due_s:
                 self._overdue(task)
         late = [answer for limit, answer in self._stop_answers if now >= limit]
         self._stop_answers = [pair for pair in self._stop_answers if now < pair[0]]
-        names = ", ".join(task.action for task in self._running) or "the stop itself"
+        if late and self._stopper is not None:
+            self._stop_is_late = True
         for answer in late:
-            answer(Answer("failed", error=f"{self._name} may still move: {names} did not end"))
+            answer(Answer("failed", error=still_moving(self._name, self._not_ended())))
         acting = [task.program for task in (*self._running, *self._queue)]
         if self._watchdog.bites(now, acting):
             self.stop(None, f"no sign of life from its program for {self._watchdog.patience_s:g} s")
+        self._tell_beat(now)
 
     def _end(self, task: Task, how: Answer) -> None:
-        """Ask for the end; a function that goes on all the same is answered for after a second."""
+        """Ask for the end; of a function that goes on all the same it is said after a second."""
         if task.ending is None:
             task.end(how)
             task.due_s = self._clock.now() + _GRACE_S
@@ -182,9 +220,11 @@ class Tasks:
     def _overdue(self, task: Task) -> None:
         if task.ending is None:
             self._end(task, Answer("failed", error=f"{task.action} took longer than {task.timeout_s:g} s"))
-        else:
-            task.due_s = None
-            task.finish(task.ending)
+            return
+        task.due_s = None
+        why = "" if task.stopped or task.ending.error is None else f" ({task.ending.error})"
+        goes_on = still_moving(self._name, [task.action])
+        task.finish(Answer("failed", error=f"{goes_on}{why}"))
 
     def _drop(self, tasks: list[Task], how: Answer) -> None:
         self._queue = [task for task in self._queue if task not in tasks]
@@ -224,7 +264,7 @@ class Tasks:
             done = Answer("canceled")
         except Failed as failed:
             done = Answer("failed", error=str(failed))
-        except Exception as error:  # noqa: BLE001 - a driver's function may raise anything; it is answered
+        except BaseException as error:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
             done = Answer("failed", error=f"{task.action} broke off: {_said(error)}")
         self.call_soon(partial(self._ended, task, done))
@@ -235,16 +275,27 @@ class Tasks:
         self._running.remove(task)
         if done.state == "succeeded" and task.ending is None:
             self._watchdog.ends_well(task)
+        if task.stopped and task.answered and self._stopper is None:
+            # It may have moved the robot after the stop: it is stopped once more, and only then stands still.
+            self._stop_is_late = True
+            self._start_stop()
         # A function that was told to end may return as if it had finished: what was asked counts.
         task.finish(done if task.ending is None or done.state == "failed" else task.ending)
         self._start_ready()
         self._settle()
 
+    def _start_stop(self) -> None:
+        if self._stopper is None:
+            self._stopper = threading.Thread(target=self._run_stop, name=f"{self._name} stop", daemon=True)
+            self._stopper.start()
+
     def _run_stop(self) -> None:
         error = None
         try:
             self._stop_body()
-        except Exception as failed:  # noqa: BLE001 - a driver's stop may raise anything; it is answered
+        except Failed as failed:
+            error = f"{self._name} may still move: {failed}"
+        except BaseException as failed:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
             error = f"{self._name} may still move: its stop broke off: {_said(failed)}"
         self.call_soon(partial(self._stop_ended, error))
@@ -252,8 +303,10 @@ class Tasks:
     def _stop_ended(self, error: str | None) -> None:
         if self._stopper is not None:
             self._stopper.join(_JOIN_S)
-        self._stopper = None
+        self._stopper, self._stop_is_late = None, False
         if error is not None:
+            if not self._stop_answers:
+                _log.error("%s", error)  # nobody asked who could be answered
             answers, self._stop_answers = self._stop_answers, []
             for _, answer in answers:
                 answer(Answer("failed", error=error))
@@ -267,5 +320,10 @@ class Tasks:
                 answer(Answer("succeeded"))
 
 
-def _said(error: Exception) -> str:
+def still_moving(name: str, actions: Sequence[str]) -> str:
+    """The sentence about functions that go on although they were told to end."""
+    return f"{name} may still move: {', '.join(actions)} {'has' if len(actions) == 1 else 'have'} not ended"
+
+
+def _said(error: BaseException) -> str:
     return str(error) or type(error).__name__

@@ -79,6 +79,8 @@ class Turtle:
         self.may_stop = threading.Event()
         self.may_stop.set()
         self.is_closed = False
+        self.breaks: BaseException = ZeroDivisionError()
+        self.stop_fails: BaseException | None = None
 
     def close(self) -> None:
         self.is_closed = True
@@ -119,7 +121,7 @@ class Turtle:
         """Never works."""
         if how == "told":
             raise Failed("no fuel")
-        raise ZeroDivisionError
+        raise self.breaks
 
     @action("ignore", category="Movement", icon="x", uses=("base",), timeout_s=5)
     def ignore(self, call: Call) -> None:
@@ -136,6 +138,8 @@ class Turtle:
     def stop(self) -> None:
         """Stands still once the test lets it."""
         self.may_stop.wait(10)
+        if self.stop_fails is not None:
+            raise self.stop_fails
         self.stops += 1
         self.moving = False
 

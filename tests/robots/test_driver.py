@@ -7,7 +7,10 @@ import json
 import pytest
 
 import nep
+from app.core.runs import STOP_TIMEOUT_S
 from app.robots.driver import Driver
+from app.robots.kit import Failed
+from app.robots.tasks import STOP_ANSWER_S
 from tests.robots.conftest import TURTLE, Ears, eventually
 
 
@@ -180,10 +183,75 @@ def test_a_stop_that_does_not_work_is_said(turtle):
     eventually(lambda: "running" in ears.states("1"))
     ears.command(id="s", op="stop")
     eventually(lambda: body.stops == 1)
-    eventually(lambda: clock.advance(0.5) or ears.states("s"))
-    assert ears.final("s", "stop")["error"] == "Turtle may still move: ignore did not end"
+    clock.advance(STOP_ANSWER_S + 0.01)
+    still = "Turtle may still move: ignore has not ended"
+    assert ears.final("s", "stop")["error"] == still
+    assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", still)
+    ears.invoke("2", "light")  # uses nothing that is in use, and is refused all the same
+    assert ears.final("2")["error"] == f"light: {still}"
+    beats = [a for a in ears.heard["answer"] if a["op"] == "alive"]
+    assert (beats[-1]["not_ended"], beats[-1]["error"]) == (["ignore"], still)
     body.go_on.set()
-    eventually(lambda: ears.command(id="t", op="stop") or "succeeded" in ears.states("t"))
+    eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])
+    assert body.stops == 2  # what went on may have moved the robot after the first one
+    ears.invoke("3", "light")
+    assert ears.final("3")["state"] == "succeeded"
+    ears.command(id="t", op="stop")
+    assert ears.final("t", "stop")["state"] == "succeeded"
+    assert ears.states("1").count("failed") == 1
+    assert len(ears.states("s")) == 1
+
+
+def test_a_robot_that_can_not_stop_says_why(turtle, caplog):
+    body, ears, _ = turtle
+    body.stop_fails = Failed("the brake does not answer")
+    ears.command(id="s", op="stop")
+    answer = ears.final("s", "stop")
+    assert (answer["state"], answer["error"]) == (
+        "failed",
+        "Turtle may still move: the brake does not answer",
+    )
+    assert caplog.records == []  # no traceback for what it says itself
+    body.stop_fails = None
+    ears.command(id="t", op="stop")
+    assert ears.final("t", "stop")["state"] == "succeeded"
+
+
+@pytest.mark.parametrize("how", [SystemExit(3), KeyboardInterrupt(), GeneratorExit()], ids=repr)
+def test_a_function_that_ends_the_program_is_answered_and_can_be_stopped(turtle, how):
+    body, ears, _ = turtle
+    body.breaks = how
+    ears.invoke("1", "fail", how="broken")
+    answer = ears.final("1")
+    assert (answer["state"], str(answer["error"]).startswith("fail broke off: ")) == ("failed", True)
+    body.stop_fails = how
+    ears.command(id="s", op="stop")
+    assert str(ears.final("s", "stop")["error"]).startswith("Turtle may still move: its stop broke off: ")
+    body.stop_fails = None
+    ears.command(id="t", op="stop")
+    assert ears.final("t", "stop")["state"] == "succeeded"
+
+
+def test_a_stop_that_hangs_is_said_each_time_and_nothing_is_accepted(turtle):
+    body, ears, clock = turtle
+    body.may_stop.clear()
+    ears.command(id="s", op="stop")
+    eventually(lambda: clock.advance(0.1) or ears.states("s"))
+    said = "Turtle may still move: the stop itself has not ended"
+    assert ears.final("s", "stop")["error"] == said
+    ears.invoke("1", "light")
+    assert ears.final("1")["error"] == f"light: {said}"
+    ears.command(id="t", op="stop")
+    eventually(lambda: clock.advance(0.1) or ears.states("t"))
+    assert ears.final("t", "stop")["error"] == said
+    body.may_stop.set()
+    eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])
+    ears.invoke("2", "light")
+    assert ears.final("2")["state"] == "succeeded"
+
+
+def test_the_kit_answers_a_stop_well_before_studio_gives_up():
+    assert 0 < STOP_ANSWER_S <= STOP_TIMEOUT_S / 2
 
 
 def test_a_late_command_of_a_stopped_program_moves_nothing(turtle):
