@@ -164,10 +164,10 @@ class Health:
             link.connected
             and topic is not None
             and topic.gone_since is None
-            and topic.age_s is not None
-            and topic.age_s > SILENT_S
+            and topic.silent_s is not None
+            and topic.silent_s > SILENT_S
         )
-        if not silent or topic is None or topic.age_s is None:
+        if not silent or topic is None or topic.silent_s is None:
             link.silent = None
             self._alerts.cure(id)
             return
@@ -175,7 +175,7 @@ class Health:
         self._alerts.put(
             id,
             "error",
-            f"The camera of {link.name} has been silent for {int(topic.age_s)} s.",
+            f"The camera of {link.name} has been silent for {int(topic.silent_s)} s.",
             "What needs its picture waits.",
             button=ASK_DOCTOR,
             action="help.doctor",

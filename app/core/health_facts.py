@@ -20,6 +20,8 @@ LOW_PERCENT = 20
 WARM_C = 60
 """From here on motors of small robots begin to lose their strength."""
 
+TOLD = frozenset({"Battery", "Temperature", "Camera", "Sensors"})
+
 AgeWords = Callable[[float], str]
 
 
@@ -50,6 +52,11 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -
         facts += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
     facts += [_left_alone(link), *_life(link)]
     return tuple(sorted(facts, key=lambda fact: not fact.to_look_at))
+
+
+def has_told(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
+    """Whether anything that a robot said or sent speaks for it; of others only their description is known."""
+    return link.answered_s is not None or any(fact.title in TOLD and fact.status == "ok" for fact in facts)
 
 
 def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
@@ -114,14 +121,14 @@ def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[He
     if camera is None:
         return
     topic = topics.get(camera.topic)
-    if link.silent is not None and topic is not None and topic.age_s is not None:
-        yield HealthFact("Camera", "error", f"silent for {age_words(topic.age_s)}")
-    elif topic is not None and not topic.subscribers and not topic.rate_hz:
-        yield HealthFact("Camera", "off", "ready; nobody looks")
-    elif topic is None or not topic.rate_hz:
-        yield HealthFact("Camera", "off", "no picture yet")
-    else:
+    if link.silent is not None and topic is not None and topic.silent_s is not None:
+        yield HealthFact("Camera", "error", f"silent for {age_words(topic.silent_s)}")
+    elif topic is not None and topic.rate_hz:
         yield HealthFact("Camera", "ok", f"sends {topic.rate_hz:.0f} pictures a second")
+    elif topic is not None and topic.gone_s is None and topic.heard_since is None:
+        yield HealthFact("Camera", "off", "ready; nobody looks")
+    else:
+        yield HealthFact("Camera", "off", "no picture yet")
 
 
 def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
@@ -129,18 +136,30 @@ def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[H
     silent = [(sensor, topic) for sensor in felt if _is_silent(sensor, topic := topics.get(sensor.topic))]
     if not felt:
         return
-    if not silent:
-        yield HealthFact("Sensors", "ok", "1 sensor sends" if len(felt) == 1 else f"all {len(felt)} send")
+    if silent:
+        age = age_words(max(topic.silent_s or 0.0 for _, topic in silent if topic is not None))
+        yield HealthFact("Sensors", "warn", f"{_listed([each.title for each, _ in silent])} silent for {age}")
         return
-    age = age_words(max(topic.age_s or 0.0 for _, topic in silent if topic is not None))
-    yield HealthFact("Sensors", "warn", f"{_listed([each.title for each, _ in silent])} silent for {age}")
+    sent = sum(1 for sensor in felt if _has_sent(topics.get(sensor.topic)))
+    if not sent:
+        words = "has sent nothing yet" if len(felt) == 1 else f"none of {len(felt)} has sent anything yet"
+        yield HealthFact("Sensors", "off", words)
+    elif sent < len(felt):
+        yield HealthFact("Sensors", "ok", f"{sent} of {len(felt)} have sent something")
+    else:
+        yield HealthFact("Sensors", "ok", "1 sensor sends" if len(felt) == 1 else f"all {len(felt)} send")
+
+
+def _has_sent(topic: Topic | None) -> bool:
+    """Whether anything was ever sent on a topic that is there."""
+    return topic is not None and topic.gone_s is None and topic.age_s is not None
 
 
 def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
     """Whether one that tells its value all the time has stopped; others may have nothing new to tell."""
-    if sensor.rate_hz is None or topic is None or topic.age_s is None or topic.gone_s is not None:
+    if sensor.rate_hz is None or topic is None or topic.silent_s is None or topic.gone_s is not None:
         return False
-    return topic.age_s > max(SILENT_S, MISSED / sensor.rate_hz)
+    return topic.silent_s > max(SILENT_S, MISSED / sensor.rate_hz)
 
 
 def _left_alone(link: RobotLink) -> HealthFact:

@@ -17,6 +17,10 @@ from nep.views import GraphView, TopicInfo
 GONE_SHOWN_S = 10.0
 RATES_KEPT = 60
 AT_ONCE = 1500
+START_S = 5.0
+"""A camera that is switched on when somebody subscribes it has sent its first picture by then."""
+FIGURES_LATE_S = 6.0
+"""Nodes of large graphs tell their counts every 5 s; what only they tell is not judged earlier."""
 
 
 @dataclass(slots=True, eq=False)
@@ -24,10 +28,11 @@ class Topic:
     """One topic. Figures that are not known are None; a panel shows them blank.
 
     ``rate_hz`` messages a second and ``bandwidth_Bps`` bytes a second as the publishers tell, ``age_s``
-    seconds since the newest message, ``lost`` messages and ``loss_ratio`` of those that a subscriber should
-    have had. ``gone_s`` is None while it is there, else the seconds since it vanished. ``newest``,
-    ``previous`` are kept, and ``received``, ``dropped`` (of those, before a panel saw them) and ``missed``
-    (sent, but not received here) counted, only while somebody looks.
+    seconds since the newest message by its stamp, ``silent_s`` seconds in which somebody listened and nothing
+    came (None while nobody listens: who sends only when heard is not silent), ``lost`` messages and
+    ``loss_ratio`` of those that a subscriber should have had. ``gone_s`` is None while it is there, else the
+    seconds since it vanished. ``newest``, ``previous`` are kept, and ``received``, ``dropped`` (of those,
+    before a panel saw them) and ``missed`` (sent, but not received here) counted, only while somebody looks.
     """
 
     name: str
@@ -39,6 +44,7 @@ class Topic:
     rate_hz: float | None = None
     bandwidth_Bps: float | None = None  # noqa: N815  bytes a second, as the vocabulary spells it
     age_s: float | None = None
+    silent_s: float | None = None
     lost: int | None = None
     loss_ratio: float | None = None
     new: bool = False
@@ -54,6 +60,8 @@ class Topic:
     gone_since: float | None = None
     last_stamp_ns: int | None = None
     last_received: float | None = None
+    heard_since: float | None = None
+    moved_at: float | None = None
     info: TopicInfo | None = None
 
     @property
@@ -80,6 +88,7 @@ class Topics:
         self._seen = (-1, -1)
         self._view: GraphView | None = None
         self._aged = 0
+        self._told_at = 0.0
         self._past: set[str] = set()  # vanished long ago, but somebody still looks at them
         self.revision = 0
         self.values_revision = 0
@@ -128,8 +137,8 @@ class Topics:
         if seen != self._seen:
             self._take_all(view, now)
         elif len(self._topics) <= AT_ONCE:
-            _renew(self._topics.values(), view)
-        self._seen, self._view = seen, view
+            _renew(self._topics.values(), view, now)
+        self._seen, self._view, self._told_at = seen, view, now
         self.values_revision += 1
 
     def _take_all(self, view: GraphView, now: float) -> None:
@@ -144,7 +153,7 @@ class Topics:
             if topic is None:
                 topic = self._topics[name] = Topic(name, new=not self._first_graph)
                 self.revision += 1
-            self._take(topic, info, view)
+            self._take(topic, info, view, now)
         for name, topic in self._topics.items():
             if name not in shown and topic.gone_since is None:
                 self._vanish(topic, now)
@@ -166,7 +175,7 @@ class Topics:
         begin, self._aged = self._aged, self._aged + AT_ONCE
         some = list(islice(self._topics.values(), begin, self._aged))
         if self._view is not None and len(self._topics) > AT_ONCE:
-            _renew(some, self._view)
+            _renew(some, self._view, self._told_at)
         for topic in some:
             if topic.gone_since is not None:
                 topic.gone_s = now - topic.gone_since
@@ -174,6 +183,7 @@ class Topics:
                     self._leave(topic)
             else:
                 topic.age_s = _age(topic, now, now_ns)
+                topic.silent_s = _silence(topic, now, self._told_at)
 
     def _leave(self, topic: Topic) -> None:
         """It vanished ten seconds ago; one that somebody still looks at only leaves the lists."""
@@ -197,7 +207,7 @@ class Topics:
         topic.newest = batch.messages[-1]
         topic.received += batch.arrived
         topic.dropped += batch.dropped
-        topic.last_received = now
+        topic.last_received = topic.moved_at = now
         self.values_revision += 1
 
     def check(self, topic: Topic) -> bool:
@@ -229,29 +239,35 @@ class Topics:
         topic.gone_since, topic.gone_s = now, 0.0
         topic.publishers, topic.publisher_nodes = 0, ()
         topic.rate_hz = topic.bandwidth_Bps = topic.age_s = None
+        topic.silent_s = topic.heard_since = topic.moved_at = None
         self.revision += 1
 
-    def _take(self, topic: Topic, info: TopicInfo, view: GraphView) -> None:
+    def _take(self, topic: Topic, info: TopicInfo, view: GraphView, now: float) -> None:
         before = topic.facts()
+        topic.heard_since = _heard_since(topic, info, now)
         topic.msg_type, topic.codec = info.msg_type, info.codec
         topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
         topic.publisher_nodes = _names(info, view)
         topic.gone_since = topic.gone_s = None
         self._past.discard(topic.name)
-        _take_figures(topic, info)
+        _take_figures(topic, info, now)
         if topic.facts() != before:
             self.revision += 1
 
 
-def _renew(topics: Iterable[Topic], view: GraphView) -> None:
+def _renew(topics: Iterable[Topic], view: GraphView, now: float) -> None:
     find = view.topics.get
     for topic in topics:
         info = find(topic.name)
         if info is not None and info is not topic.info and topic.gone_since is None:
-            _take_figures(topic, info)
+            _take_figures(topic, info, now)
 
 
-def _take_figures(topic: Topic, info: TopicInfo) -> None:
+def _take_figures(topic: Topic, info: TopicInfo, now: float) -> None:
+    if info.last_stamp_ns is not None and (
+        topic.info is None or info.last_stamp_ns != topic.info.last_stamp_ns
+    ):
+        topic.moved_at = now
     topic.info = info
     topic.rate_hz = rate_hz = info.rate_hz
     topic.bandwidth_Bps = info.bandwidth_Bps
@@ -275,6 +291,28 @@ def _age(topic: Topic, now: float, now_ns: int) -> float | None:
     if stamp is not None:
         return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
     return now - topic.last_received if topic.last_received is not None else None
+
+
+def _heard_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
+    """Since when the publishers that are there have had a subscriber; None while they have none."""
+    if not info.publishers or not info.subscribers:
+        return None
+    before = {each.id for each in topic.info.publishers} if topic.info is not None else set()
+    anew = topic.heard_since is None or not before & {each.id for each in info.publishers}
+    return now if anew else topic.heard_since
+
+
+def _silence(topic: Topic, now: float, told_at: float) -> float | None:
+    """How long nothing came although somebody listened, on our own clock: that of the sender may be wrong.
+
+    What arrives here is known to the moment; of others only what the master told last, at ``told_at``.
+    """
+    if topic.heard_since is None or topic.moved_at is None:
+        return None
+    until = now if topic.watched else told_at
+    since = topic.moved_at if topic.moved_at >= topic.heard_since else topic.heard_since + START_S
+    silent_s = max(0.0, until - since)
+    return silent_s if topic.watched or silent_s >= FIGURES_LATE_S else 0.0
 
 
 def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.health_facts import facts_of
+from app.core.health_facts import facts_of, has_told
 from app.core.session import Session
 from app.ui.others_sheet import words_of
 from app.ui.theme import Theme
@@ -40,7 +40,10 @@ class Facts:
         self.window_ms = 0.0
 
     def health(self) -> Fact:
-        """Say how many alerts there are, how much Health has to look at, or that Pepper is well."""
+        """Say how many alerts there are, how much Health has to look at, or that Pepper is well.
+
+        A robot that has told nothing yet is only connected.
+        """
         alerts = [alert for alert in self._session.alerts.active if alert.severity != "info"]
         if alerts:
             icon, status = _worst(alert.severity for alert in alerts)
@@ -52,15 +55,16 @@ class Facts:
         if not links:
             return "circle-dashed", "No robot", "off"
         topics, now = self._session.topics, time.monotonic()
-        facts = [fact for link in links for fact in facts_of(link, topics, now, age_words)]
-        wrong = [fact.status for fact in facts if fact.to_look_at]
+        found = [(link, facts_of(link, topics, now, age_words)) for link in links]
+        wrong = [fact.status for _, facts in found for fact in facts if fact.to_look_at]
         if wrong:
             icon, status = _worst(wrong)
             whose = links[0].name if len(links) == 1 else f"{len(links)} robots"
             return icon, f"{whose}: {len(wrong)} to look at", status
-        if len(links) == 1:
-            return "circle-check", f"{links[0].name} is well", "ok"
-        return "circle-check", f"{len(links)} robots are well", "ok"
+        who = f"{links[0].name} is" if len(links) == 1 else f"{len(links)} robots are"
+        if all(has_told(link, facts) for link, facts in found):
+            return "circle-check", f"{who} well", "ok"
+        return "circle-dashed", f"{who} connected", "off"
 
     def saved(self) -> Fact:
         """When the behaviour was saved, or that it is not saved yet."""

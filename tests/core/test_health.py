@@ -11,8 +11,11 @@ from app.core.alerts import Alert, Alerts
 from app.core.checks import Checked
 from app.core.fleet import Fleet
 from app.core.health import AWAY_S, CURE_S, Health
+from app.core.mailbox import Batch
 from app.core.topics import Topics
 from nep import graph
+from nep.message import Message
+from nep.views import PublisherInfo, SubscriberInfo, TopicInfo
 
 
 class Case:
@@ -23,7 +26,8 @@ class Case:
         self.alerts = Alerts()
         self.links: list[SimpleNamespace] = []
         fleet = cast("Fleet", SimpleNamespace(links=self.links))
-        self.health = Health(Topics(), fleet, self.alerts, lambda: self.now)
+        self.topics = Topics()
+        self.health = Health(self.topics, fleet, self.alerts, lambda: self.now)
 
     def look(self, bad: int, good: int = 0, *, unchecked: int = 0, last_good: bool = False) -> None:
         checked = Checked(bad + good, bad, unchecked, "no json" if bad else "", last_good)
@@ -141,3 +145,35 @@ def test_a_virtual_robot_is_told_of_only_while_its_process_runs_here(case: Case)
     alert = case.alert()
     assert alert is not None
     assert (alert.title, alert.action) == ("Rover does not answer.", "connect:Rover")
+
+
+def seeing(name: str) -> SimpleNamespace:
+    link = robot(virtual=True, connected=True)
+    link.name = name
+    link.robot = SimpleNamespace(sensors=(SimpleNamespace(is_image=True, topic=f"/{name}/camera"),))
+    return link
+
+
+def camera(name: str, subscribers: int) -> TopicInfo:
+    sender = PublisherInfo(1, "n1", (), False, 5, 50, 5, 1_000_000_000, None, None)
+    heard = tuple(SubscriberInfo(n, "n2", 0, 0) for n in range(subscribers))
+    return TopicInfo(f"/{name}/camera", "image", "image", (sender,), heard, last_stamp_ns=1_000_000_000)
+
+
+def test_of_two_robots_the_one_that_is_not_shown_is_not_silent(case: Case) -> None:
+    """A virtual robot sends its pictures only while somebody looks."""
+    case.links += [seeing("Pepper"), seeing("Turtle")]
+    both = {f"/{name}/camera": camera(name, name == "Pepper") for name in ("Pepper", "Turtle")}
+    case.topics.update(graph.GraphView(1, 1, {}, both), 0)
+    case.topics["/Pepper/camera"].watched = True
+    case.topics.add("/Pepper/camera", Batch([Message("/Pepper/camera", b"", "image", "image")]), 49)
+    case.topics.age(50, 60 * 10**9)
+    case.health.check()
+    assert [link.silent for link in case.links] == [None, None]
+    assert case.alert() is None
+    case.topics.age(53, 60 * 10**9)
+    case.health.check()
+    alert = case.alert()
+    assert alert is not None, "the one that is looked at is silent"
+    assert alert.title == "The camera of Pepper has been silent for 4 s."
+    assert [link.silent for link in case.links] == ["camera silent", None]

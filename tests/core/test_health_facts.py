@@ -75,7 +75,9 @@ def test_a_camera_that_nobody_looks_at_sends_nothing_and_is_well(case: Case) -> 
     (camera,) = [sensor.topic for sensor in PEPPER.sensors if sensor.is_image]
     case.topics[camera] = Topic(camera, subscribers=0)
     assert case.says("Camera") == ("off", "ready; nobody looks")
-    case.topics[camera] = Topic(camera, subscribers=1)
+    case.topics[camera] = Topic(camera, age_s=15.0)
+    assert case.says("Camera") == ("off", "ready; nobody looks"), "it sent while somebody looked"
+    case.topics[camera] = Topic(camera, subscribers=1, heard_since=NOW)
     assert case.says("Camera") == ("off", "no picture yet")
 
 
@@ -128,18 +130,36 @@ def test_the_last_stop(case: Case, last: str, status: str) -> None:
 
 def test_a_silent_camera(case: Case) -> None:
     case.link.silent = "camera silent"
-    case.topics["/Pepper/camera"].age_s = 4.0
+    case.topics["/Pepper/camera"].silent_s = 4.0
     assert case.says("Camera") == ("error", "silent for 4 s")
 
 
 def test_sensors_that_tell_all_the_time_and_have_stopped(case: Case) -> None:
-    case.topics["/Pepper/distance"].age_s = 8.0
-    case.topics["/Pepper/heard_word"].age_s = 8.0  # tells only when there is something
+    case.topics["/Pepper/distance"].silent_s = 8.0
+    case.topics["/Pepper/heard_word"].silent_s = 8.0  # tells only when there is something
     assert case.says("Sensors") == ("warn", "distance silent for 8 s")
-    case.topics["/Pepper/sees_ball"].age_s = 9.0
+    case.topics["/Pepper/sees_ball"].silent_s = 9.0
     assert case.says("Sensors") == ("warn", "distance and 1 more silent for 9 s")
     case.topics["/Pepper/distance"].gone_s = case.topics["/Pepper/sees_ball"].gone_s = 1.0
     assert case.says("Sensors")[0] == "ok"
+
+
+def test_sensors_that_nobody_hears_are_not_blamed(case: Case) -> None:
+    case.topics["/Pepper/distance"].age_s = 80.0
+    assert case.says("Sensors") == ("ok", f"all {len(PEPPER.sensors) - 1} send")
+
+
+def test_what_has_sent_nothing_is_not_said_to_send(case: Case) -> None:
+    felt = [sensor.topic for sensor in PEPPER.sensors if not sensor.is_image]
+    for topic in felt:
+        case.topics[topic] = Topic(topic)
+    assert case.says("Sensors") == ("off", f"none of {len(felt)} has sent anything yet")
+    case.topics[felt[0]].age_s = 0.2
+    assert case.says("Sensors") == ("ok", f"1 of {len(felt)} have sent something")
+    case.link.robot = replace(PEPPER, sensors=PEPPER.sensors[:1])
+    assert case.says("Sensors") == ("ok", "1 sensor sends")
+    case.topics[felt[0]].age_s = None
+    assert case.says("Sensors") == ("off", "has sent nothing yet")
 
 
 def test_one_of_rize_has_neither_watchdog_nor_signs_of_life(case: Case) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count
 
 from app.core.mailbox import Batch
-from app.core.topics import GONE_SHOWN_S, Topics, total_rate_hz
+from app.core.topics import FIGURES_LATE_S, GONE_SHOWN_S, START_S, Topics, total_rate_hz
 from nep.message import Message
 from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
@@ -182,3 +183,73 @@ def test_of_very_many_topics_every_one_is_renewed_and_ages_within_some_calls() -
     for _ in range(6):
         topics.age(10.0 + GONE_SHOWN_S, 0)
     assert len(topics) == 0
+
+
+def heard(
+    count: int = 1, *, last_stamp_ns: int = 1_000_000_000, node: str = "n9", sender: int = 1
+) -> TopicInfo:
+    made = info("/a", last_stamp_ns=last_stamp_ns)
+    publishers = tuple(replace(each, id=sender) for each in made.publishers)
+    return replace(
+        made, publishers=publishers, subscribers=tuple(SubscriberInfo(n, node, 5, 0) for n in range(count))
+    )
+
+
+def silence(topics: Topics, now: float) -> float | None:
+    topics.age(now, 90_000_000_000)
+    return topics["/a"].silent_s
+
+
+def test_a_stream_that_nobody_listens_to_is_not_silent() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    assert silence(topics, 1000) is None
+    assert topics["/a"].age_s == 89.0, "its age is told all the same"
+
+
+def test_one_that_is_looked_at_is_silent_from_its_last_message_on() -> None:
+    topics = Topics()
+    topics.update(view(heard()), 10)
+    topics["/a"].watched = True
+    topics.add("/a", Batch([message(1)]), 20)
+    assert silence(topics, 20.5) == 0.5
+    assert silence(topics, 24) == 4.0
+    topics.update(view(info("/a")), 25)
+    assert silence(topics, 60) is None, "nobody looks any more"
+
+
+def test_who_is_heard_again_has_time_to_begin() -> None:
+    topics = Topics()
+    topics.update(view(info("/a")), 0)
+    topics.update(view(heard()), 100)
+    topics["/a"].watched = True
+    assert silence(topics, 100 + START_S) == 0.0
+    assert silence(topics, 104 + START_S) == 4.0
+    topics.update(view(heard(sender=2)), 110)
+    assert silence(topics, 112) == 0.0, "another publisher has taken its place"
+
+
+def test_a_clock_that_goes_wrong_makes_no_silence() -> None:
+    topics = Topics()
+    topics.update(view(heard()), 0)
+    topics["/a"].watched = True
+    topics.add("/a", Batch([message(1, stamp_ns=1)]), 8)
+    topics.age(8.1, 10**18)
+    assert (round(topics["/a"].silent_s or 0, 3), topics["/a"].age_s) == (0.1, (10**18 - 10**9) / 1e9)
+
+
+def test_what_others_hear_is_judged_by_what_the_master_told_last() -> None:
+    topics = Topics()
+    topics.update(view(heard()), 0)
+    topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10)
+    assert silence(topics, 60) == 0.0, "the master has gone; nobody knows"
+    topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10 + FIGURES_LATE_S)
+    assert silence(topics, 60) == FIGURES_LATE_S
+
+
+def test_a_topic_that_never_sent_is_not_silent() -> None:
+    topics = Topics()
+    never = replace(heard(), last_stamp_ns=None)
+    topics.update(view(never), 0)
+    topics["/a"].watched = True
+    assert silence(topics, 100) is None

@@ -51,6 +51,15 @@ def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:
     assert facts(session).health() == ("circle-x", "Pepper: 2 to look at", "error")
 
 
+def test_a_robot_that_has_told_nothing_is_connected_and_not_well(session: fakes.Session) -> None:
+    session.alerts.cure("message:/faces")
+    link = session.fleet.links[0]
+    link.answered_s, link.values = None, {}
+    for topic in session.topics:
+        topic.rate_hz = topic.age_s = None
+    assert facts(session).health() == ("circle-dashed", "Pepper is connected", "off")
+
+
 def test_a_robot_that_has_gone_is_to_be_looked_at(session: fakes.Session) -> None:
     session.alerts.cure("message:/faces")
     link = session.fleet.links[0]
