@@ -23,16 +23,8 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 CACHE = REPOSITORY / ".cache" / "peers"
 SCRIPTS = Path(__file__).parent / "peers"
 FIXED_PORTS = (7000, 50000)
-PICTURES = ("numpy>=1.26,<2.3", "opencv-python-headless>=4.10,<4.13")
-"""nep publishes pictures with numpy's `tostring`, which numpy 2.3 took away."""
-PYTHON_PEERS = {
-    "0.5.3.5": ("nep==0.5.3.5", "pyzmq", "simplejson", "tornado", *PICTURES),
-    "0.5.4.5": ("nep==0.5.4.5", "pyzmq", "simplejson", "msgpack", *PICTURES),
-    "0.5.4.6": ("nep==0.5.4.6", "pyzmq", "simplejson", "msgpack", "numpy"),
-    "0.5.4.7": ("nep==0.5.4.7", "pyzmq", "simplejson", "msgpack", "numpy"),
-    "0.5.4.8": ("nep==0.5.4.8", "pyzmq", "simplejson", "msgpack", *PICTURES),
-}
-JAVASCRIPT_PEER = "nep-js@0.1.1"
+PYTHON_PEERS = ("0.5.3.5", "0.5.4.5", "0.5.4.6", "0.5.4.7", "0.5.4.8")
+JAVASCRIPT_PEER = "nep-js"
 MARK = "\x1e"
 LONG_S = 20.0
 FIRST_S = 600.0
@@ -193,7 +185,16 @@ def _install_python(version: str, folder: Path) -> str:
     shutil.rmtree(folder, ignore_errors=True)
     commands = (
         [sys.executable, "-m", "venv", str(folder)],
-        [str(_python_of(folder)), "-m", "pip", "install", "--quiet", *PYTHON_PEERS[version]],
+        [
+            str(_python_of(folder)),
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--require-hashes",
+            "-r",
+            str(_pins(version)),
+        ],
         [str(_python_of(folder)), "-c", "import nep; nep.node"],
     )
     return _run_all(commands, version, folder)
@@ -204,25 +205,27 @@ def _install_javascript(version: str, folder: Path) -> str:
         return "the test peer nep-js needs node and npm, which this computer does not have"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
+    for name in ("package.json", "package-lock.json"):
+        shutil.copy(SCRIPTS / "javascript" / name, folder)
+    npm = shutil.which("npm") or "npm"
     commands = (
-        [
-            shutil.which("npm") or "npm",
-            "install",
-            "--silent",
-            "--no-audit",
-            "--no-fund",
-            "--prefix",
-            str(folder),
-            JAVASCRIPT_PEER,
-        ],
+        [npm, "ci", "--silent", "--no-audit", "--no-fund", "--prefix", str(folder)],
         ["node", "-e", f"require({json.dumps(str(folder / 'node_modules' / 'nep-js'))})"],
     )
     return _run_all(commands, version, folder)
 
 
+def _pins(version: str) -> Path:
+    """What is installed for a peer, with hashes."""
+    if version == JAVASCRIPT_PEER:
+        return SCRIPTS / "javascript" / "package-lock.json"
+    return SCRIPTS / f"nep-{version}.txt"
+
+
 def _packages(version: str) -> str:
     """What a peer's environment is made of: when that changes it is made anew."""
-    return " ".join(PYTHON_PEERS.get(version, (JAVASCRIPT_PEER,)))
+    common = SCRIPTS / "python.txt"
+    return _pins(version).read_text("utf-8") + common.read_text("utf-8")
 
 
 def _run_all(commands: Sequence[Sequence[str]], version: str, folder: Path) -> str:
