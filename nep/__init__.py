@@ -12,6 +12,7 @@ from nep.encoded import Encoded
 from nep.errors import (
     AddressInUseError,
     BackendUnavailableError,
+    BadNameError,
     BadTopicError,
     ClosedError,
     DecodeError,
@@ -33,6 +34,7 @@ __all__ = [
     "AddressInUseError",
     "Alert",
     "BackendUnavailableError",
+    "BadNameError",
     "BadTopicError",
     "ClosedError",
     "Configuration",

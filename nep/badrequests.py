@@ -7,6 +7,7 @@ import re
 from collections import OrderedDict
 from dataclasses import dataclass
 
+from nep.text import escaped, shortened
 from nep.views import Alert
 
 __all__ = ["BadRequests", "who_sends"]
@@ -46,7 +47,7 @@ class BadRequests:
         """One more of `sender`, in words `name`. Logged: the first, the tenth, the hundredth, ..."""
         known = self._senders.pop(sender, None) or _Sender(name)
         self._senders[sender] = known
-        known.name, known.reason, known.newest_at = name, _printable(reason), now
+        known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _LONGEST)), now
         known.count += 1
         if known.count in _LOGGED:
             _logger.warning("%s", _sentence(known))
@@ -88,8 +89,3 @@ def who_sends(routing_id: str, node_name: str | None, peer: str) -> tuple[str, s
 def _sentence(sender: _Sender) -> str:
     times = "once" if sender.count == 1 else f"{sender.count} times so far"
     return f"{sender.name} sends what the master does not understand ({times}): {sender.reason}"
-
-
-def _printable(reason: str) -> str:
-    cut = reason if len(reason) <= _LONGEST else f"{reason[:_LONGEST]}…"
-    return "".join(letter if letter.isprintable() else "·" for letter in cut)

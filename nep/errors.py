@@ -4,6 +4,7 @@
     ├── WaitTimeoutError        nothing came within a time limit
     ├── ClosedError             the object was closed before
     ├── BadTopicError           a topic name that the grammar refuses
+    ├── BadNameError            a node's name that the grammar refuses
     ├── UnknownBackendError     no back end has this name
     ├── BackendUnavailableError the back end's package is not installed
     ├── PluginsMissingError     a plug-in package is empty (a frozen build that forgot it)
@@ -23,9 +24,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from difflib import get_close_matches
 
+from nep.text import escaped, shortened
+
 __all__ = [
     "AddressInUseError",
     "BackendUnavailableError",
+    "BadNameError",
     "BadTopicError",
     "ClosedError",
     "DecodeError",
@@ -40,6 +44,9 @@ __all__ = [
     "WireError",
     "did_you_mean",
 ]
+
+_LONGEST = 500
+"""Letters of a reason that somebody else gave."""
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
@@ -77,7 +84,16 @@ class BadTopicError(NepError, ValueError):
     def __init__(self, topic: str, reason: str) -> None:
         self.topic = topic
         self.reason = reason
-        super().__init__(f"'{topic}' cannot be a topic; {reason}")
+        super().__init__(f"'{escaped(topic)}' cannot be a topic; {reason}")
+
+
+class BadNameError(NepError, ValueError):
+    """`name` cannot be the name of a node, for `reason`."""
+
+    def __init__(self, name: str, reason: str) -> None:
+        self.name = name
+        self.reason = reason
+        super().__init__(f"'{escaped(shortened(name, 200))}' cannot be a node's name; {reason}")
 
 
 class UnknownBackendError(NepError):
@@ -125,8 +141,8 @@ class RequestRefusedError(NepError):
     """The master refused a request; `reason` is its sentence."""
 
     def __init__(self, reason: str) -> None:
-        self.reason = reason
-        super().__init__(reason)
+        self.reason = escaped(shortened(reason, _LONGEST))
+        super().__init__(self.reason)
 
 
 class AddressInUseError(NepError):
@@ -156,7 +172,7 @@ class DecodeError(NepError, ValueError):
     def __init__(self, codec: str, size_bytes: int, reason: str) -> None:
         self.codec = codec
         self.size_bytes = size_bytes
-        self.reason = reason
+        self.reason = reason = escaped(shortened(reason, _LONGEST))  # it may repeat what a stranger wrote
         super().__init__(f"cannot decode {size_bytes} bytes as '{codec}'; {reason}")
 
 

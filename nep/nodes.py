@@ -19,13 +19,13 @@ from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpe
 from nep.backends.choosing import backend_named
 from nep.codecs import codec_for
 from nep.configuration import Configuration, Direct, Hybrid, checked_mode, checked_port
-from nep.errors import ClosedError, DecodeError, NepError
+from nep.errors import ClosedError, DecodeError
 from nep.graph import GraphView
 from nep.inbox import MAX_MESSAGES, Keep
 from nep.logs import LogHandler, handler_of
 from nep.pubsub import SLICE_S, Publisher, Subscriber
 from nep.records import NodeRecord
-from nep.wire import check_topic
+from nep.wire import check_node_name, check_topic
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -45,7 +45,7 @@ class Node:
     `transport` names a back end: "zeromq" (also "ZMQ"), "memory" (nodes of this process only). `master` is
     the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`: how long `new_pub` and
     `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for ever. Raises
-    `UnknownBackendError`.
+    `UnknownBackendError` and `BadNameError`.
     """
 
     def __init__(
@@ -57,9 +57,7 @@ class Node:
         wait_s: float | None = 2.0,
         generation: str = "native",
     ) -> None:
-        if not name or len(name.encode("utf-8", "replace")) > 200:
-            raise NepError(f"'{name}' cannot be a node's name; use 1 to 200 letters")
-        self.name = name
+        self.name = check_node_name(name)
         self.id = secrets.token_hex(8)
         self._backend = backend_named(transport)
         self._master = master or ("memory" if self._backend.name == "memory" else master_address())

@@ -13,8 +13,9 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from nep.errors import BadTopicError, WireError
+from nep.errors import BadNameError, BadTopicError, WireError
 from nep.packing import pack, unpack
+from nep.text import control_in
 
 __all__ = [
     "BYE",
@@ -27,6 +28,7 @@ __all__ = [
     "Header",
     "Hello",
     "apart",
+    "check_node_name",
     "check_size",
     "check_topic",
     "extension_part",
@@ -45,6 +47,7 @@ __all__ = [
 VERSION = 1
 HEADER_BYTES = 32
 TOPIC_MAX_BYTES = 200
+NODE_NAME_MAX_BYTES = 200
 SUBSCRIPTION_MAX_BYTES = 4096
 """Whoever subscribes more is disconnected: libzmq keeps some forty bytes for each of them."""
 
@@ -112,9 +115,26 @@ def check_topic(topic: str) -> str:
     if not 1 <= size <= TOPIC_MAX_BYTES:
         raise BadTopicError(topic, f"it has {size} bytes, 1 to {TOPIC_MAX_BYTES} are allowed")
     for letter in topic:
-        if letter.isspace() or letter == "{" or not (letter.isprintable() or ord(letter) > 0x9F):
+        if letter.isspace() or letter == "{":
             raise BadTopicError(topic, f"the character '{ascii(letter)[1:-1]}' is not allowed in it")
+    if control := control_in(topic):
+        raise BadTopicError(topic, f"the character '{control}' is not allowed in it")
     return topic
+
+
+def check_node_name(name: str) -> str:
+    """`name` itself when a node may have it: 1 to 200 bytes of UTF-8 and nothing that controls.
+
+    Raises `BadNameError` with the reason.
+    """
+    if not isinstance(name, str):
+        raise BadNameError(str(name), "a name is a 'str'")
+    if control := control_in(name):
+        raise BadNameError(name, f"the character '{control}' is not allowed in it")
+    size = len(name.encode("utf-8"))
+    if not 1 <= size <= NODE_NAME_MAX_BYTES:
+        raise BadNameError(name, f"it has {size} bytes, 1 to {NODE_NAME_MAX_BYTES} are allowed")
+    return name
 
 
 def topic_part(topic: str) -> bytes:

@@ -1,0 +1,86 @@
+"""Letters that control: refused in names, readable where they are shown."""
+
+from __future__ import annotations
+
+import unicodedata
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nep
+from nep.errors import DecodeError, RequestRefusedError
+from nep.text import control_in, escaped, shortened
+from nep.wire import check_node_name, check_topic
+
+CONTROLS = [
+    *map(chr, range(0x20)),
+    "\x7f",
+    *map(chr, range(0x80, 0xA0)),
+    *"\u2028\u2029\u202a\u202b\u202d\u202e",
+]
+CONTROLS += [*"\u2066\u2067\u2068\u2069\u200e\u200f\u061c\u200b\ufeff", "\ud800", "\udfff"]
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=ascii)
+def test_a_name_with_a_letter_that_controls_is_refused_and_the_sentence_can_be_shown(control: str) -> None:
+    name = f"arm{control}2"
+    assert control_in(name) == ascii(control)[1:-1]
+    with pytest.raises(nep.BadNameError, match="cannot be a node's name") as bad_name:
+        nep.node(name)
+    with pytest.raises(nep.BadTopicError) as bad_topic:
+        check_topic(f"/{name}")
+    for raised in (bad_name, bad_topic):
+        assert control not in str(raised.value)
+        str(raised.value).encode("utf-8")
+
+
+def test_a_name_has_one_to_two_hundred_bytes() -> None:
+    for good in (
+        "a",
+        "Pepper 2",
+        "Ärm",
+        "机器人",
+        "قلم",
+        "می‌خواهم",
+        "👩‍🚀",
+        "x" * 200,
+        "é" * 100,
+        "{}",
+        "<img>",
+    ):
+        assert check_node_name(good) == good
+    for bad in ("", "x" * 201, "é" * 101, "a" * 1_000_000):
+        with pytest.raises(nep.BadNameError, match="1 to 200 are allowed") as raised:
+            check_node_name(bad)
+        assert len(str(raised.value)) < 400
+
+
+@given(st.text(st.characters(categories=["L", "N", "P", "S", "Zs", "Cc", "Cf", "Cs", "Zl", "Zp"])))
+def test_what_is_escaped_moves_no_cursor_and_has_one_line(text: str) -> None:
+    shown = escaped(text)
+    assert not control_in(shown)
+    assert not any(unicodedata.category(letter) in {"Cc", "Cs", "Zl", "Zp"} for letter in shown)
+    assert len(shown.splitlines()) <= 1
+    shown.encode("utf-8")
+    if not control_in(text):
+        assert shown == text
+
+
+def test_lines_stay_lines_where_they_may() -> None:
+    assert escaped("a\n\tb\x1b[2J\r\x85c", lines=True) == "a\n\tb\\x1b[2J\\r\\x85c"
+    assert escaped("a\nb") == "a\\nb"
+
+
+def test_what_a_stranger_wrote_is_cleaned_and_cut_in_errors() -> None:
+    for error in (
+        DecodeError("json", 3, "no \x1b]0;title\x07" + "x" * 9999),
+        RequestRefusedError("\x9b2J" * 999),
+    ):
+        assert not control_in(str(error))
+        assert len(str(error)) < 6 * 500 + 100
+
+
+def test_a_long_text_is_cut_and_says_so() -> None:
+    assert shortened("abc", 3) == "abc"
+    assert shortened("abcd", 3) == "abc… (4 characters)"
