@@ -10,8 +10,8 @@ from app.robots.calls import Call
 from app.robots.inputs import near_miss
 from app.robots.members import as_part, text
 from app.robots.parts import Action, Robot
-from app.robots.task import Answer, Task
-from app.robots.tasks import Tasks, still_moving
+from app.robots.task import Answer, Program, Task
+from app.robots.tasks import NOTHING_RUNS, Tasks, still_moving
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 _LONGEST_ID = 200
@@ -26,11 +26,16 @@ class Desk:
         self._open: set[str] = set()
         self._ended: deque[str] = deque(maxlen=_ENDED_KEPT)
 
-    def receive(self, command: object) -> None:
-        """One message of the command topic; whatever it is, it is answered or has no id to answer to."""
+    def receive(self, command: object, publisher: int | None = None) -> None:
+        """One message of the command topic; whatever it is, it is answered or has no id to answer to.
+
+        `publisher` is the id of the publisher that it came from: signs of life and cancels count only from
+        the one that asked. A stop counts from everybody.
+        """
         message = as_part(command)
         wanted = text(message.get("id"))
-        program = text(message.get("from"))
+        name = text(message.get("from"))
+        program = None if name is None else Program(name, publisher)
         operation = message.get("op")
         if program is not None:
             self._tasks.sign_of_life(program, watch=operation == "invoke")
@@ -42,9 +47,10 @@ class Desk:
                 self._ended.append(ended)
             self._tasks.stop(self._answering(wanted, "stop", self._robot.safe_stop.action))
         elif operation == "cancel":
-            self._cancel(wanted, str(message.get("action") or ""))
+            self._cancel(wanted, str(message.get("action") or ""), publisher)
         elif operation == "invoke":
-            self._invoke(wanted, program, str(message.get("action") or ""), message.get("input"))
+            task = str(message.get("action") or ""), message.get("input")
+            self._invoke(wanted, *task, program, publisher)
         else:
             error = f"there is no “{operation}”; a command is invoke, cancel, stop or alive"
             self._answering(wanted, str(operation), "")(Answer("failed", error=error))
@@ -64,7 +70,8 @@ class Desk:
         action: Action,
         given: Mapping[str, object],
         answer: Callable[[Answer], None],
-        program: str | None = None,
+        program: Program | None = None,
+        publisher: int | None = None,
     ) -> Task:
         """The task that runs an action of the body with an input that has been checked."""
         typed = {name: _typed(action, name, value) for name, value in action.complete(given).items()}
@@ -84,6 +91,7 @@ class Desk:
             cancellable=action.cancellable,
             title=action.title,
             program=program,
+            publisher=publisher,
             goes_on=action.repeat_s is not None,
         )
 
@@ -91,11 +99,13 @@ class Desk:
         """The sentence for an action that the robot has not."""
         return f"{self._robot.name} can't “{name}”{near_miss(name, [a.name for a in self._robot.actions])}"
 
-    def _invoke(self, wanted: str, program: str | None, name: str, given: object) -> None:
+    def _invoke(
+        self, wanted: str, name: str, given: object, program: Program | None, publisher: int | None
+    ) -> None:
         if wanted in self._open:
             return  # the same command a second time
         answer = self._answering(wanted, "invoke", name)
-        if program in self._ended:
+        if program is not None and program.name in self._ended:
             # sent before its program was ended, come after the stop: it must not move the robot again
             answer(Answer("canceled", error="its program was stopped"))
             return
@@ -111,10 +121,12 @@ class Desk:
             answer(Answer("failed", error="; ".join(sentences)))
             return
         self._open.add(wanted)
-        self._tasks.submit(self.task(wanted, action, as_part(given), answer, program))
+        self._tasks.submit(self.task(wanted, action, as_part(given), answer, program, publisher))
 
-    def _cancel(self, wanted: str, name: str) -> None:
-        error = self._tasks.cancel(lambda task: task.id == wanted)
+    def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
+        error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
+        if error is not None and wanted in self._open and error == NOTHING_RUNS:
+            error = f"only who asked for “{name or wanted}” can cancel it; a stop is for everybody"
         if error is not None:
             self._answering(wanted, "cancel", name)(Answer("failed", error=error))
 

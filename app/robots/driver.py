@@ -101,7 +101,7 @@ class Driver:
         dialect = Dialect(self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS))
         tasks.start()
         self._listen(self.robot.topics.command, "robot/command", desk.receive)
-        self._listen(RIZE_COMMANDS, "json", dialect.receive)
+        self._listen(RIZE_COMMANDS, "json", lambda message, _publisher: dialect.receive(message))
 
     def close(self) -> None:
         """Stop the robot, answer what is open, end its threads, leave the network. May be called twice."""
@@ -156,7 +156,9 @@ class Driver:
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
         """Call `changed` with every message of ``/<name>/world``, in the network's thread: be quick."""
-        self._subscribe(topic_of(self.name, "world"), "json", lambda payload: changed(as_part(payload)))
+        self._subscribe(
+            topic_of(self.name, "world"), "json", lambda payload, _publisher: changed(as_part(payload))
+        )
 
     # ---- topics -----------------------------------------------------------------------------------
 
@@ -176,16 +178,20 @@ class Driver:
         except nep.EncodeError as error:
             _log.warning("%s: nothing is published on '%s': %s", self.name, topic, error)
 
-    def _listen(self, topic: str, msg_type: str, receive: Callable[[object], None]) -> None:
-        def hand_over(payload: object) -> None:
+    def _listen(self, topic: str, msg_type: str, receive: Callable[[object, int | None], None]) -> None:
+        def hand_over(payload: object, publisher: int | None) -> None:
             tasks = self._tasks
-            # A flood of commands must not pile up without end; a stop always gets through.
-            if tasks is not None and (tasks.backlog < _BACKLOG or as_part(payload).get("op") == "stop"):
-                tasks.call_soon(partial(receive, payload))
+            if tasks is None:
+                return
+            # A flood of commands must not pile up without end. A stop gets through it; when as many again
+            # wait, they are stops, and the robot will stop without another one.
+            is_stop = as_part(payload).get("op") == "stop"
+            if tasks.backlog < _BACKLOG * (1 + is_stop):
+                tasks.call_soon(partial(receive, payload, publisher))
 
         self._subscribe(topic, msg_type, hand_over)
 
-    def _subscribe(self, topic: str, msg_type: str, use: Callable[[object], None]) -> None:
+    def _subscribe(self, topic: str, msg_type: str, use: Callable[[object, int | None], None]) -> None:
         def take(messages: Sequence[nep.Message]) -> None:
             for message in messages:
                 try:
@@ -195,6 +201,6 @@ class Driver:
                         self._unread.add(topic)
                         _log.warning("%s: a message on '%s' can't be read: %s", self.name, topic, error)
                 else:
-                    use(payload)
+                    use(payload, message.publisher)
 
         self._subscribers.append(self._node.new_sub(topic, msg_type, sink=take))

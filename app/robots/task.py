@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from app.robots.calls import Call
 
@@ -32,6 +32,16 @@ class Answer:
         return self.state in {"succeeded", "failed", "canceled"}
 
 
+class Program(NamedTuple):
+    """Who asks a robot to act: the name in ``from``, and the id of the publisher that the command came from.
+
+    Anybody can write another's name; only both together are the program that must stay alive.
+    """
+
+    name: str
+    publisher: int | None
+
+
 @dataclass(eq=False)
 class Task:
     """Something to run: `run` gets its :class:`Call` in a thread, `answer` is called in the deciding one.
@@ -39,6 +49,7 @@ class Task:
     `stopped` says that a stop of the robot told it to end; `answered` that its final answer was given, also
     while its function goes on.
     `program` asked for it and must stay alive while it runs; one that `goes_on` (a speed) also afterwards.
+    `publisher` is the id of the publisher that the command came from, also when it named no program.
     """
 
     id: str
@@ -50,7 +61,8 @@ class Task:
     timeout_s: float | None = None
     cancellable: bool = True
     title: str = ""
-    program: str | None = None
+    program: Program | None = None
+    publisher: int | None = None
     goes_on: bool = False
     call: Call | None = None
     thread: threading.Thread | None = None

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from app.robots.calls import Call, Canceled, Clock, Failed
-from app.robots.task import Answer, Task
+from app.robots.task import Answer, Program, Task
 from app.robots.watchdog import Watchdog
 
 BEAT_S = 0.5
@@ -24,6 +24,7 @@ when something goes on: well before Studio gives up (`app.core.runs.STOP_TIMEOUT
 _GRACE_S = 1.0
 """So long a function may take to put things away after a cancel, a time-out or one that takes its place."""
 _LONGEST_QUEUE = 50
+NOTHING_RUNS = "nothing with this id runs"
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
 
@@ -120,7 +121,7 @@ class Tasks:
         """End the tasks that are wanted; None when there was one, else a sentence."""
         found = [task for task in (*self._running, *self._queue) if wanted(task)]
         if not found:
-            return "nothing with this id runs"
+            return NOTHING_RUNS
         stubborn = [task for task in found if task in self._running and not task.cancellable]
         if stubborn:
             return f"{stubborn[0].action} can't be canceled; it ends by itself"
@@ -129,7 +130,7 @@ class Tasks:
             self._end(task, Answer("canceled"))
         return None
 
-    def sign_of_life(self, program: str, *, watch: bool) -> None:
+    def sign_of_life(self, program: Program, *, watch: bool) -> None:
         """A program said something; `watch` begins to expect more (it asked the robot to act)."""
         self._watchdog.hear(program, self._clock.now(), watch=watch)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from app.robots.task import Task
+from app.robots.task import Program, Task
 
 
 class Watchdog:
@@ -13,12 +13,12 @@ class Watchdog:
     def __init__(self, patience_s: float | None) -> None:
         """`patience_s` may pass without a sign of life; None never bites."""
         self.patience_s = patience_s
-        self._heard: dict[str, float] = {}
-        self._going_on: dict[str, str] = {}  # resource -> the program that left it in motion
+        self._heard: dict[Program, float] = {}
+        self._going_on: dict[str, Program] = {}  # resource -> the program that left it in motion
 
-    def hear(self, program: str, now: float, *, watch: bool) -> None:
+    def hear(self, program: Program, now: float, *, watch: bool) -> None:
         """A program said something; `watch` begins to expect more (it asked the robot to act)."""
-        if watch or program in self._heard:
+        if self.patience_s is not None and (watch or program in self._heard):
             self._heard[program] = now
 
     def begins(self, task: Task) -> None:
@@ -40,7 +40,7 @@ class Watchdog:
         """When to look again."""
         return [] if self.patience_s is None else [seen + self.patience_s for seen in self._heard.values()]
 
-    def bites(self, now: float, acting: Collection[str | None]) -> bool:
+    def bites(self, now: float, acting: Collection[Program | None]) -> bool:
         """Whether the robot is to stop; `acting` are the programs of what runs or waits now.
 
         A silent program for which nothing is done is forgotten: it may have ended long ago.

@@ -10,7 +10,9 @@ import nep
 from app.core.runs import STOP_TIMEOUT_S
 from app.robots.driver import Driver
 from app.robots.kit import Failed
+from app.robots.task import Program, Task
 from app.robots.tasks import STOP_ANSWER_S
+from app.robots.watchdog import Watchdog
 from tests.robots.conftest import TURTLE, Ears, eventually
 
 
@@ -288,6 +290,61 @@ def test_a_program_that_falls_silent_stops_the_robot(turtle):
     assert ears.final("1")["error"] == "no sign of life from its program for 1 s"
     eventually(lambda: body.stops == 1)
     assert not body.moving
+
+
+def test_a_forged_sign_of_life_keeps_no_robot_going(turtle, node):
+    body, ears, clock = turtle
+    attacker = node.new_pub("/Turtle/command", "robot/command")
+    ears.invoke("1", "move", program="p")
+    eventually(lambda: body.moving)
+    for number in range(3):
+        clock.advance(0.4)
+        attacker.publish({"op": "alive", "id": f"a{number}", "from": "p"})
+        attacker.publish({"op": "invoke", "id": f"i{number}", "action": "fail", "input": {}, "from": "p"})
+        ears.final(f"i{number}")  # the forged sign before it was taken
+    assert ears.final("1")["error"] == "no sign of life from its program for 1 s"
+    eventually(lambda: body.stops == 1)
+    assert not body.moving
+
+
+def test_a_forged_sign_of_life_keeps_no_speed_going():
+    """Also after the action: what it left in motion is its own program's, whoever writes its name."""
+    dog = Watchdog(1.0)
+    program, forger = Program("p", 1), Program("p", 2)
+    drive = Task(
+        "1", "drive", lambda _call: None, lambda _answer: None, ("base",), program=program, goes_on=True
+    )
+    dog.hear(program, 0.0, watch=True)
+    dog.ends_well(drive)
+    dog.hear(forger, 0.9, watch=True)
+    assert not dog.bites(0.95, [])
+    assert dog.bites(1.0, [])
+
+
+def test_only_who_asked_can_cancel_and_anybody_can_stop(turtle, node):
+    body, ears, _ = turtle
+    attacker = node.new_pub("/Turtle/command", "robot/command")
+    ears.invoke("1", "move", program="p")
+    eventually(lambda: body.moving)
+    attacker.publish({"op": "cancel", "id": "1", "action": "move", "from": "p"})
+    refused = ears.final("1", "cancel")
+    assert refused["error"] == "only who asked for “move” can cancel it; a stop is for everybody"
+    assert body.moving
+    attacker.publish({"op": "stop", "id": "s"})
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert not body.moving
+
+
+def test_a_flood_of_stops_is_bounded_and_stops(turtle, node):
+    body, ears, _ = turtle
+    body.may_stop.clear()
+    others = node.new_pub("/Turtle/command", "robot/command")
+    for number in range(6000):
+        others.publish({"op": "stop", "id": f"s{number}"})
+    body.may_stop.set()
+    ears.command(id="last", op="stop")
+    eventually(lambda: ears.command(id="last", op="stop") or ears.states("last"))
+    assert body.stops >= 1
 
 
 def test_programs_that_only_listen_or_have_stopped_are_not_watched(turtle):
