@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 
 import pytest
 
@@ -335,16 +336,21 @@ def test_only_who_asked_can_cancel_and_anybody_can_stop(turtle, node):
     assert not body.moving
 
 
-def test_a_flood_of_stops_is_bounded_and_stops(turtle, node):
-    body, ears, _ = turtle
-    body.may_stop.clear()
-    others = node.new_pub("/Turtle/command", "robot/command")
-    for number in range(6000):
-        others.publish({"op": "stop", "id": f"s{number}"})
-    body.may_stop.set()
-    ears.command(id="last", op="stop")
-    eventually(lambda: ears.command(id="last", op="stop") or ears.states("last"))
-    assert body.stops >= 1
+def test_a_flood_of_commands_or_stops_is_bounded_and_a_stop_gets_through(node, clock):
+    gate = threading.Event()
+    with nep.node("listener", "memory") as other, Driver(TURTLE, "Turtle", node, clock=clock) as driver:
+        ears = Ears(other, "Turtle")
+        tasks = driver._tasks
+        tasks.call_soon(gate.wait)
+        for number in range(2500):
+            ears.command(op="alive", id=f"a{number}")
+        assert tasks.backlog <= 2001
+        for number in range(2500):
+            ears.command(op="stop", id=f"s{number}")
+        assert tasks.backlog <= 4001
+        gate.set()
+        assert ears.final("s0", "stop")["state"] == "succeeded"
+        assert driver.body.stops >= 1
 
 
 def test_programs_that_only_listen_or_have_stopped_are_not_watched(turtle):
