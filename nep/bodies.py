@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from nep.collecting import collecting_later
 from nep.errors import WireError
-from nep.packing import pack, unpack
+from nep.packing import pack_surely, unpack
 from nep.plain import read, write
 from nep.requests import (
     Added,
@@ -78,7 +78,7 @@ class Asked(NamedTuple):
 
 def encode_request(request: Request, call: int) -> bytes:
     """The body of a request."""
-    return pack({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
+    return pack_surely({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
 
 
 def decode_request(body: bytes) -> Asked:
@@ -100,7 +100,7 @@ def decode_request(body: bytes) -> Asked:
 
 def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
     """The body of a reply to `call`, or of a push."""
-    return pack({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
+    return pack_surely({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
 
 
 def decode_answer(body: bytes) -> tuple[int, Reply | Push]:

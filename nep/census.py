@@ -13,12 +13,17 @@ from nep.records import (
     RemotePublisher,
     SubscriberCount,
     SubscriberRecord,
+    as_count,
 )
 from nep.requests import RENEW_S
+from nep.text import escaped, shortened
 from nep.views import Alert
 
-__all__ = ["Census", "Member", "Publisher", "Subscriber"]
+__all__ = ["Census", "Member", "Publisher", "Subscriber", "as_ratio"]
 
+_CORES_MAX = 100_000.0
+_PROBLEM_MAX = 500
+"""Letters of the sentence about what a subscriber cannot read."""
 FADES_S = 12.0
 """So long after its last message a publisher's rate may still sink."""
 
@@ -205,19 +210,20 @@ class Census:
         now: float,
         cpu_ratio: float | None = None,
     ) -> None:
-        """Take over a node's statistics; it is alive."""
+        """Take over a node's statistics; it is alive. Numbers that can't be become the nearest."""
         member.renewed_at = now
-        member.cpu_ratio = cpu_ratio
+        member.cpu_ratio = as_ratio(cpu_ratio)
         member.hung.clear()
         for count in publishers:
             publisher = member.publishers[count.id]
             self.counted(publisher, count.count, count.bytes, now)
-            publisher.last_seq, publisher.last_stamp_ns = count.last_seq, count.last_stamp_ns
+            self.reached(publisher, count.last_seq, count.last_stamp_ns)
         for seen in subscribers:
             self.seen(member.subscribers[seen.id], seen.received, seen.lost, seen.problem)
 
     def counted(self, publisher: Publisher, count: int, size_bytes: int, now: float) -> None:
         """A publisher has sent so much until now."""
+        count, size_bytes = as_count(count), as_count(size_bytes)
         if count != publisher.count:
             publisher.changed_at = now
             publisher.count, publisher.bytes = count, size_bytes
@@ -226,8 +232,17 @@ class Census:
             self.touched.add(publisher.record.topic)
         publisher.meter.add(now, count, size_bytes)
 
+    def reached(self, publisher: Publisher, last_seq: int, last_stamp_ns: int | None) -> None:
+        """The number and the stamp of a publisher's newest message."""
+        publisher.last_seq = as_count(last_seq)
+        publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
+
     def seen(self, subscriber: Subscriber, received: int | None, lost: int | None, problem: str) -> None:
         """A subscriber has received so much until now."""
+        received = None if received is None else as_count(received)
+        lost = None if lost is None else as_count(lost)
+        if problem:
+            problem = escaped(shortened(problem, _PROBLEM_MAX))
         if received != subscriber.received or lost != subscriber.lost or problem != subscriber.problem:
             self.touched.add(subscriber.record.topic)
             subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
@@ -258,6 +273,11 @@ class Census:
         self.touched.add(topic)
         self.revision += 1
         self.publishers_revision = self._topic_revisions[topic] = self.revision
+
+
+def as_ratio(value: float | None) -> float | None:
+    """A share of a processor as somebody told it; None for what can be none."""
+    return value if value is not None and 0.0 <= value < _CORES_MAX else None
 
 
 def _take_out(table: dict[str, dict[int, Member]], topic: str, known: int) -> None:

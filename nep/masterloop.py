@@ -13,7 +13,7 @@ from dataclasses import replace
 import zmq
 
 from nep.badrequests import BadRequests, who_sends
-from nep.bodies import Asked, decode_request
+from nep.bodies import Asked, decode_request, encode_answer
 from nep.collecting import collecting_later
 from nep.errors import ClosedError, NepError, WaitTimeoutError
 from nep.graph import Graph, GraphView
@@ -30,6 +30,7 @@ from nep.waker import Waker
 __all__ = ["MasterLoop"]
 
 _logger = logging.getLogger("nep.master")
+_LOGGED = frozenset(10**n for n in range(20))
 _TICK_S = 0.25
 _REST_MS = 10
 _NODES_PER_MS = 50
@@ -71,6 +72,7 @@ class MasterLoop:
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
         self._listening = Listening(self._port.socket, int(self.address.rpartition(":")[2]))
         self._follow_at = 0.0
+        self._failures = 0
 
     # ---- from other threads
 
@@ -113,23 +115,40 @@ class MasterLoop:
                     polled.append((self._port.socket, int(zmq.POLLIN)))
                 zmq.zmq_poll(polled, self._until(tick_at))
                 self._waker.clear()
-                self._serve_submissions()
-                if len(polled) > 1:
-                    self._serve_router()
-                    if self._renewals and self._rest_from_renewals(waker):
-                        self._serve_router()
-                    self._answer_renewals()
                 now = time.monotonic()
                 due = self._graph.learning_end
-                if now >= tick_at or (due is not None and now >= due):
+                is_due = now >= tick_at or (due is not None and now >= due)
+                if is_due:
                     tick_at = now + _TICK_S
-                    self._tick(now)
-                self._tell_listeners(now)
+                try:
+                    self._turn(waker, is_due=is_due)
+                except Exception as error:  # noqa: BLE001 - logged; one program must not end the others
+                    self._failed(error, "something in its turn")
         finally:
             self.ended.set()
             self._release()
             for submission in (*self._submitted, *self._pending.values()):
                 submission.done.set()
+
+    def _turn(self, waker: tuple[int, int], *, is_due: bool) -> None:
+        """Serve all that came, then what time brings."""
+        self._serve_submissions()
+        if self._is_open:
+            self._serve_router()
+            if self._renewals and self._rest_from_renewals(waker):
+                self._serve_router()
+            self._answer_renewals()
+        now = time.monotonic()
+        if is_due:
+            self._tick(now)
+        self._tell_listeners(now)
+
+    def _failed(self, error: Exception, what: str) -> None:
+        """Log what went wrong; rarely, when it does again and again."""
+        self._failures += 1
+        if self._failures in _LOGGED:
+            sentence = "the master could not carry out %s (%d times so far)"
+            _logger.error(sentence, what, self._failures, exc_info=error)
 
     def _rest_from_renewals(self, waker: tuple[int, int]) -> bool:
         """With hundreds of nodes, let renewals gather: waking up costs more than answering one."""
@@ -189,12 +208,20 @@ class MasterLoop:
     def _answer_renewals(self) -> None:
         """All of them, then all answers: so the network's thread is woken once, too."""
         renewals, self._renewals = self._renewals, []
-        answers = [self._renew_quickly(sender, body) for sender, body in renewals]
+        answers = [self._renew_safely(sender, body) for sender, body in renewals]
         for (sender, body), answer in zip(renewals, answers, strict=True):
             if answer is None:
                 self._serve(sender, [body], "")
             elif not self._port.send(sender, answer):
                 self._send(self._graph.drop((_name_of(sender),)))
+
+    def _renew_safely(self, sender: bytes, body: bytes) -> bytes | None:
+        """As `_renew_quickly`; what fails takes the usual way, which answers it."""
+        try:
+            return self._renew_quickly(sender, body)
+        except Exception as error:  # noqa: BLE001 - logged; the others are renewed
+            self._failed(error, "a renewal")
+            return None
 
     def _renew_quickly(self, sender: bytes, body: bytes) -> bytes | None:
         """The answer to a usual renewal; None when it is something else."""
@@ -238,11 +265,9 @@ class MasterLoop:
                     self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
             else:
                 self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
-        except Exception:  # one request must never end the master
-            _logger.exception("the master could not carry out a request")
-            reason = "the master could not carry this out; its log says why"
-            refused = Refused(self._graph.epoch, self._graph.revision, reason)
-            self._send((Outgoing(sender, refused, asked.call),))
+        except Exception as error:  # noqa: BLE001 - logged; one request must never end the master
+            self._failed(error, "a request")
+            self._send((Outgoing(sender, self._refused(), asked.call),))
 
     def _listen(self, request: Listen) -> Reply:
         try:
@@ -272,8 +297,18 @@ class MasterLoop:
     def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
         """Send one answer; False when its node has no connection any more."""
         answer = with_hosts(without(each.answer, dead), self._listening.hosts)
-        body = self._views.body(answer, each.call or 0)
+        try:
+            body = self._views.body(answer, each.call or 0)
+        except Exception as error:  # noqa: BLE001 - logged; the others get theirs, who asked gets an answer
+            self._failed(error, "an answer")
+            if each.call is None:
+                return True
+            body = encode_answer(self._refused(), each.call)
         return self._port.send(each.to.encode("utf-8", "surrogateescape"), body)
+
+    def _refused(self) -> Refused:
+        reason = "the master could not carry this out; its log says why"
+        return Refused(self._graph.epoch, self._graph.revision, reason)
 
     def _tell_listeners(self, now: float) -> None:
         """With many nodes that come at once, not after each: telling shall not take most of the time."""

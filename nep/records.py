@@ -4,6 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+COUNT_MAX = 2**63 - 1
+"""Counters stop here: every language and every encoding has room for it."""
+
+
+def as_count(value: int) -> int:
+    """A number that somebody told as a counter: 0 to `COUNT_MAX`, whatever it was."""
+    return value if 0 <= value <= COUNT_MAX else 0 if value < 0 else COUNT_MAX
+
 
 @dataclass(frozen=True)
 class NodeRecord:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from nep.census import Census, Member
-from nep.packing import pack, unpack
+from nep.census import Census, Member, as_ratio
+from nep.packing import pack_surely, unpack
 from nep.requests import RENEW_S, Renew
 
 __all__ = ["RenewalSaid", "is_renewal", "read_renewal", "renewed_body", "same_ids", "take_over"]
@@ -90,13 +90,13 @@ def _take_over(census: Census, member: Member, said: RenewalSaid, now: float) ->
         if stamp_ns is not None and type(stamp_ns) is not int:
             return False
         census.counted(publisher, count, size_bytes, now)
-        publisher.last_seq, publisher.last_stamp_ns = last_seq, stamp_ns
+        census.reached(publisher, last_seq, stamp_ns)
     for seen in said.subscribers:
         received, lost, problem = seen["received"], seen["lost"], seen.get("problem", "")
         if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
             return False
         census.seen(subscribers[seen["id"]], received, lost, problem)
-    member.renewed_at, member.cpu_ratio = now, said.cpu_ratio
+    member.renewed_at, member.cpu_ratio = now, as_ratio(said.cpu_ratio)
     if member.hung:
         member.hung.clear()
     return True
@@ -116,4 +116,4 @@ def renewed_body(
         what["hosts"] = hosts
     if next_s != RENEW_S:
         what["next_s"] = next_s
-    return pack({"is": "renewed", "re": call, "what": what})
+    return pack_surely({"is": "renewed", "re": call, "what": what})

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from nep.census import Census, Member, Publisher, Subscriber
 from nep.plain import made
+from nep.records import as_count
 from nep.views import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 __all__ = ["Viewer"]
@@ -85,7 +86,7 @@ def _look_at(
     for member, subscriber in subscribing:
         subscribers.append(_subscriber_info(member, subscriber))
         if subscriber.lost is not None:
-            lost = (lost or 0) + subscriber.lost
+            lost = as_count((lost or 0) + subscriber.lost)
             received += subscriber.received or 0
     every_field: dict[str, object] = {
         "name": name,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgpack  # type: ignore[import-untyped]
 
 from nep.bodies import encode_answer
-from nep.packing import pack
+from nep.packing import pack_surely, saturated
 from nep.plain import write
 from nep.requests import Push, Reply, Seen
 from nep.views import NodeInfo, TopicInfo
@@ -17,7 +17,7 @@ class ViewPacker:
     """Keeps the bytes of each node and topic as long as its value is the same."""
 
     def __init__(self) -> None:
-        self._pack = msgpack.Packer(use_bin_type=True, default=vars).pack
+        self._pack = msgpack.Packer(use_bin_type=True, unicode_errors="replace", default=_plain).pack
         self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
 
     def body(self, answer: Reply | Push, call: int) -> bytes:
@@ -40,15 +40,15 @@ class ViewPacker:
         return b"".join(
             (
                 header(3),
-                *map(pack, ("is", "seen", "re", call, "what")),
+                *map(pack_surely, ("is", "seen", "re", call, "what")),
                 header(3),
-                *map(pack, ("epoch", answer.epoch, "revision", answer.revision, "view")),
+                *map(pack_surely, ("epoch", answer.epoch, "revision", answer.revision, "view")),
                 header(len(rest) + 2),
-                *(pack(key) + pack(item) for key, item in rest.items()),
-                pack("nodes"),
+                *(pack_surely(key) + pack_surely(item) for key, item in rest.items()),
+                pack_surely("nodes"),
                 header(len(nodes)),
                 *nodes,
-                pack("topics"),
+                pack_surely("topics"),
                 header(len(topics)),
                 *topics,
             )
@@ -63,3 +63,8 @@ class ViewPacker:
         packed: bytes = self._pack(key) + self._pack(vars(value))
         self._parts[name] = (value, packed)
         return packed
+
+
+def _plain(value: object) -> object:
+    """What msgpack does not know: our own values, and numbers beyond its own."""
+    return saturated(value) if isinstance(value, int) else vars(value)

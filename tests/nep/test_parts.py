@@ -236,3 +236,35 @@ def test_the_public_names_are_there() -> None:
     assert isinstance(nep, ModuleType)
     for name in nep.__all__:
         assert getattr(nep, name) is not None
+
+
+def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
+    sources = Sources()
+    sources.reached(1, 0)
+    assert sources.arrived(1, 1, is_resent=False)
+    with pytest.raises(nep.errors.WireError, match="its number leaps from 1 to 18446744073709551615"):
+        sources.arrived(1, 2**64 - 1, is_resent=False)
+    assert not sources.reached(1, 2**64 - 1)
+    sources.get(1).has_echoed = True
+    for _ in range(3):
+        sources.promised(1, 2**64 - 1)
+    assert sources.arrived(1, 3, is_resent=False)
+    assert (sources.received, sources.lost, sources.get(1).last) == (2, 1, 3)
+
+
+def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
+    sources = Sources()
+    assert sources.arrived(1, 1, is_resent=False)
+    far = 1 + 2**32 + 1
+    with pytest.raises(nep.errors.WireError):
+        sources.arrived(1, far, is_resent=False)
+    assert sources.arrived(1, far + 1, is_resent=False)
+    assert sources.arrived(1, far + 3, is_resent=False)
+    assert (sources.received, sources.lost) == (3, 1)
+
+
+def test_the_largest_gap_that_can_be_is_counted() -> None:
+    sources = Sources()
+    assert sources.arrived(1, 1, is_resent=False)
+    assert sources.arrived(1, 1 + 2**32, is_resent=False)
+    assert sources.lost == 2**32 - 1

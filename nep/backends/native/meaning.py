@@ -63,11 +63,14 @@ class Meaning:
 
     def _notice(self, header: Header) -> None:
         """An echo, or the last word of a publisher that closes."""
-        self._sources.reached(header.publisher, header.seq)
+        last = self._sources.get(header.publisher).last
+        is_possible = self._sources.reached(header.publisher, header.seq)
         if header.flags & BYE:
             self._leave(header.publisher)
         else:
             self._sources.get(header.publisher).has_echoed = True
+        if not is_possible:
+            raise WireError(f"its publisher's number leaps from {last} to {header.seq}")
 
     def _message(self, header: Header, rest: Sequence[_Part], *, is_resent: bool) -> Message | None:
         codec = codec_numbered(header.codec)

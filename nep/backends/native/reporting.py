@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 
 from nep.backends.base import SubscriberSpec
 from nep.backends.native.readable import Readable
-from nep.records import SubscriberCount
+from nep.records import SubscriberCount, as_count
 
 __all__ = ["R", "Reporting"]
 
@@ -43,4 +43,5 @@ class Reporting(Generic[R]):
     def counts(self) -> SubscriberCount:
         """The statistics for a renewal."""
         problem = self._problem or self._readable.refusals.told()
-        return SubscriberCount(self.spec.id, self.received, self.lost, problem)
+        lost = None if self.lost is None else as_count(self.lost)
+        return SubscriberCount(self.spec.id, as_count(self.received), lost, problem)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nep.errors import WireError
 from nep.message import Kind, kind_of
 from nep.records import RemotePublisher
 
@@ -11,6 +12,8 @@ __all__ = ["Source", "Sources"]
 
 FAREWELL_S = 3.0
 """So long after a publisher has unregistered its last messages may still come."""
+GAP_MAX = 2**32
+"""More messages than these nobody misses at once: an hour of a million a second."""
 _UNKNOWN = kind_of("", "", "")
 
 
@@ -32,6 +35,8 @@ class Source:
     final: int = 0
     promised: int = 0
     written_off: int = 0
+    leapt_to: int = 0
+    """The number of a message that was refused because too many would be missing before it; else 0."""
 
 
 class Sources:
@@ -63,9 +68,20 @@ class Sources:
         return list(self.by_id.items())
 
     def arrived(self, publisher: int, seq: int, *, is_resent: bool) -> bool:
-        """A message arrived; False when it is one that was heard already and only sent again (latched)."""
+        """A message arrived; False when it is one that was heard already and only sent again (latched).
+
+        Raises `WireError` when more than `GAP_MAX` would be missing before it. A publisher that goes on from
+        there counts anew: nobody knows then how many are missing.
+        """
         source = self.get(publisher)
         last = source.last
+        if last is not None and seq - last > GAP_MAX:
+            if not source.leapt_to or source.leapt_to != seq - 1:
+                source.leapt_to = seq
+                raise WireError(f"its number leaps from {last} to {seq}")
+            source.leapt_to, source.promised, source.last = 0, 0, seq
+            self.received += 1
+            return True
         if last is None or seq > last:
             if last is not None and not is_resent:
                 self.lost += seq - last - 1
@@ -78,13 +94,19 @@ class Sources:
         self.received += 1
         return True
 
-    def reached(self, publisher: int, seq: int) -> None:
-        """An echo or a bye: messages up to `seq` were sent before it, on the same connection."""
+    def reached(self, publisher: int, seq: int) -> bool:
+        """An echo or a bye: messages up to `seq` were sent before it, on the same connection.
+
+        False when that cannot be, because more than `GAP_MAX` would be missing: nothing is counted then.
+        """
         source = self.get(publisher)
+        if source.last is not None and seq - source.last > GAP_MAX:
+            return False
         if source.last is not None and seq > source.last:
             self.lost += seq - source.last
         if source.last is None or seq > source.last:
             source.last = seq
+        return True
 
     def promised(self, publisher: int, seq: int) -> None:
         """The master says that `seq` was sent. Nothing waits in the socket.
@@ -93,7 +115,7 @@ class Sources:
         taken off again.
         """
         source = self.by_id.get(publisher)
-        if source is None or source.last is None or not source.has_echoed:
+        if source is None or source.last is None or not source.has_echoed or seq - source.last > GAP_MAX:
             return
         if source.promised > source.last:
             missing = source.promised - source.last
