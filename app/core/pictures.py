@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from nep import images
-from nep.errors import DecodeError, NepError
+from nep.errors import NepError
+from nep.image_files import examine
 from nep.message import Message
 
 if TYPE_CHECKING:
@@ -15,11 +15,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Size = tuple[int, int]
-Pixel = int | tuple[int, int, int]
-RAW_CHANNELS = {"bgr8": 3, "rgb8": 3, "mono8": 1}
+Pixel = int | float | tuple[int, int, int]
 REDUCED = (8, 4, 2)
-MOST_PIXELS = 120_000_000
-"""More than any camera has; decoding takes up to four bytes of memory for each, whatever was sent."""
+PNG_NUMBERS = ("uint8", "uint16")
+STRIP_ROWS = 64
+AVERAGED = ("uint8", "uint16")
+"""Numbers whose mean says the same as they do; of others, which may be none at all (NaN), some are taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +52,8 @@ class Picture:
         if not (self.whole and 0 <= x < self.width and 0 <= y < self.height):
             return None
         if self.numbers is not None:
-            return int(self.numbers[y, x])
+            number: int | float = self.numbers[y, x].item()
+            return number
         blue, green, red = (int(value) for value in self.bgra[y, x, :3])
         return red, green, blue
 
@@ -87,13 +89,17 @@ def _short(error: BaseException) -> str:
 def png_of(message: Message) -> bytes:
     """The whole picture as a PNG file, as it was received. Raises NepError, or OSError when it can't be made.
 
-    A message that is a PNG already is taken as it is.
+    A message that is a PNG already is taken as it is, but for what is beside its picture.
     """
     import cv2  # noqa: PLC0415  heavy
 
-    if message.extension.get("encoding") == "png" or bytes(message.data[:4]) == b"\x89PNG":
-        return bytes(message.data)
+    if images.raw_layout(message.extension.get("encoding")) is None:
+        file = examine(message.data)
+        if file.kind == "png":
+            return bytes(file.data)
     frame, _size = _frame(message, None)
+    if frame.dtype not in PNG_NUMBERS:
+        raise OSError(f"a PNG has no numbers of the type {frame.dtype}")
     good, data = cv2.imencode(".png", frame)
     if not good:
         raise OSError(f"a picture of {frame.shape} can't be written as PNG")
@@ -101,61 +107,34 @@ def png_of(message: Message) -> bytes:
 
 
 def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
-    """The picture as OpenCV has it (grey, BGR or BGRA; 8 or 16 bits), perhaps smaller, and its whole size."""
+    """The picture as OpenCV has it (grey, BGR or BGRA; any numbers), perhaps smaller, and its whole size."""
+    layout = images.raw_layout(message.extension.get("encoding"))
+    if layout is not None:
+        frame = images.raw_array(message.data, layout, message.extension.get("shape"))
+        size = (frame.shape[1], frame.shape[0])
+        frame = _smaller(frame, _factor(size, fit))
+        if layout.is_red_first:
+            frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
+        return frame, size
+    file = examine(message.data)
+    size = (file.width, file.height)
+    factor = _factor(size, fit)
+    if file.kind == "jpeg":
+        return images.read_file(file, factor), size
+    return _smaller(images.read_file(file), factor), size
+
+
+def _smaller(frame: NDArray[Any], factor: int) -> NDArray[Any]:
+    """The picture so many times smaller."""
     import cv2  # noqa: PLC0415
-    import numpy as np  # noqa: PLC0415
 
-    encoding = message.extension.get("encoding")
-    if isinstance(encoding, str) and encoding in RAW_CHANNELS:
-        whole = _raw(message, encoding)
-        size = (whole.shape[1], whole.shape[0])
-        factor = _factor(size, fit)
-        if factor > 1:
-            small = (max(1, size[0] // factor), max(1, size[1] // factor))
-            whole = cv2.resize(whole, small, interpolation=cv2.INTER_AREA)
-        if encoding == "rgb8":
-            whole = cv2.cvtColor(whole, cv2.COLOR_RGB2BGR)
-        return whole, size
-    if not message.data.nbytes:
-        raise DecodeError("image", 0, "there is nothing in it")
-    shape = (images.picture_info(message.data) or {}).get("shape")
-    if isinstance(shape, list) and shape[0] * shape[1] > MOST_PIXELS:
-        raise DecodeError("image", message.size_bytes, f"{shape[1]} × {shape[0]} pixels are too many")  # noqa: RUF001
-    told = _told_size(message)
-    factor = _factor(told, fit) if told is not None else 1
-    flag = _flag(message, factor, cv2)
-    try:
-        frame = cv2.imdecode(np.frombuffer(message.data, np.uint8), flag)
-    except (cv2.error, MemoryError) as error:  # such as a head that tells of a million rows
-        raise DecodeError("image", message.size_bytes, _short(error)) from error
-    if frame is None:
-        raise DecodeError("image", message.size_bytes, "they are no picture that OpenCV reads")
-    if factor == 1 or told is None:
-        told = (frame.shape[1], frame.shape[0])
-    return frame, told
-
-
-def _raw(message: Message, encoding: str) -> NDArray[Any]:
-    import numpy as np  # noqa: PLC0415
-
-    channels = RAW_CHANNELS[encoding]
-    shape = message.extension.get("shape")
-    good = isinstance(shape, Sequence) and len(shape) >= 2 and all(isinstance(n, int) for n in shape)
-    if good and shape[0] * shape[1] * channels == message.size_bytes and min(shape[:2]) > 0:  # type: ignore[index]
-        flat = np.frombuffer(message.data, np.uint8)
-        rows, columns = shape[0], shape[1]  # type: ignore[index]
-        return flat.reshape((rows, columns) if channels == 1 else (rows, columns, channels))
-    return np.asarray(images.decode(message.data, message.extension))  # raises, with its sentence
-
-
-def _told_size(message: Message) -> Size | None:
-    """Width and height, as the message tells or as its first bytes do; None when nobody tells."""
-    shape = message.extension.get("shape")
-    if shape is None:
-        shape = (images.picture_info(message.data) or {}).get("shape")
-    if isinstance(shape, Sequence) and len(shape) >= 2 and all(isinstance(n, int) for n in shape[:2]):
-        return int(shape[1]), int(shape[0])
-    return None
+    if factor == 1:
+        return frame
+    small = (max(1, frame.shape[1] // factor), max(1, frame.shape[0] // factor))
+    if frame.dtype not in AVERAGED:
+        return frame[::factor, ::factor][: small[1], : small[0]]
+    smaller: NDArray[Any] = cv2.resize(frame, small, interpolation=cv2.INTER_AREA)
+    return smaller
 
 
 def _factor(size: Size, fit: Size | None) -> int:
@@ -166,31 +145,68 @@ def _factor(size: Size, fit: Size | None) -> int:
     return next((factor for factor in REDUCED if shrink >= factor), 1)
 
 
-def _flag(message: Message, factor: int, cv2: Any) -> int:  # noqa: ANN401  a module
-    """How OpenCV is to read: a PNG with one channel keeps its numbers."""
-    if factor > 1:
-        found = {2: cv2.IMREAD_REDUCED_COLOR_2, 4: cv2.IMREAD_REDUCED_COLOR_4, 8: cv2.IMREAD_REDUCED_COLOR_8}
-        return int(found[factor])
-    head = bytes(message.data[:26])
-    grey_png = head.startswith(b"\x89PNG") and len(head) == 26 and head[25] == 0
-    return int(cv2.IMREAD_UNCHANGED if grey_png else cv2.IMREAD_COLOR)
-
-
 def _bgra(frame: NDArray[Any]) -> tuple[Any, NDArray[Any] | None] | None:
     """As QImage reads it, and the numbers of one channel; None for what is no picture."""
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
 
     channels = 1 if frame.ndim == 2 else frame.shape[2] if frame.ndim == 3 else 0
-    if channels == 1 and frame.dtype == np.uint16:
-        grey = frame.reshape(frame.shape[:2])
-        shown = cv2.normalize(grey, np.zeros(grey.shape, np.uint8), 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
-        return cv2.cvtColor(cv2.applyColorMap(shown, cv2.COLORMAP_VIRIDIS), cv2.COLOR_BGR2BGRA), grey
-    if frame.dtype != np.uint8 or 0 in frame.shape:
+    if not 1 <= channels <= 4 or 0 in frame.shape:
         return None
     if channels == 1:
         grey = frame.reshape(frame.shape[:2])
-        return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGRA), grey
-    if channels == 3:
-        return cv2.cvtColor(frame, cv2.COLOR_BGR2BGRA), None
-    return (np.ascontiguousarray(frame), None) if channels == 4 else None
+        if frame.dtype == np.uint8:
+            return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGRA), grey
+        return _coloured(grey), grey
+    if frame.dtype != np.uint8:
+        frame = _eight_bits(frame)
+    if channels == 2:  # such as a field of vectors: as blue and green
+        frame = np.dstack([frame, np.zeros(frame.shape[:2], np.uint8)])
+    if channels == 4:
+        return np.ascontiguousarray(frame), None
+    return cv2.cvtColor(np.ascontiguousarray(frame), cv2.COLOR_BGR2BGRA), None
+
+
+def _coloured(grey: NDArray[Any]) -> NDArray[np.uint8]:
+    """One channel of many values in false colours, from the smallest to the largest; black where is none."""
+    import cv2  # noqa: PLC0415
+    import numpy as np  # noqa: PLC0415
+
+    known = np.isfinite(grey)
+    shown = _scaled(grey, known)
+    bgra = cv2.cvtColor(cv2.applyColorMap(shown, cv2.COLORMAP_VIRIDIS), cv2.COLOR_BGR2BGRA)
+    if not known.all():
+        bgra[~known] = (0, 0, 0, 255)
+    return np.asarray(bgra, np.uint8)
+
+
+def _eight_bits(frame: NDArray[Any]) -> NDArray[np.uint8]:
+    """Colours of more than 8 bits: 16 bits by their range, floats of 0 to 1, others by what they hold."""
+    import numpy as np  # noqa: PLC0415
+
+    if frame.dtype == np.uint16:
+        return (frame >> 8).astype(np.uint8)
+    known = np.isfinite(frame)
+    values = frame[known]
+    if frame.dtype.kind == "f" and values.size and values.min() >= 0 and values.max() <= 1:
+        return np.asarray(np.where(known, frame, 0) * 255 + 0.5, np.uint8)
+    return _scaled(frame, known)
+
+
+def _scaled(frame: NDArray[Any], known: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Its values from 0, the smallest, to 255, the largest; 0 where a value is not known."""
+    import numpy as np  # noqa: PLC0415
+
+    values = frame[known]
+    if not values.size:
+        return np.zeros(frame.shape, np.uint8)
+    low, high = float(values.min()), float(values.max())
+    shown = np.zeros(frame.shape, np.uint8)
+    span = high / 2 - low / 2  # halves: the distance of two floats may be no float any more
+    if span <= 0:
+        return shown
+    for start in range(0, len(frame), STRIP_ROWS):  # double precision takes eight bytes for each
+        rows = slice(start, start + STRIP_ROWS)
+        strip = np.where(known[rows], frame[rows], low).astype(np.float64)
+        shown[rows] = np.clip((strip / 2 - low / 2) * (255 / span), 0, 255).astype(np.uint8)
+    return shown

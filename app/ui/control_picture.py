@@ -17,11 +17,12 @@ from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
 from app.robots.description import Parameter
 from app.ui.control import Control, connect, line_field
 from app.ui.flow import Flow
-from app.ui.picture_file import FILES, encoded, read_picture
+from app.ui.picture_file import FILES, encoded, image_of, read_picture
 from app.ui.picture_thumbnail import Thumbnail
 from app.ui.theme import Theme
 from app.ui.widgets import Button, label
 from app.ui.widgets.menus import Menu, drop_below
+from nep.errors import DecodeError
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream
@@ -111,8 +112,7 @@ class PictureChoice(QWidget):
         self._show_none()
         text = "" if value is None else str(value)
         if text.startswith("data:"):
-            image = QImage.fromData(base64.b64decode(text.partition(",")[2]))
-            self._image = None if image.isNull() else image
+            self._image = _image_in(text)
             self.thumbnail.show_image(self._image)
             self.field.setText("the picture of that time" if self._image is not None else "")
         else:
@@ -186,7 +186,8 @@ class PictureChoice(QWidget):
         if picture is not None and picture is not self._seen:
             self._seen = picture
             data = picture.bgra.data
-            held = QImage(data, picture.width, picture.height, QImage.Format.Format_RGB32)
+            rows, columns = picture.bgra.shape[:2]
+            held = QImage(data, columns, rows, QImage.Format.Format_RGB32)
             self._image = held.copy()
             self.thumbnail.show_image(self._image)
         self._judge(f"{stream.error}." if stream.error else "")
@@ -208,6 +209,14 @@ class PictureChoice(QWidget):
         self.sentence = sentence
         self._wrong.setText(sentence)
         self._wrong.setVisible(bool(sentence))
+
+
+def _image_in(address: str) -> QImage | None:
+    """The picture that stands in a ``data:`` address; None when none can be read."""
+    try:
+        return image_of(base64.b64decode(address.partition(",")[2]))
+    except (ValueError, DecodeError):
+        return None
 
 
 def picture_control(theme: Theme, parameter: Parameter, pictures: Pictures) -> Control:

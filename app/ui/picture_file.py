@@ -1,5 +1,7 @@
 """A picture file as it is sent to a robot: read with care, and made small enough.
 
+What Qt may decode is decided by `nep.image_files`, as for every other picture: by the bytes, JPEG or PNG.
+
 It is sent as NEP's pictures in JSON are: ``data:image/jpeg;base64,…``, or the bare base64 text where the
 description asks for that (``contentEncoding`` and no ``format``).
 """
@@ -10,29 +12,55 @@ import base64
 from pathlib import Path
 
 from PySide6.QtCore import QBuffer, QByteArray, QIODevice, Qt
-from PySide6.QtGui import QImage, QImageReader
+from PySide6.QtGui import QImage, QImageReader, QTransform
 
-FILES = "Pictures (*.png *.jpg *.jpeg *.gif *.bmp *.webp)"
+from nep.errors import DecodeError
+from nep.image_files import MOST_BYTES, ImageFile, examine
+
+FILES = "Pictures (*.png *.jpg *.jpeg)"
 LONGEST_SIDE, QUALITY = 1280, 85
-MOST_PIXELS = 60_000_000
 MOST_FILE_BYTES = 40_000_000
 
 
 def read_picture(path: Path) -> tuple[QImage | None, str]:
     """A picture file, turned as its camera says, or the sentence that says why it can't be used."""
     try:
-        too_big = path.stat().st_size > MOST_FILE_BYTES
+        if not path.is_file() and path.exists():
+            return None, f"“{path.name}” is no file."
+        with path.open("rb") as file:
+            data = file.read(MOST_FILE_BYTES + 1)
     except OSError as error:
         return None, f"“{path.name}” can't be read: {(error.strerror or 'unknown').lower()}."
-    reader = QImageReader(str(path))
-    reader.setAutoTransform(True)
-    size = reader.size()
-    if too_big or size.width() * size.height() > MOST_PIXELS:
+    if len(data) > MOST_FILE_BYTES:
         return None, f"“{path.name}” is too large; use one below {MOST_FILE_BYTES // 1_000_000} MB."
+    try:
+        return image_of(data), ""
+    except DecodeError as error:
+        return None, f"“{path.name}” can't be used: {error.reason}."
+
+
+def image_of(data: bytes) -> QImage:
+    """The picture in a file's bytes, upright and no larger than Qt may hold. Raises DecodeError."""
+    file = examine(data)
+    QImageReader.setAllocationLimit(MOST_BYTES // 1_000_000)  # else 256 MB, less than we have let through
+    buffer = QBuffer()
+    buffer.setData(bytes(file.data))
+    buffer.open(QIODevice.OpenModeFlag.ReadOnly)
+    reader = QImageReader(buffer, QByteArray(file.kind.encode()))
+    reader.setDecideFormatFromContent(False)
     image = reader.read()
     if image.isNull():
-        return None, f"“{path.name}” is no picture that can be read."
-    return image, ""
+        raise DecodeError("image", len(data), "they are no picture that can be read")
+    return upright(image, file)
+
+
+def upright(image: QImage, file: ImageFile) -> QImage:
+    """The picture turned as the file's orientation says, which Qt reads from a JPEG alone."""
+    if file.orientation >= 5:
+        image = image.transformed(QTransform(0, 1, 1, 0, 0, 0))
+    if file.orientation in (2, 3, 6, 7):
+        image = image.flipped(Qt.Orientation.Horizontal)
+    return image.flipped(Qt.Orientation.Vertical) if file.orientation in (3, 4, 7, 8) else image
 
 
 def encoded(image: QImage, *, bare: bool = False) -> str:

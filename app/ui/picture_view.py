@@ -39,8 +39,8 @@ def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
     """``(16, 8)  196 198 190  #C4C6BE``; of grey and depth the number."""
     if pixel is None:
         return f"({x}, {y})"
-    if isinstance(pixel, int):
-        return f"({x}, {y})  {pixel}"
+    if isinstance(pixel, int | float):
+        return f"({x}, {y})  {pixel:.6g}" if isinstance(pixel, float) else f"({x}, {y})  {pixel}"
     red, green, blue = pixel
     return f"({x}, {y})  {red} {green} {blue}  #{red:02X}{green:02X}{blue:02X}"
 

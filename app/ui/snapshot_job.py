@@ -12,6 +12,7 @@ from PySide6.QtGui import QImage
 
 from app.core import snapshots
 from app.core.pictures import png_of
+from app.ui.picture_file import image_of
 from nep.errors import NepError
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class SnapshotJob(QObject):
 
     def copy(self, message: Message) -> None:
         """Make an image of it, as large as it was received; nothing while another one is being made."""
-        self._start(lambda: self.copied.emit(QImage.fromData(png_of(message))))
+        self._start(lambda: self.copied.emit(image_of(png_of(message))))
 
     def wait(self) -> None:
         """Until what was begun has ended, two seconds at most."""

@@ -13,6 +13,7 @@ from nep.gateway.inbox import Inbox
 from nep.gateway.listing import Listing
 from nep.gateway.relay import Key
 from nep.graph import Alert
+from nep.image_files import examine
 from nep.message import Message
 from nep.nodes import Node
 from nep.pubsub import Publisher, Subscriber
@@ -20,8 +21,6 @@ from nep.pubsub import Publisher, Subscriber
 _AGAIN_S = 1.0
 """A topic that could not be joined is tried again after this: trying costs the gateway's thread time."""
 _Made = TypeVar("_Made", Publisher, Subscriber)
-_READABLE = ("jpeg", "png", None)  # no set: a message may tell anything, also what can't be looked up in one
-"""Encodings of pictures that the originals read; without one, the bytes are a file that says it itself."""
 
 
 class Native:
@@ -89,10 +88,16 @@ class Native:
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
         """See `Outside`."""
-        if message.codec != "image" or message.extension.get("encoding") in _READABLE:
+        if message.codec != "image":
             return message.data
         try:
-            return images.encode(message.payload).data
+            if images.raw_layout(message.extension.get("encoding")) is None:
+                examine(message.data)  # the originals decode whatever they get, a bomb as well
+                return message.data
+            made = images.encode(message.payload)
+            if images.raw_layout((made.extension or {}).get("encoding")) is not None:
+                raise EncodeError("image", "picture", "they read JPEG and PNG, which have no such numbers")
+            return made.data
         except (DecodeError, EncodeError) as error:
             self.tell(
                 f"message:{message.topic}", f"Original programs get no pictures of “{message.topic}”: {error}"

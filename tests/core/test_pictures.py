@@ -106,6 +106,61 @@ def test_what_is_no_picture_is_a_sentence(sent: Message, words: str) -> None:
     assert words in error
 
 
+FAR = 3.4e38
+"""Nearly the largest float: the distance between it and its negative is none any more."""
+
+
+@pytest.mark.parametrize(
+    ("values", "low", "high"),
+    [
+        (np.array([[0.5, 2.0], [np.nan, np.inf]], np.float32), (0, 0), (0, 1)),
+        (np.array([[-FAR, FAR], [np.nan, -np.inf]], np.float32), (0, 0), (0, 1)),
+        (np.array([[-2.0, 1e300], [np.nan, np.nan]]), (0, 0), (0, 1)),
+        (np.array([[-5, 700], [0, 0]], np.int16), (0, 0), (0, 1)),
+    ],
+)
+def test_numbers_of_other_kinds_are_scaled_to_be_seen_and_kept_to_be_read(values, low, high) -> None:
+    picture, error = decode(
+        raw(values, f"{values.dtype.itemsize * 8}{'F' if values.dtype.kind == 'f' else 'S'}C1"), 0
+    )
+    assert error is None
+    assert picture is not None
+    assert picture.pixel(high[1], high[0]) == values[high]
+    darkest, brightest = picture.bgra[low].tolist(), picture.bgra[high].tolist()
+    assert (darkest, brightest) == ([84, 1, 68, 255], [37, 231, 253, 255])  # the ends of its colours
+    for place in np.argwhere(~np.isfinite(values)):
+        assert picture.bgra[tuple(place)].tolist() == [0, 0, 0, 255], "no number is black"
+
+
+def test_colours_of_many_bits_and_pictures_of_nothing_but_nan_can_be_shown() -> None:
+    deep = np.full((4, 6, 3), 0x8000, np.uint16)
+    unit = np.full((4, 6, 3), 0.5, np.float32)
+    for sent in (raw(deep, "bgr16"), encoded(deep), raw(unit, "32FC3")):
+        picture, error = decode(sent, 0.0)
+        assert error is None
+        assert picture is not None
+        assert picture.bgra[0, 0].tolist() == [128, 128, 128, 255]
+    for nothing in (np.full((4, 6), np.nan), np.zeros((4, 6, 2)), np.full((4, 6), 7.0)):
+        picture, error = decode(raw(nothing, f"64FC{nothing.ndim - 1}"), 0.0)
+        assert error is None
+        assert picture is not None
+
+
+def test_a_small_view_of_depth_is_as_bright_as_a_large_one() -> None:
+    depth = np.full((400, 600), 1000, np.uint16)
+    depth[:, 300:] = 2000
+    for sent in (encoded(depth), raw(depth, "mono16"), raw(depth.astype(np.float32), "32FC1")):
+        small, _ = decode(sent, 0.0, (60, 40))
+        assert small is not None
+        assert small.bgra.shape == (50, 75, 4)
+        assert small.bgra[20, 70].tolist() == [37, 231, 253, 255]
+
+
+def test_a_picture_of_floats_is_no_png_and_says_so() -> None:
+    with pytest.raises(OSError, match="no numbers of the type float32"):
+        png_of(raw(np.zeros((4, 6), np.float32), "32FC1"))
+
+
 def png_of_size(side: int) -> Message:
     """A small PNG whose head tells of many pixels."""
     data = bytearray(cv2.imencode(".png", scene(8, 8))[1].tobytes())
@@ -163,7 +218,7 @@ ANYTHING = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=2),
     max_leaves=6,
 )
-KINDS = st.sampled_from(["jpeg", "png", "bgr8", "rgb8", "mono8", "tiff"])
+KINDS = st.sampled_from(["jpeg", "png", "bgr8", "rgb8", "mono8", "tiff", "32FC1", "bgra8", "16SC2", "64FC3"])
 SHAPES = st.lists(st.integers(-3, 2**40) | st.integers(0, 6), max_size=4)
 SENT = (
     st.binary(max_size=60)
@@ -188,6 +243,7 @@ def test_whatever_is_sent_as_a_picture_is_one_or_a_sentence(data, extension, fit
     if picture is not None:
         assert picture.bgra.dtype == np.uint8
         assert picture.bgra.shape[2] == 4
+        assert picture.bgra.flags.c_contiguous, "QImage reads it as one piece"
     for read in (lambda: sent.payload, lambda: png_of(sent)):
         with contextlib.suppress(NepError, OSError):
             read()

@@ -98,8 +98,10 @@ def test_json_has_no_nan_but_reads_that_of_the_originals() -> None:
         ("msgpack", {"a": {1}}, "cannot encode a 'dict' as 'msgpack'; 'set' has no form in it"),
         ("msgpack", 2**70, "cannot encode a 'int' as 'msgpack'"),
         ("image", "text", "publish a 'uint8' array"),
-        ("image", b"text", "neither a JPEG nor a PNG"),
-        ("image", np.zeros((2, 2, 3)), "its numbers are 'float64'; convert them to 'uint8'"),
+        ("image", b"text", "neither JPEG nor PNG"),
+        ("image", np.zeros((2, 2, 3), bool), "its numbers are 'bool'; use uint8, int8, uint16"),
+        ("image", np.zeros((2, 2, 3), np.complex64), "its numbers are 'complex64'; use uint8"),
+        ("image", np.zeros((2, 2, 5), np.uint8), r"its shape \(2, 2, 5\) is none of a picture"),
         ("image", np.zeros((2,), np.uint8), r"its shape \(2,\) is none of a picture"),
         ("image", np.zeros((0, 5, 3), np.uint8), "none of a picture"),
     ],
@@ -141,20 +143,75 @@ def test_raw_pictures_are_exact(picture: np.ndarray) -> None:
 
     assert np.array_equal(read(images.raw_image(picture)), picture)  # type: ignore[arg-type]
     assert np.array_equal(read(images.raw_image(picture[::2, ::2])), picture[::2, ::2])  # type: ignore[arg-type]
-    grey = read(images.raw_image(picture[:, :, 0]))
-    assert np.array_equal(grey, np.repeat(picture[:, :, :1], 3, axis=2))  # type: ignore[arg-type]
     rgb = codec("image").decode(
         memoryview(picture[:, :, ::-1].tobytes()), {"shape": [48, 64, 3], "encoding": "rgb8"}
     )
     assert np.array_equal(rgb, picture)  # type: ignore[arg-type]
 
 
-def test_other_shapes_of_pictures(picture: np.ndarray) -> None:
-    alpha = np.dstack([picture, np.full((48, 64), 255, np.uint8)])
-    for odd in (alpha, picture[:, :, :1], picture[:, :, 0]):
-        read = back("image", odd)
+NUMBERS = ("uint8", "int8", "uint16", "int16", "int32", "float32", "float64")
+SHAPES = ((3, 5), (3, 5, 1), (3, 5, 2), (3, 5, 3), (3, 5, 4), (1, 1), (1, 7, 3))
+
+
+def numbers_of(kind: str, shape: tuple[int, ...]) -> np.ndarray:
+    """The least, the largest and others between; of floats also those that are none."""
+    made = np.random.default_rng(1).integers(0, 100, shape).astype(kind)
+    least, most = (np.iinfo(kind).min, np.iinfo(kind).max) if made.dtype.kind in "iu" else (-np.inf, np.nan)
+    made.flat[0], made.flat[-1] = least, most
+    return made
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("kind", NUMBERS)
+def test_any_numbers_and_channels_are_kept_without_loss(kind: str, shape: tuple[int, ...]) -> None:
+    made = numbers_of(kind, shape)
+    wanted = made[:, :, 0] if shape[2:] == (1,) else made
+    sent = [images.raw_image(made), images.raw_image(made.astype(made.dtype.newbyteorder(">")))]
+    if kind != "uint8" or shape[2:] in ((2,), (4,)):  # all but what is a JPEG
+        sent.append(codec("image").encode(made))
+        sent.append(codec("image").encode(np.asfortranarray(made)))
+    for data, extension in sent:
+        assert extension is not None
+        assert extension["shape"] == [*wanted.shape[:2], 1 if wanted.ndim == 2 else shape[2]]
+        read = codec("image").decode(memoryview(data), extension)
         assert isinstance(read, np.ndarray)
-        assert read.shape == (48, 64, 3)
+        assert read.dtype == np.dtype(kind)
+        assert np.array_equal(read, wanted, equal_nan=kind.startswith("float"))
+
+
+@pytest.mark.parametrize(
+    ("made", "encodings"),
+    [
+        (np.zeros((2, 3), np.uint8), ("jpeg", "mono8")),
+        (np.zeros((2, 3, 3), np.uint8), ("jpeg", "bgr8")),
+        (np.zeros((2, 3, 4), np.uint8), ("png", "bgra8")),
+        (np.zeros((2, 3), np.uint16), ("png", "mono16")),
+        (np.zeros((2, 3, 3), np.uint16), ("png", "bgr16")),
+        (np.zeros((2, 3), np.float32), ("32FC1", "32FC1")),
+        (np.zeros((2, 3, 2), np.float64), ("64FC2", "64FC2")),
+        (np.zeros((2, 3), np.int16), ("16SC1", "16SC1")),
+    ],
+)
+def test_how_an_array_is_sent(made: np.ndarray, encodings: tuple[str, str]) -> None:
+    sent = codec("image").encode(made), images.raw_image(made)
+    assert tuple((extension or {})["encoding"] for _, extension in sent) == encodings
+
+
+def test_a_jpeg_of_one_channel_stays_one(picture: np.ndarray) -> None:
+    for grey in (picture[:, :, 0], picture[:, :, :1]):
+        read = back("image", grey)
+        assert isinstance(read, np.ndarray)
+        assert (read.shape, read.dtype) == ((48, 64), np.uint8)
+        assert np.abs(read.astype(int) - picture[:, :, 0]).mean() < 4
+
+
+@pytest.mark.parametrize(("encoding", "kind"), [("rgb8", "uint8"), ("rgba8", "uint8"), ("rgb16", "<u2")])
+def test_red_first_becomes_blue_first(encoding: str, kind: str) -> None:
+    channels = 4 if "a" in encoding else 3
+    made = np.arange(4 * 5 * channels, dtype=kind).reshape(4, 5, channels)
+    data = memoryview(made[:, :, [2, 1, 0, 3][:channels]].tobytes())
+    read = codec("image").decode(data, {"shape": [4, 5, channels], "encoding": encoding})
+    assert np.array_equal(read, made)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("ending", ["jpeg", "png"])
@@ -174,6 +231,9 @@ def test_files_pass_unchanged(picture: np.ndarray, ending: str) -> None:
         (b"abc", {"shape": "x", "encoding": "bgr8"}),
         (b"abc", {"shape": [-1, -1, 3], "encoding": "bgr8"}),
         (b"abc", {"encoding": "mono8"}),
+        (b"abc", {"shape": [1, 1, 1], "encoding": "32FC1"}),
+        (b"abcd", {"shape": [1, 1], "encoding": "32FC5"}),
+        (b"", {"shape": [0, 2**64], "encoding": "mono8"}),
     ],
 )
 def test_broken_pictures(data: bytes, extension: dict[str, object]) -> None:

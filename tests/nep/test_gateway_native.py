@@ -7,6 +7,7 @@ from nep.gateway.inbox import Inbox
 from nep.gateway.listing import Listing
 from nep.gateway.native import Native
 from nep.message import Message
+from tests.nep.bad_pictures import BOMBS
 
 LONG_S = 10
 
@@ -87,6 +88,30 @@ def test_pictures_that_originals_cannot_read_become_jpeg(scene):
     jpeg = scene.native.data_of(message)
     again = Message("cam", jpeg, "image", "image", extension={"encoding": "jpeg"})
     assert scene.native.data_of(again) == jpeg
+
+
+@pytest.mark.parametrize("told", [None, "jpeg", "png", "gif"])
+def test_a_bomb_is_not_handed_to_the_originals_whatever_it_calls_itself(scene, told):
+    for name in ("gif", "png of many pixels"):
+        bomb = Message(
+            "cam", BOMBS[name], "image", "image", extension={} if told is None else {"encoding": told}
+        )
+        assert scene.native.data_of(bomb) is None
+    assert [alert.id for alert in scene.alerts] == ["message:cam"]
+    assert "48000 × 48000 pixels are too many" in scene.alerts[0].sentence  # noqa: RUF001
+
+
+def test_numbers_that_the_originals_cannot_read_are_an_alert(scene):
+    np = pytest.importorskip("numpy")
+    depth = nep.raw_image(np.zeros((4, 6), np.uint16))
+    sent = scene.native.data_of(Message("cam", depth.data, "image", "image", extension=depth.extension))
+    assert bytes(sent).startswith(b"\x89PNG")
+    floats = nep.raw_image(np.zeros((4, 6), np.float32))
+    assert (
+        scene.native.data_of(Message("cam", floats.data, "image", "image", extension=floats.extension))
+        is None
+    )
+    assert "they read JPEG and PNG" in scene.alerts[0].sentence
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", ["bgr8"], {"bgr8": 1}, 7, b"jpeg"])

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import base64
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QImage, QWheelEvent
@@ -20,10 +23,11 @@ from app.ui.control_colour import ColourChoice, HueStrip
 from app.ui.control_picture import PictureChoice
 from app.ui.forms import ActionForm
 from app.ui.long_text import LEAST_HEIGHT, LongText
-from app.ui.picture_file import MOST_FILE_BYTES, encoded, read_picture
+from app.ui.picture_file import FILES, MOST_FILE_BYTES, encoded, read_picture
 from app.ui.theme import Theme
 from app.ui.widgets import SliderWithUnit
 from app.ui.widgets.menus import Menu
+from tests.nep.bad_pictures import BOMBS, chunk, exif, segment
 from tests.ui import fakes
 
 KEEP = Option(0, "keep"), Option(1, "turn")
@@ -291,12 +295,54 @@ def test_a_file_that_is_no_picture_says_so_and_is_not_sent(qtbot, theme, tmp_pat
     choice = child(form, PictureChoice)
     (tmp_path / "not.png").write_text("hello")
     choice.use_file(tmp_path / "not.png")
-    assert choice.sentence == "“not.png” is no picture that can be read."
+    assert choice.sentence == "“not.png” can't be used: they are no picture: neither JPEG nor PNG."
     assert choice.thumbnail.image is None
     assert read_picture(tmp_path / "none.png")[1] == "“none.png” can't be read: no such file or directory."
     with (tmp_path / "big.png").open("wb") as big:
         big.truncate(MOST_FILE_BYTES + 1)
     assert "too large" in read_picture(tmp_path / "big.png")[1]
+
+
+@pytest.mark.parametrize("name", ["bmp", "gif", "svg", "png of many pixels", "jpeg of a thousand passes"])
+def test_a_bomb_is_refused_with_a_sentence_as_a_file_and_as_an_address(qtbot, theme, tmp_path, name) -> None:
+    form = form_of(qtbot, theme, Parameter("p", "picture", "image"))
+    choice = child(form, PictureChoice)
+    (tmp_path / "photo.png").write_bytes(BOMBS[name])
+    choice.use_file(tmp_path / "photo.png")
+    assert choice.sentence.startswith("“photo.png” can't be used: ")
+    assert choice.thumbnail.image is None
+    choice.set_value("data:image/png;base64," + base64.b64encode(BOMBS[name]).decode())
+    assert choice.thumbnail.image is None
+    choice.set_value("data:image/png;base64,é")  # no base64 at all
+    assert choice.thumbnail.image is None
+
+
+def test_only_what_is_read_is_offered_and_a_pipe_is_not_opened(tmp_path) -> None:
+    assert FILES == "Pictures (*.png *.jpg *.jpeg)"
+    assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is no file."
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe.png")
+        assert read_picture(tmp_path / "pipe.png")[1] == "“pipe.png” is no file."
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("kind", ["jpeg", "png"])
+def test_a_photo_stands_upright_whichever_way_the_camera_was_held(qapp, tmp_path, kind, orientation) -> None:
+    frame = np.zeros((32, 64, 3), np.uint8)
+    frame[:16, :16] = 255
+    data = cv2.imencode(f".{kind}", frame)[1].tobytes()
+    told = exif(orientation)
+    if kind == "jpeg":
+        data = data[:2] + segment(0xE1, told) + data[2:]
+    else:
+        data = data[:33] + chunk(b"eXIf", told[6:]) + data[33:]
+    (tmp_path / "photo").write_bytes(data)
+    image, _ = read_picture(tmp_path / "photo")
+    assert image is not None
+    wanted = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    assert (image.height(), image.width()) == wanted.shape[:2]
+    for y, x in ((4, 4), (4, image.width() - 4), (image.height() - 4, 4)):
+        assert (image.pixelColor(x, y).red() > 128) == (wanted[y, x, 2] > 128)
 
 
 def test_the_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:

@@ -1,0 +1,293 @@
+"""JPEG and PNG files: what their bytes tell, and how large they may be. Nothing is decoded here.
+
+Whoever decodes a picture file asks `examine` first: a file of a few bytes may tell of pixels that take
+gigabytes, or of a thousand passes over them. What the bytes are decides, never what somebody says of them.
+Only JPEG and PNG are pictures here: a decoder of every other format is one more that a stranger can reach.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from nep.errors import DecodeError
+
+__all__ = ["MOST_BYTES", "MOST_PIXELS", "ImageFile", "check_size", "examine"]
+
+MOST_PIXELS = 120_000_000
+"""More than any camera of a robot has."""
+MOST_BYTES = 512_000_000
+"""What the pixels, and the decoder's own tables beside them, may take of memory."""
+MOST_SCANS = 100
+"""Passes of a JPEG that comes in refinements; encoders make about ten."""
+MOST_SCANNED = 1_200_000_000
+"""Pixels times passes: how long decoding may take, which is a few seconds at worst."""
+MOST_PIECES = 100_000
+"""Segments of a JPEG, chunks of a PNG; an encoder makes one of 8 kB and more."""
+
+_JPEG = b"\xff\xd8\xff"
+_PNG = b"\x89PNG\r\n\x1a\n"
+_OTHERS = {
+    b"GIF8": "GIF", b"BM": "BMP", b"RIFF": "WebP", b"II*\0": "TIFF", b"MM\0*": "TIFF", b"<svg": "SVG",
+    b"<?xml": "SVG", b"\0\0\0\x0cjP": "JPEG 2000", b"\xff\x4f\xff\x51": "JPEG 2000",
+    b"\x76\x2f\x31\x01": "OpenEXR", b"#?RAD": "HDR", b"P4": "PNM", b"P5": "PNM", b"P6": "PNM",
+    b"P7": "PNM", b"PF": "PNM",
+}  # fmt: skip
+_FILL = re.compile(rb"\xff*")
+_ALONE = frozenset({0x01, *range(0xD0, 0xD8)})
+"""Markers of a JPEG without a length: TEM and RST."""
+_FRAMES = {0xC0: False, 0xC1: False, 0xC2: True}
+"""Heads of a JPEG's pixels, and whether these come in refinements. Others no camera and no browser knows."""
+_TABLES = frozenset({0xC4, 0xDB, 0xDD, 0xFE, *range(0xE0, 0xF0)})
+_SCAN, _APP1 = 0xDA, 0xE1
+_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 4, 6: 4}
+"""Channels of a PNG by its colour type, as they are decoded."""
+_DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
+_NEEDED = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
+_TURNED = 5
+"""From this orientation on, rows of the file are columns of the picture."""
+
+
+@dataclass(frozen=True)
+class ImageFile:
+    """A JPEG or PNG file that may be decoded.
+
+    `width` and `height` are those of the picture as it is shown: turned as `orientation` (1 to 8, as EXIF
+    has it) says. `channels` are 1 (grey), 3 or 4 (with alpha) of `bits` (8 or 16) each. `data` is what to
+    give to a decoder: the file, or for a PNG with text, profiles or an animation the picture alone.
+    """
+
+    kind: Literal["jpeg", "png"]
+    width: int
+    height: int
+    channels: int
+    bits: int
+    orientation: int
+    data: bytes | memoryview
+
+    @property
+    def extension(self) -> dict[str, object]:
+        """What travels beside it in a message."""
+        return {"shape": [self.height, self.width, self.channels], "encoding": self.kind}
+
+
+def examine(data: bytes | memoryview) -> ImageFile:
+    """What a file is. Raises `DecodeError` for what is neither JPEG nor PNG, is broken, or is too large."""
+    file = data if isinstance(data, bytes) else memoryview(data).cast("B")
+    head = bytes(file[:8])
+    if head == _PNG:
+        return _Png(file).read()
+    if head.startswith(_JPEG):
+        return _Jpeg(file).read()
+    size = len(file)
+    if not size:
+        raise DecodeError("image", 0, "there is nothing in it")
+    for start, name in _OTHERS.items():
+        if head.startswith(start):
+            raise DecodeError("image", size, f"it is {name}, and only JPEG and PNG are read")
+    raise DecodeError("image", size, "they are no picture: neither JPEG nor PNG")
+
+
+def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> None:
+    """Raises `DecodeError` for more pixels, or more memory for them, than a picture may have.
+
+    `pixel_bytes` is what each takes in memory, `size_bytes` how many bytes told of them.
+    """
+    if width < 1 or height < 1:
+        raise DecodeError("image", size_bytes, f"a picture of {width} × {height} pixels is none")  # noqa: RUF001
+    if width * height > MOST_PIXELS:
+        reason = f"{width} × {height} pixels are too many, {MOST_PIXELS // 10**6} million are read"  # noqa: RUF001
+        raise DecodeError("image", size_bytes, reason)
+    needed = width * height * pixel_bytes
+    if needed > MOST_BYTES:
+        reason = f"{width} × {height} pixels take {needed / 1e6:.0f} MB, {MOST_BYTES // 10**6} are given"  # noqa: RUF001
+        raise DecodeError("image", size_bytes, reason)
+
+
+class _Reader:
+    """What both kinds of files have in common."""
+
+    kind: Literal["jpeg", "png"]
+
+    def __init__(self, data: bytes | memoryview) -> None:
+        self.data = data
+        self.size = len(data)
+
+    def number(self, at: int, count: int) -> int:
+        """The big-endian number of `count` bytes there."""
+        return int.from_bytes(self.data[at : at + count], "big")
+
+    def broken(self, reason: str) -> DecodeError:
+        """The error that refuses the file."""
+        reason = f"they are no picture that can be read, but a broken {self.kind.upper()}: {reason}"
+        return DecodeError("image", self.size, reason)
+
+
+class _Jpeg(_Reader):
+    """The segments of a JPEG up to its first scan.
+
+    What no encoder writes is refused, not guessed: a decoder may understand it in another way than we do,
+    and then other sizes count than we have seen.
+    """
+
+    kind = "jpeg"
+
+    def read(self) -> ImageFile:
+        """See `examine`."""
+        frame, orientation, at = None, 1, 2
+        for _ in range(MOST_PIECES):
+            marker, at = self._marker(at)
+            if marker in _ALONE:
+                continue
+            length = self.number(at, 2)
+            if length < 2 or at + length > self.size:
+                raise self.broken("it ends too early")
+            if marker in _FRAMES:
+                if frame is not None:
+                    raise self.broken("it has two heads")
+                frame = self._frame(marker, at, length)
+            elif marker == _SCAN:
+                if frame is None:
+                    raise self.broken("its pixels come before their size")
+                return self._checked(frame, orientation, at)
+            elif marker == _APP1:
+                orientation = _orientation(self.data[at + 2 : at + length]) or orientation
+            elif marker not in _TABLES:
+                raise self.broken(f"what 'ff{marker:02x}' is nobody knows")
+            at += length
+        raise self.broken("it has too many segments")
+
+    def _marker(self, at: int) -> tuple[int, int]:
+        """The marker there and where it ends."""
+        if self.number(at, 1) != 0xFF:
+            reason = "it ends too early" if at >= self.size else "its segments do not follow each other"
+            raise self.broken(reason)
+        found = _FILL.match(self.data, at)
+        at = found.end() if found is not None else at
+        if at >= self.size:
+            raise self.broken("it ends too early")
+        return self.data[at], at + 1
+
+    def _frame(self, marker: int, at: int, length: int) -> _Frame:
+        bits, height, width = self.number(at + 2, 1), self.number(at + 3, 2), self.number(at + 5, 2)
+        components = self.number(at + 7, 1)
+        if length != 8 + 3 * components or components not in (1, 3, 4):
+            raise self.broken(f"it has {components} colours")
+        if bits != 8:
+            raise DecodeError("image", self.size, f"a JPEG of {bits} bits for a colour is not read, a PNG is")
+        sampling = [self.number(at + 9 + 3 * each, 1) for each in range(components)]
+        factors = [(each >> 4, each & 15) for each in sampling]
+        if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
+            raise self.broken("its colours have no size")
+        return _Frame(width, height, components, _FRAMES[marker], factors)
+
+    def _checked(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
+        channels = 1 if frame.components == 1 else 3
+        pixel_bytes = float(channels)
+        is_refined = frame.is_refined or self.number(at + 2, 1) != frame.components
+        if is_refined:  # the decoder keeps all coefficients until the last scan
+            pixel_bytes += frame.coefficient_bytes
+        check_size(frame.width, frame.height, pixel_bytes, self.size)
+        if is_refined:
+            # One scan may come in a few bytes and makes the decoder walk over all pixels again.
+            scans = bytes(self.data[at:]).count(b"\xff\xda") + 1
+            if scans > MOST_SCANS or scans * frame.width * frame.height > MOST_SCANNED:
+                reason = f"{frame.width} × {frame.height} pixels in {scans} passes take too long"  # noqa: RUF001
+                raise DecodeError("image", self.size, reason)
+        width, height = frame.width, frame.height
+        if orientation >= _TURNED:
+            width, height = height, width
+        return ImageFile("jpeg", width, height, channels, 8, orientation, self.data)
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What the head of a JPEG's pixels tells."""
+
+    width: int
+    height: int
+    components: int
+    is_refined: bool
+    factors: list[tuple[int, int]]
+
+    @property
+    def coefficient_bytes(self) -> float:
+        """What the coefficients of one pixel take: two bytes each, of whole blocks."""
+        across, down = max(each[0] for each in self.factors), max(each[1] for each in self.factors)
+        units = -(-self.width // (8 * across)) * -(-self.height // (8 * down))
+        blocks = units * sum(each[0] * each[1] for each in self.factors)
+        return 128 * blocks / max(1, self.width * self.height)
+
+
+class _Png(_Reader):
+    """The chunks of a PNG."""
+
+    kind = "png"
+
+    def read(self) -> ImageFile:
+        """See `examine`."""
+        if self.size < 33 or self.data[8:16] != b"\0\0\0\x0dIHDR":
+            raise self.broken("it does not begin with its size")
+        width, height = self.number(16, 4), self.number(20, 4)
+        depth, colour = self.data[24], self.data[25]
+        if depth not in _DEPTHS.get(colour, ()):
+            raise self.broken(f"colour type {colour} has no depth of {depth} bits")
+        needed, kinds, orientation = self._chunks()
+        channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _CHANNELS[colour]
+        bits = 16 if depth == 16 else 8
+        check_size(width, height, channels * bits // 8, self.size)
+        if orientation >= _TURNED:
+            width, height = height, width
+        data = self.data
+        if len(needed) > 1 or needed[0] != (8, self.size):
+            data = _PNG + b"".join([bytes(self.data[start:end]) for start, end in needed])
+        return ImageFile("png", width, height, channels, bits, orientation, data)
+
+    def _chunks(self) -> tuple[list[tuple[int, int]], set[bytes], int]:
+        """Where the chunks are that a picture needs (neighbours together), their kinds, its orientation.
+
+        All others are left out: compressed text and profiles may be bombs of their own, and what an animation
+        adds is no part of its first picture.
+        """
+        needed: list[tuple[int, int]] = []
+        kinds: set[bytes] = set()
+        orientation, at = 1, 8
+        for _ in range(MOST_PIECES):
+            kind, end = bytes(self.data[at + 4 : at + 8]), min(self.size, at + 12 + self.number(at, 4))
+            if kind == b"IHDR" and kind in kinds:
+                raise self.broken("it has two heads")
+            if kind in _NEEDED:
+                kinds.add(kind)
+                if needed and needed[-1][1] == at:
+                    needed[-1] = needed[-1][0], end
+                else:
+                    needed.append((at, end))
+            elif kind == b"eXIf":
+                orientation = (
+                    _orientation(b"Exif\0\0" + bytes(self.data[at + 8 : at + 8 + _HEAD])) or orientation
+                )
+            at = end
+            if kind == b"IEND" or at + 8 > self.size:
+                return needed, kinds, orientation
+        raise self.broken("it has too many chunks")
+
+
+_HEAD = 4096
+"""How far into EXIF data the orientation is looked for."""
+
+
+def _orientation(exif: bytes | memoryview) -> int | None:
+    """The orientation (1 to 8) that EXIF data tell; None when they tell none."""
+    data = bytes(exif[:_HEAD])
+    if data[:6] != b"Exif\0\0" or data[6:10] not in (b"II*\0", b"MM\0*"):
+        return None
+    order: Literal["big", "little"] = "little" if data[6:7] == b"I" else "big"
+    tiff = data[6:]
+    at = int.from_bytes(tiff[4:8], order)
+    count = int.from_bytes(tiff[at : at + 2], order)
+    for start in range(at + 2, min(at + 2 + 12 * count, len(tiff) - 11), 12):
+        if int.from_bytes(tiff[start : start + 2], order) == 0x0112:
+            told = int.from_bytes(tiff[start + 8 : start + 10], order)
+            return told if 1 <= told <= 8 else None
+    return None
