@@ -195,6 +195,13 @@ class Fleet:
                 if publisher is not None:
                     publisher.close()
 
+    def unwatched(self, topic: str) -> None:
+        """Nobody looks at a topic any more: what a robot told there is not known from now on."""
+        for link in self._links.values():
+            for sensor in link.robot.sensors:
+                if sensor.topic == topic:
+                    link.values.pop(sensor.name, None)
+
     # -- inside ----------------------------------------------------------------------------------------------
 
     def _get(self, name: str) -> RobotLink:

@@ -11,8 +11,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from app.core.pictures import Picture, Size, decode
+from app.core.watches import Look
 from nep.message import Message
 
 RATE_WINDOW_S = 2.0
@@ -49,15 +51,17 @@ class Rate:
 class ImageStream:
     """The pictures of one topic, for one panel. Figures that are not known are None.
 
-    While it is `held` the picture stays; what arrives is counted and not decoded.
+    While it is `held` the picture stays; what arrives is counted and not decoded. `awaits_picture` until one
+    came since somebody looks, or looks again after a `rest`.
     """
 
     topic: str
     _images: Images
-    _watch_closed: Callable[[], None]
+    _watch: Watching
     picture: Picture | None = None
     error: str | None = None
     held: bool = False
+    awaits_picture: bool = True
     wish: Size | None = None
     """What `Images` keeps here and reads under its lock: the size that is wanted, ..."""
     waiting: tuple[Message, float] | None = None
@@ -65,6 +69,14 @@ class ImageStream:
     arriving: Rate = field(default_factory=Rate)
     """... and how many come."""
     _shown: Rate = field(default_factory=Rate)
+    _looked_s: float = 0.0
+    _resting: bool = False
+    closed: bool = False
+
+    @property
+    def resting(self) -> bool:
+        """Whether nobody can see it now."""
+        return self._resting
 
     @property
     def arriving_hz(self) -> float | None:
@@ -79,9 +91,16 @@ class ImageStream:
 
     @property
     def silent_s(self) -> float | None:
-        """Seconds since the last picture; None before the first."""
+        """Seconds in which somebody looked and no picture came; None before the first."""
         picture = self.picture
-        return self._images.clock() - picture.received_s if picture is not None else None
+        if picture is None:
+            return None
+        return self._images.clock() - max(picture.received_s, self._looked_s)
+
+    @property
+    def age_s(self) -> float | None:
+        """How old the picture is: seconds since it arrived; None before the first."""
+        return self._images.clock() - self.picture.received_s if self.picture is not None else None
 
     def want(self, size: Size | None) -> None:
         """The picture is shown so large (pixels of the screen); None: every pixel is wanted.
@@ -99,19 +118,40 @@ class ImageStream:
         if self.picture is not None:
             self._shown.add(self.picture.received_s)
 
+    def rest(self) -> None:
+        """Nobody can see it: nothing is received or decoded until `wake`; the picture stays."""
+        if not self._resting:
+            self._resting = self.awaits_picture = True
+            self._images.forget(self)
+            self._watch.rest()
+
+    def wake(self) -> None:
+        """Somebody looks again after a `rest`."""
+        if self._resting and not self.closed:
+            self._resting = False
+            self._looked_s = self._images.clock()
+            self._watch.wake()
+            self._images.add(self)
+
     def close(self) -> None:
         """Nobody looks any more; said twice it does nothing."""
+        self._resting = self.closed = True
         self._images.forget(self)
-        self._watch_closed()
+        self._watch.close()
+
+
+class Watching(Look, Protocol):
+    """What keeps a stream's topic subscribed (`app.core.watches.Watch`)."""
+
+    def close(self) -> None:
+        """For good; said twice it does nothing."""
 
 
 class Images:
     """All open streams and the thread that decodes for them."""
 
-    def __init__(
-        self, watch: Callable[[str], Callable[[], None]], clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        """``watch(topic)`` subscribes and returns what ends it; ``clock`` gives monotonic seconds."""
+    def __init__(self, watch: Callable[[str], Watching], clock: Callable[[], float] = time.monotonic) -> None:
+        """``watch(topic)`` subscribes until it is closed; ``clock`` gives monotonic seconds."""
         self._watch = watch
         self.clock = clock
         self.lock = threading.Lock()
@@ -123,12 +163,18 @@ class Images:
     def stream(self, topic: str) -> ImageStream:
         """Look at a topic's pictures until the stream is closed."""
         stream = ImageStream(topic, self, self._watch(topic))
+        self.add(stream)
+        return stream
+
+    def add(self, stream: ImageStream) -> None:
+        """A stream wants pictures, for the first time or again."""
         with self.lock:
-            self._streams.setdefault(topic, []).append(stream)
+            self._streams.setdefault(stream.topic, []).append(stream)
+            stream.arriving = Rate()
+            self._arrived.notify()  # one that is held may be wanted larger
             if self._thread is None and not self._closing:
                 self._thread = threading.Thread(target=self._decode_all, name="studio-images", daemon=True)
                 self._thread.start()
-        return stream
 
     def offer(self, messages: Sequence[Message]) -> None:
         """A sink: keep the newest message of each topic that somebody looks at. Called in nep's thread."""
@@ -144,8 +190,10 @@ class Images:
             self._arrived.notify()
 
     def forget(self, stream: ImageStream) -> None:
-        """A stream was closed."""
+        """A stream was closed, or rests."""
         with self.lock:
+            if not stream.held:
+                stream.waiting = None
             left = [other for other in self._streams.get(stream.topic, []) if other is not stream]
             if left:
                 self._streams[stream.topic] = left
@@ -220,11 +268,14 @@ class Images:
 
 def _give(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
     before = stream.picture
+    if stream.resting:
+        return  # nobody can see it; the next one after `wake` is shown
     if stream.held and before is not None and before.message is not message:
         return  # decoded while a person froze the picture before
     stream.error = error
     if picture is not None:
         stream.picture = picture
+        stream.awaits_picture = stream.awaits_picture and before is not None and before.message is message
 
 
 def _largest(streams: Sequence[ImageStream]) -> Size | None:

@@ -81,8 +81,8 @@ class Session:
         self.traffic = Traffic(self.topics)
         self.nodes = Nodes()
         self._mailbox, self._checks = Mailbox(), Checks()
-        self._watches = Watches(self._begin_watch, self._end_watch)
-        self.images = Images(lambda topic: self._watches.open([topic]).close, clock)
+        self._watches = Watches(self._begin_watch, self._end_watch, self._forget_watch)
+        self.images = Images(self.watch, clock)
         self.source: Source = source if source is not None else self._live_network()
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings)
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
@@ -185,7 +185,10 @@ class Session:
     def _end_watch(self, topic: str) -> None:
         self.source.unwatch(topic)
         self.topics.unwatch(topic)
-        self._health.forget(topic)
+        self.fleet.unwatched(topic)
+
+    def _forget_watch(self, topic: str) -> None:
+        self._health.forget(topic)  # not before: what is wrong does not depend on whether its panel shows
 
     def _make_stopper(self, node: Node) -> None:
         self.stopper = RobotStopper(node)

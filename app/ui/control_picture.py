@@ -102,6 +102,8 @@ class PictureChoice(QWidget):
         """The picture as the robot wants it, or the address that was typed; None while there is none."""
         if self._stream is not None:
             self._look()
+            if self._stream.awaits_picture:
+                return None  # the last picture may be from before its panel was hidden
         if self._image is not None:
             return encoded(self._image, bare=self._parameter.bare)
         return None if self._stream is not None else self.field.text().strip() or None
@@ -183,7 +185,7 @@ class PictureChoice(QWidget):
         if stream is None:
             return
         picture = stream.picture
-        if picture is not None and picture is not self._seen:
+        if picture is not None and picture is not self._seen and not stream.awaits_picture:
             self._seen = picture
             data = picture.bgra.data
             rows, columns = picture.bgra.shape[:2]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QCloseEvent, QCursor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
@@ -23,6 +24,8 @@ from app.ui.widgets import EmptyAction, EmptyState, paint
 from app.ui.widgets.menus import Menu, drop_below
 
 LEAST_BODY = QSize(160, 60)
+RESTS_AFTER_S = 2.0
+"""A panel that is hidden for a moment, by a quick change of tabs, stays subscribed."""
 
 _log = logging.getLogger(__name__)
 
@@ -109,6 +112,7 @@ class Dock(QDockWidget):
         self.description, self.panel = description, panel
         self.failed = False
         self.front = False
+        self._seen_s = -RESTS_AFTER_S
         self._theme = theme
         self.setObjectName(f"panel.{description.name}")
         self.setAccessibleName(description.title)
@@ -130,17 +134,34 @@ class Dock(QDockWidget):
         self.front = visible
 
     def shown(self) -> bool:
-        """Whether a person can see the panel now."""
-        return self.front and self.isVisible()
+        """Whether a person can see the panel now: it is open, in front, and its window is on the screen."""
+        return self.front and self.isVisible() and on_screen(self.window())
+
+    def follow(self, now: float) -> str | None:
+        """Let a panel rest that nobody has seen for two seconds, and wake one that is seen; called each tick.
+
+        ``now`` is monotonic seconds. The sentence of its failure when it just failed.
+        """
+        if self.failed:
+            return None
+        if self.shown():
+            self._seen_s = now
+            return self._try(self.panel.wake)
+        return self._try(self.panel.rest) if now - self._seen_s >= RESTS_AFTER_S else None
 
     def refresh(self) -> str | None:
         """Let the panel show what is new; the sentence of its failure when it just failed."""
         if self.failed or not self.shown():
             return None
+        return self._try(self.panel.refresh)
+
+    def _try(self, act: Callable[[], object]) -> str | None:
         try:
-            self.panel.refresh()
+            act()
         except Exception as error:  # noqa: BLE001  whatever a panel raises, the window lives on
             self.failed = True
+            with suppress(Exception):  # it shows nothing now, so it looks at nothing
+                self.panel.rest()
             sentence = f"{type(error).__name__}: {error}"
             self.body.fail(sentence, self.try_again)
             return sentence
@@ -227,6 +248,11 @@ class Dock(QDockWidget):
             drop_below(menu, anchor)
         else:
             menu.popup(QCursor.pos())
+
+
+def on_screen(window: QWidget) -> bool:
+    """Whether a window is not minimised, on another desktop, or wholly behind others where systems tell."""
+    return not window.isMinimized() and window.windowHandle().isExposed()
 
 
 def fitting(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:

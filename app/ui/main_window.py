@@ -49,9 +49,17 @@ class MainWindow(QMainWindow):
     bench_made = Signal()
 
     def __init__(
-        self, session: Session, theme: Theme, panels: Mapping[str, Panel], examples: Sequence[Example] = ()
+        self,
+        session: Session,
+        theme: Theme,
+        panels: Mapping[str, Panel],
+        examples: Sequence[Example] = (),
+        *,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        """``clock`` gives monotonic seconds: how long a panel has not been seen."""
         super().__init__()
+        self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
         self.state = WindowState(session.settings, self.complain)
         self.arrangements = Arrangements(self.state, self.complain)
@@ -63,6 +71,7 @@ class MainWindow(QMainWindow):
         self._facts = Facts(session)
         self._alerts_seen = -1
         self._ticks = self._halves = 0
+        self._twice = False  # the timer runs twice as often as the tick
         self._shut = False
         self._leaving = Leaving(self, self.editor, self.close)
         self._build(examples)
@@ -70,7 +79,7 @@ class MainWindow(QMainWindow):
         self.ring = FocusRing(theme, self)
         self.enter = EnterKey(self)
         self.timer = QTimer(self)
-        self.timer.setInterval(TICK_MS // 2)
+        self.timer.setInterval(TICK_MS)
         self.timer.timeout.connect(self._half_tick)
         self.settling = Settling(self)
         self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
@@ -198,12 +207,25 @@ class MainWindow(QMainWindow):
     # -- the tick ---------------------------------------------------------------------------------
 
     def _half_tick(self) -> None:
-        """60 times a second for pictures: at 30 every tenth or so would come twice within one and be lost."""
+        """60 times a second for pictures: at 30 every tenth or so would come twice within one and be lost.
+
+        While nobody sees a picture, the timer has half the pace, and each of its turns is a tick.
+        """
         self._halves += 1
-        if self._halves % 2:
+        if self._halves % 2 or not self._twice:
             self.tick()
         elif self.bench is not None:
             self.bench.refresh(pictures=True)
+
+    def _follow_panels(self) -> None:
+        """Let panels that nobody can see rest, and the timer run no faster than they need."""
+        now = self._clock()
+        for bench in self.benches.values():
+            bench.follow(now)
+        twice = self.bench is not None and self.bench.shows_pictures()
+        if twice != self._twice:
+            self._twice, self._halves = twice, 1
+            self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
 
     def tick(self) -> None:
         """Take what is new, and let everything that can be seen show it."""
@@ -219,6 +241,7 @@ class MainWindow(QMainWindow):
                     "studio", "error", "Studio has a fault and may show old values.", detail
                 )
         self._show_session()
+        self._follow_panels()
         if self.bench is not None:
             self.bench.refresh()
         spent = (time.perf_counter() - began) * 1000

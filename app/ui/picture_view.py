@@ -102,16 +102,16 @@ class PictureView(QWidget):
     def take(self, stream: ImageStream, boxes: tuple[Box, ...] = ()) -> None:
         """Show what the stream has now."""
         before = (self.words, self._boxes)
-        picture, silent_s = stream.picture, stream.silent_s
+        picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._takes += 1
         self._rate = rate_sentence(stream.shown_hz, stream.arriving_hz)
         if picture is not None and (self._takes % AGE_EVERY == 1 or not self._age):
             self._age = _age_of(picture)
         if stream.held:
-            self._state = f"Frozen, {age_words(silent_s)} old"
+            self._state = f"Frozen, {age_words(stream.age_s)} old"
         else:
             silent = silent_s is not None and silent_s > SILENT_AFTER_S
-            self._state = f"Last picture, {age_words(silent_s)} old" if silent else ""
+            self._state = f"Last picture, {age_words(stream.age_s)} old" if silent else ""
         if picture is not self._picture and picture is not None:
             self._picture = picture
             rows, columns = picture.bgra.shape[:2]
@@ -121,9 +121,10 @@ class PictureView(QWidget):
             if not stream.held:
                 stream.shown()
             self.update()
-        self._boxes = boxes
+        if not stream.held or picture is not shown:
+            self._boxes = boxes  # those on a frozen picture are frozen, too
         stream.want(self._wish())
-        if (self.words, boxes) != before:
+        if (self.words, self._boxes) != before:
             self.setAccessibleDescription(self.words)
             self.update()
 

@@ -17,6 +17,13 @@ class SessionPictures:
 
     def __init__(self, session: Session) -> None:
         self._session = session
+        self._opened: list[ImageStream] = []
+
+    @property
+    def streams(self) -> Sequence[ImageStream]:
+        """Those that are open now."""
+        self._opened = [stream for stream in self._opened if not stream.closed]
+        return self._opened
 
     def topics(self) -> Sequence[str]:
         """The picture topics that there are now."""
@@ -24,4 +31,6 @@ class SessionPictures:
 
     def stream(self, topic: str) -> ImageStream:
         """Look at one until it is closed."""
-        return self._session.images.stream(topic)
+        made = self._session.images.stream(topic)
+        self._opened = [*self.streams, made]
+        return made

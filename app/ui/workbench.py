@@ -223,14 +223,25 @@ class Workbench(QMainWindow):
 
     # -- the tick ---------------------------------------------------------------------------------
 
+    def follow(self, now: float) -> None:
+        """Panels that nobody can see rest, others wake; called with every tick, also while it is hidden."""
+        for name, dock in self.docks.items():
+            self._tell_failure(name, dock.follow(now))
+
+    def shows_pictures(self) -> bool:
+        """Whether a person sees a panel of pictures, which want to be refreshed twice as often."""
+        return any(dock.panel.shows_pictures and dock.shown() for dock in self.docks.values())
+
     def refresh(self, *, pictures: bool = False) -> None:
         """Let every panel that can be seen show what is new, or only those with ``pictures``."""
         for name, dock in self.docks.items():
             if pictures and not dock.panel.shows_pictures:
                 continue
-            sentence = dock.refresh()
-            if sentence is not None:
-                self.panel_failed.emit(name, sentence)
+            self._tell_failure(name, dock.refresh())
+
+    def _tell_failure(self, name: str, sentence: str | None) -> None:
+        if sentence is not None:
+            self.panel_failed.emit(name, sentence)
 
     def focus_home(self) -> None:
         """Give the keyboard to the panel that the layout is about: the first that shows."""

@@ -11,6 +11,7 @@ import pytest
 
 from app.core.images import Images, Rate
 from app.core.pictures import decode
+from app.core.watches import Watches
 from nep.message import Message
 
 
@@ -38,11 +39,7 @@ def watched() -> list[str]:
 
 @pytest.fixture
 def images(watched: list[str]):
-    def watch(topic: str) -> Callable[[], None]:
-        watched.append(topic)
-        return lambda: watched.remove(topic)
-
-    images = Images(watch)
+    images = Images(lambda topic: Watches(watched.append, watched.remove).open([topic]))
     yield images
     images.close()
 
@@ -210,3 +207,59 @@ def test_pictures_are_decoded_in_the_decoders_thread(images: Images) -> None:
     until(lambda: stream.error is not None)
     assert seen
     assert threading.get_ident() not in seen
+
+
+def test_a_stream_that_rests_decodes_nothing_and_keeps_its_picture(
+    images: Images, watched: list[str]
+) -> None:
+    stream, other = images.stream("/camera"), images.stream("/camera")
+    images.offer([jpeg((1, 2, 3), seq=1)])
+    until(lambda: stream.picture is not None and other.picture is not None)
+    assert not stream.awaits_picture
+    stream.rest()
+    stream.rest()
+    images.offer([jpeg((1, 2, 3), seq=2)])
+    until(lambda: other.picture is not None and other.picture.seq == 2)
+    assert (stream.picture is not None and stream.picture.seq, stream.awaits_picture) == (1, True)
+    other.rest()
+    assert watched == [], "nobody looks"
+    stream.wake()
+    assert watched == ["/camera"]
+    assert stream.awaits_picture, "what it has may be old"
+    images.offer([jpeg((1, 2, 3), seq=3)])
+    until(lambda: stream.picture is not None and stream.picture.seq == 3)
+    assert not stream.awaits_picture
+    stream.close()
+    stream.wake()
+    assert watched == [], "a stream that was closed stays closed"
+
+
+def test_a_camera_that_nobody_looked_at_is_not_silent_when_somebody_does() -> None:
+    now = [100.0]
+    images = Images(lambda topic: Watches(str, str).open([topic]), lambda: now[0])
+    stream = images.stream("/camera")
+    images.offer([jpeg((1, 2, 3))])
+    until(lambda: stream.picture is not None)
+    now[0] = 104.0
+    assert (stream.silent_s, stream.age_s) == (4.0, 4.0)
+    stream.rest()
+    now[0] = 200.0
+    stream.wake()
+    now[0] = 201.0
+    assert (stream.silent_s, stream.age_s) == (1.0, 101.0)
+    images.close()
+
+
+def test_a_picture_that_is_held_while_it_rests_can_still_be_wanted_larger(images: Images) -> None:
+    stream = images.stream("/camera")
+    stream.want((160, 120))
+    images.offer([large(1)])
+    until(lambda: stream.picture is not None)
+    assert stream.picture is not None
+    assert not stream.picture.whole
+    stream.hold(True)
+    stream.rest()
+    stream.want(None)
+    stream.wake()
+    until(lambda: stream.picture is not None and stream.picture.whole)
+    assert (stream.picture.seq, stream.awaits_picture) == (1, True)

@@ -15,3 +15,23 @@ def test_the_first_watch_begins_and_the_last_ends() -> None:
     first.close()
     assert calls == ["+/a", "+/b", "-/a", "-/b"]
     assert not watches.watched("/a")
+
+
+def test_a_watch_that_rests_is_not_subscribed_and_still_known() -> None:
+    calls: list[str] = []
+    watches = Watches(*(lambda topic, sign=sign: calls.append(f"{sign}{topic}") for sign in "+-!"))
+    first, second = watches.open(["/a"]), watches.open(["/a"])
+    first.rest()
+    first.rest()
+    assert (calls, watches.watched("/a"), first.resting) == (["+/a"], True, True)
+    second.close()
+    assert calls == ["+/a", "-/a"], "the other one only rests, and still wants to know"
+    first.wake()
+    first.wake()
+    assert calls == ["+/a", "-/a", "+/a"]
+    first.rest()
+    first.close()
+    assert calls == ["+/a", "-/a", "+/a", "-/a", "!/a"]
+    first.wake()
+    first.close()
+    assert (calls[-1], len(calls), watches.watched("/a")) == ("!/a", 5, False)

@@ -117,6 +117,13 @@ class Watch:
     def __init__(self, close: Callable[[], None]) -> None:
         self._close: Callable[[], None] | None = close
         self.open = True
+        self.resting = False
+
+    def rest(self) -> None:
+        self.resting = True
+
+    def wake(self) -> None:
+        self.resting = False
 
     def close(self) -> None:
         if self._close is not None:
@@ -134,8 +141,18 @@ class ImageStream:
         self.error: str | None = None
         self.painted: list[Picture] = []
         self.closed = False
-        self.held = False
+        self.held = self.awaits_picture = self.resting = False
         self.wishes: list[tuple[int, int] | None] = []
+
+    @property
+    def age_s(self) -> float | None:
+        return self.silent_s
+
+    def rest(self) -> None:
+        self.resting = True
+
+    def wake(self) -> None:
+        self.resting = False
 
     def want(self, size: tuple[int, int] | None) -> None:
         if not self.wishes or self.wishes[-1] != size:

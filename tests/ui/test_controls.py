@@ -367,6 +367,10 @@ def test_the_newest_picture_of_a_topic_at_the_moment_of_try_is_sent(qtbot, theme
     cameras.made.picture = fakes.picture(160, 120)
     sent = decoded(form.input()["p"])
     assert (sent.width(), sent.height()) == (160, 120)
+    cameras.made.awaits_picture = True  # its panel was hidden: what it has may be from long ago
+    assert form.input() == {}
+    cameras.made.awaits_picture = False
+    assert decoded(form.input()["p"]).width() == 160
     form.shut()
     assert not choice._timer.isActive()
 

@@ -72,6 +72,17 @@ def test_it_says_how_many_are_shown_and_their_size(view) -> None:
     assert rate_sentence(17.2, 15.0) == "shown 15 of 15/s"  # two windows of time: never more than arrive
 
 
+def test_the_boxes_of_a_frozen_picture_are_frozen_too(view) -> None:
+    stream, boxes = stream_of(picture()), boxes_of(FACES)
+    view.take(stream, boxes)  # type: ignore[arg-type]
+    stream.held = True
+    view.take(stream, ())  # type: ignore[arg-type]
+    assert view.boxes == boxes
+    stream.held = False
+    view.take(stream, ())  # type: ignore[arg-type]
+    assert view.boxes == ()
+
+
 def test_each_picture_is_told_as_shown_once(view) -> None:
     stream = stream_of(picture())
     view.take(stream)  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ there when nothing changed. It never imports another panel; what concerns the wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -19,6 +19,7 @@ from app.ui.theme import Theme
 
 if TYPE_CHECKING:
     from app.core.session import Session
+    from app.core.watches import Look
 
 Density = Literal["compact", "comfortable"]
 ANY_TYPE = "*"
@@ -149,6 +150,22 @@ class PanelWidget(QWidget):
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         """Take over what `save_state` gave; whatever does not fit is left out."""
+
+    def looks(self) -> Iterable[Look | None]:
+        """The watches and streams that only cost while the panel can be seen; None stands for none."""
+        return ()
+
+    def rest(self) -> None:
+        """Nobody has seen the panel for a while: it keeps what it shows and gets nothing new."""
+        for look in self.looks():
+            if look is not None:
+                look.rest()
+
+    def wake(self) -> None:
+        """The panel can be seen, perhaps again: it gets what is new."""
+        for look in self.looks():
+            if look is not None:
+                look.wake()
 
     def shut(self) -> None:
         """The panel leaves the window: end its watches and streams."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from app.blocks import Program
     from app.core.document import Document
     from app.core.runs import Runs
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
 
 LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
 TOOLBOX_WIDTH = 196
@@ -272,6 +272,9 @@ class BehaviourPanel(PanelWidget):
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         self.set_mode("python" if state.get("mode") == "python" else "blocks")
+
+    def looks(self) -> Iterable[Look | None]:
+        return self._watches.values()
 
     def shut(self) -> None:
         self._sensors = self._offered = ()

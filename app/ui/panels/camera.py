@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
@@ -16,7 +16,7 @@ from app.ui.words import age_words
 if TYPE_CHECKING:
     from app.core.images import ImageStream
     from app.core.robot_link import RobotLink
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
 
 
 class CameraPanel(PanelWidget):
@@ -91,6 +91,9 @@ class CameraPanel(PanelWidget):
         self.empty.say("No pictures yet", f"The next picture of {link.name} appears here.")
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._stream, self._watch)
 
     def shut(self) -> None:
         if self._stream is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -18,7 +19,7 @@ from app.ui.words import age_words
 
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
 
 TITLE_WIDTH = 96
 BESIDE_FROM = 300
@@ -208,6 +209,9 @@ class HealthPanel(PanelWidget):
         super().theme_changed()
         self._make_rows(0)
         self._facts = ()
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._watch,)
 
     def shut(self) -> None:
         if self._watch is not None:

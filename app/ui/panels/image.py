@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
     from app.core.images import ImageStream
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
     from nep.message import Message
 
 CODEC = "image"
@@ -235,6 +235,9 @@ class ImagePanel(PanelWidget):
         if self._watch is not None:
             self._watch.close()
         self._watch, self._watched_robot = None, ""
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._stream, self._watch)
 
     def shut(self) -> None:
         self.job.wait()

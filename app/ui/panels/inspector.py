@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QModelIndex, QPoint, Qt
@@ -30,7 +30,7 @@ from app.ui.widgets.menus import Menu
 if TYPE_CHECKING:
     from app.core.lazy_json import JsonIndex
     from app.core.topics import Topic
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
     from nep.message import Message
 
 FIRST_ROWS = 24
@@ -286,6 +286,9 @@ class InspectorPanel(PanelWidget):
         if self._watch is not None:
             self._watch.close()
             self._watch = None
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._watch,)
 
     def shut(self) -> None:
         self._leave()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
 STALE = QColor(90, 90, 90, 150)
@@ -219,6 +219,14 @@ class RobotPanel(PanelWidget):
     def _change(self, change: Mapping[str, object]) -> None:
         if self._robot:
             self.session.fleet.world(self._robot, change)
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._watch,)
+
+    def wake(self) -> None:
+        if self._watch is not None and self._watch.resting:
+            self._told_s = time.monotonic()  # it is not to blame that nobody looked
+        super().wake()
 
     def shut(self) -> None:
         if self._watch is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
@@ -30,7 +30,7 @@ from app.ui.words import plural
 
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
 
 UNFOLDED = 4
 LIST_FROM_WIDTH = 760
@@ -49,6 +49,7 @@ class RobotsPanel(PanelWidget):
         self._cards_of = ""
         self._pictures = SessionPictures(self.session)
         self._seen: dict[str, tuple[object, ...]] = {}
+        self._told: dict[tuple[str, str], list[str]] = {}
         self._lay_out()
         application = QApplication.instance()
         if isinstance(application, QApplication):
@@ -228,7 +229,9 @@ class RobotsPanel(PanelWidget):
         """What a property of the robot offers to choose from now."""
         link = self.session.fleet.link(self._robot)
         value = link.values.get(name) if link is not None else None
-        return [str(item) for item in value] if isinstance(value, (list, tuple)) else []
+        if isinstance(value, (list, tuple)):
+            self._told[self._robot, name] = [str(item) for item in value]
+        return self._told.get((self._robot, name), [])  # also while nobody looked and nothing came again yet
 
     def _filter(self) -> None:
         words = self.finder.text().casefold().split()
@@ -288,6 +291,9 @@ class RobotsPanel(PanelWidget):
     def focus_filter(self) -> bool:
         self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)
         return True
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._watch, *self._pictures.streams)
 
     def shut(self) -> None:
         if self._watch is not None:

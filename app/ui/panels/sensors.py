@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -19,7 +20,7 @@ from app.ui.words import age_words
 
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
-    from app.core.watches import Watch
+    from app.core.watches import Look, Watch
 
 ROW = {"compact": 26, "comfortable": 28}
 FIRST = ("touch", "distance", "battery")  # what people look for; the others keep their order
@@ -176,6 +177,9 @@ class SensorsPanel(PanelWidget):
             row.large = density == "comfortable"
             row.updateGeometry()
         super().set_density(density)
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._watch,)
 
     def shut(self) -> None:
         if self._watch is not None:

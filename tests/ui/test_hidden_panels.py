@@ -1,0 +1,315 @@
+"""Panels that nobody can see cost nothing: no watches, no streams, no 60 Hz; seen again, they get them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QMainWindow
+
+from app.core.session import Session
+from app.core.settings import Settings
+from app.core.source import GraphSeen, Job
+from app.robots import simulated
+from app.robots.description import parse, td_for
+from app.ui.docks import RESTS_AFTER_S, Dock
+from app.ui.main_window import TICK_MS, MainWindow
+from app.ui.panel_shelf import PanelShelf
+from app.ui.panels.camera import CameraPanel
+from app.ui.panels.image import ImagePanel
+from app.ui.panels.inspector import InspectorPanel
+from app.ui.panels.robot import RobotPanel
+from app.ui.theme import Theme
+from nep.message import Message
+from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from tests.ui.shell_parts import PANELS
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+CAMERA, OTHER, STATE = "/Pepper/camera", "/webcam", "/Pepper/state"
+
+
+class Wishes:
+    """A source that only writes down which topics are wanted."""
+
+    address = "127.0.0.1:1"
+
+    def __init__(self) -> None:
+        self.wanted: set[str] = set()
+        self.asked: list[str] = []
+
+    def start(self) -> None:
+        """Nothing to begin."""
+
+    def watch(self, topic: str) -> None:
+        self.wanted.add(topic)
+        self.asked.append(topic)
+
+    def unwatch(self, topic: str) -> None:
+        self.wanted.discard(topic)
+
+    def submit(self, what: str, job: Job) -> None:
+        """Nobody does it."""
+
+    def missed(self) -> Mapping[str, int]:
+        return {}
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
+def graph() -> GraphView:
+    sender = (PublisherInfo(1, "n1", (), False, 1, 1, 1, 1, 15.0, 1.0),)
+    names = {CAMERA: "image", OTHER: "image", "/words": "json"}
+    topics = {name: TopicInfo(name, codec, codec, sender) for name, codec in names.items()}
+    return GraphView(1, 1, {"n1": NodeInfo("n1", "Pepper", "there", 5, "python", "native", 0)}, topics)
+
+
+class Case:
+    """A window with the real panels on a session that talks to nobody, and its clock."""
+
+    def __init__(self, home: Path, theme: Theme) -> None:
+        self.now = 100.0
+        self.source = Wishes()
+        self.session = Session(
+            Settings(home),
+            address=self.source.address,
+            source=self.source,
+            journal_folder=home / "journal",
+            start_companions=False,
+        )
+        self.session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
+        self.session._mailbox.post_event(GraphSeen(graph(), 0.0))
+        panels = {**PanelShelf(), "behaviour": PANELS["behaviour"]}
+        self.window = MainWindow(self.session, theme, panels, clock=lambda: self.now)
+
+    def tick(self, seconds: float = 0.0) -> None:
+        self.now += seconds
+        self.window.tick()
+
+    def hide_for_long(self) -> None:
+        """What is hidden now is hidden for longer than it stays subscribed."""
+        self.tick()
+        self.tick(RESTS_AFTER_S)
+
+    def dock(self, name: str) -> Dock:
+        bench = self.window.bench
+        assert bench is not None
+        dock = bench.open(name)
+        assert dock is not None
+        return dock
+
+    def arrive(self, topic: str, data: bytes, codec: str = "json") -> None:
+        message = Message(topic, data, codec, codec)
+        self.session._checks.look(topic, [message])
+        self.session._mailbox.post(topic, [message])
+
+
+@pytest.fixture
+def case(qtbot, theme: Theme, home: Path) -> Iterator[Case]:
+    made = Case(home, theme)
+    qtbot.addWidget(made.window)
+    theme.apply()
+    made.window.resize(1440, 900)
+    made.window.show()
+    qtbot.waitExposed(made.window)
+    yield made
+    made.window.close()
+
+
+def settle(qtbot, case: Case, dock: Dock) -> None:
+    qtbot.waitUntil(dock.shown)
+    case.tick()
+
+
+def test_a_closed_panel_looks_at_nothing_and_does_again_when_it_is_opened(qtbot, case: Case) -> None:
+    case.window.show_layout("behaviour")
+    camera = case.dock("camera")
+    settle(qtbot, case, camera)
+    assert {CAMERA, STATE} <= case.source.wanted
+    camera.close()
+    case.tick()
+    case.tick(RESTS_AFTER_S - 0.1)
+    assert CAMERA in case.source.wanted, "a panel that is hidden for a moment stays subscribed"
+    case.tick(0.1)
+    assert CAMERA not in case.source.wanted
+    assert STATE in case.source.wanted, "the robot that is drawn is still seen"
+    before = case.source.asked.count(CAMERA)
+    settle(qtbot, case, case.dock("camera"))
+    assert CAMERA in case.source.wanted
+    assert case.source.asked.count(CAMERA) == before + 1
+
+
+def test_a_panel_behind_another_tab_looks_at_nothing(qtbot, case: Case) -> None:
+    case.window.show_layout("developer")
+    image, inspector = case.dock("image"), case.dock("inspector")
+    image.panel.show_topic(OTHER)
+    settle(qtbot, case, image)
+    assert case.source.wanted >= {OTHER}
+    camera = case.dock("camera")  # shares the place of the pictures
+    qtbot.waitUntil(lambda: camera.shown() and not image.shown())
+    case.hide_for_long()
+    assert OTHER not in case.source.wanted
+    assert CAMERA in case.source.wanted
+    image.raise_()
+    settle(qtbot, case, image)
+    assert OTHER in case.source.wanted
+    assert inspector.shown()
+
+
+def test_a_quick_change_of_tabs_subscribes_nothing_anew(qtbot, case: Case) -> None:
+    case.window.show_layout("developer")
+    image = case.dock("image")
+    image.panel.show_topic(OTHER)
+    settle(qtbot, case, image)
+    camera = case.dock("camera")
+    settle(qtbot, case, camera)
+    asked = len(case.source.asked)
+    for _ in range(5):
+        for dock in (image, camera):
+            dock.raise_()
+            settle(qtbot, case, dock)
+            case.tick(RESTS_AFTER_S / 3)
+    assert len(case.source.asked) == asked
+
+
+def test_a_layout_that_does_not_show_and_its_floating_panels_look_at_nothing(qtbot, case: Case) -> None:
+    case.window.show_layout("developer")
+    image = case.dock("image")
+    image.panel.show_topic(OTHER)
+    image.setFloating(True)
+    settle(qtbot, case, image)
+    case.window.show_start()
+    qtbot.waitUntil(lambda: not image.isVisible())
+    case.hide_for_long()
+    assert OTHER not in case.source.wanted
+    case.window.show_layout("developer")
+    settle(qtbot, case, image)
+    assert OTHER in case.source.wanted
+
+
+def test_a_minimised_window_looks_at_nothing_and_its_timer_is_slow(qtbot, case: Case) -> None:
+    case.window.show_layout("behaviour")
+    camera = case.dock("camera")
+    settle(qtbot, case, camera)
+    assert case.window.timer.interval() == TICK_MS // 2
+    with_panels = set(case.source.wanted)
+    case.window.showMinimized()
+    qtbot.waitUntil(lambda: not camera.shown())
+    case.hide_for_long()
+    assert case.source.wanted == {"/Pepper/answer"}, "answers of robots do not depend on what is seen"
+    assert case.window.timer.interval() == TICK_MS
+    before = case.window._ticks
+    case.window.timer.timeout.emit()
+    case.window.timer.timeout.emit()
+    assert case.window._ticks == before + 2, "the session goes on at its pace"
+    case.window.showNormal()
+    settle(qtbot, case, camera)
+    assert case.source.wanted == with_panels
+    assert case.window.timer.interval() == TICK_MS // 2
+
+
+def test_a_frozen_picture_and_a_message_are_kept_while_they_are_hidden(qtbot, case: Case) -> None:
+    case.window.show_layout("developer")
+    image, inspector = case.dock("image").panel, case.dock("inspector").panel
+    assert isinstance(image, ImagePanel)
+    assert isinstance(inspector, InspectorPanel)
+    image.show_topic(OTHER)
+    inspector.show_topic("/words")
+    settle(qtbot, case, case.dock("image"))
+    case.arrive("/words", b'{"a": 1}')
+    case.tick()
+    inspector.freeze.setChecked(True)
+    image.freeze.setChecked(True)
+    stream = image._stream
+    case.window.showMinimized()
+    qtbot.waitUntil(lambda: not case.window.isActiveWindow() or case.window.isMinimized())
+    case.hide_for_long()
+    assert not case.source.wanted & {OTHER, "/words"}
+    case.window.showNormal()
+    settle(qtbot, case, case.dock("image"))
+    assert case.source.wanted >= {OTHER, "/words"}
+    assert (image._stream, image.freeze.isChecked()) == (stream, True)
+    assert inspector.frozen
+    assert inspector.model.value() == {"a": 1}
+
+
+def test_what_is_wrong_is_told_also_while_its_panel_is_hidden(qtbot, case: Case) -> None:
+    case.window.show_layout("developer")
+    inspector = case.dock("inspector")
+    inspector.panel.show_topic("/words")
+    settle(qtbot, case, inspector)
+    case.arrive("/words", b"{no json")
+    case.tick()
+    assert case.session.alerts.has("message:/words")
+    inspector.close()
+    case.hide_for_long()
+    assert "/words" not in case.source.wanted
+    assert case.session.alerts.has("message:/words")
+    inspector.panel.show_topic(OTHER)
+    assert not case.session.alerts.has("message:/words"), "nobody wants to know any more"
+
+
+def test_a_robot_that_was_not_looked_at_is_not_stale_when_it_is_seen_again(qtbot, case: Case) -> None:
+    case.window.show_layout("behaviour")
+    dock = case.dock("robot")
+    settle(qtbot, case, dock)
+    panel = dock.panel
+    assert isinstance(panel, RobotPanel)
+    case.arrive(STATE, b'{"x": 1}')
+    case.tick()
+    dock.close()
+    case.hide_for_long()
+    panel._told_s -= 60
+    settle(qtbot, case, case.dock("robot"))
+    assert not panel.view.stale
+
+
+def test_what_a_robot_told_while_nobody_looked_is_not_known(qtbot, case: Case) -> None:
+    case.window.show_layout("behaviour")
+    sensors, health, robot = (case.dock(name) for name in ("sensors", "health", "robot"))
+    case.dock("camera")
+    settle(qtbot, case, sensors)
+    case.arrive("/Pepper/battery", b'{"value": 84}')
+    case.tick()
+    link = case.session.fleet.link("Pepper")
+    assert link is not None
+    assert link.values["battery"] == 84
+    for dock in (sensors, health, robot):
+        dock.close()
+    case.hide_for_long()
+    assert link.values["battery"] == 84, "the camera looks at the robot, too"
+    case.dock("camera").close()
+    case.hide_for_long()
+    assert "battery" not in link.values
+
+
+def test_a_panel_that_fails_looks_at_nothing_until_it_is_tried_again(qtbot, case: Case) -> None:
+    case.window.show_layout("behaviour")
+    camera = case.dock("camera")
+    settle(qtbot, case, camera)
+    assert isinstance(camera.panel, CameraPanel)
+    assert case.source.wanted >= {CAMERA}
+    view, camera.panel.view = camera.panel.view, None  # type: ignore[assignment]  # whatever makes it raise
+    case.tick()
+    assert camera.failed
+    assert CAMERA not in case.source.wanted
+    camera.panel.view = view
+    camera.try_again()
+    case.tick()
+    assert not camera.failed
+    assert CAMERA in case.source.wanted
+
+
+def test_every_panel_that_watches_tells_what_it_looks_at(case: Case) -> None:
+    """Whatever a panel opens is among its `looks`: nothing of it is wanted while no panel can be seen."""
+    assert isinstance(case.window, QMainWindow)
+    for layout in ("behaviour", "developer"):
+        case.window.show_layout(layout)
+        for name in case.window.panels:
+            if name != "behaviour":
+                case.dock(name).panel.refresh()
+    case.window.show_start()
+    case.hide_for_long()
+    assert case.source.wanted == {"/Pepper/answer"}
