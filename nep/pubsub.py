@@ -5,13 +5,12 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
 from nep.codecs import codec_for
 from nep.encoded import Encoded, encoded
-from nep.errors import ClosedError, DecodeError, EncodeError
+from nep.errors import ClosedError, DecodeError
 from nep.message import Message
 
 if TYPE_CHECKING:
@@ -33,7 +32,6 @@ class Publisher:
         self._spec = spec
         self._encode = spec.codec.encode
         self._is_latched = spec.is_latched
-        self._is_unweighed = spec.codec.name != "image"
         self._is_closed = False
 
     @property
@@ -69,30 +67,25 @@ class Publisher:
     def publish(self, payload: object) -> None:
         """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.
 
-        With no subscriber nothing but the first is encoded, unless it is latched. Raises `EncodeError`,
+        With no subscriber nothing is encoded, unless it is latched. Raises `EncodeError`,
         `ClosedError`.
         """
-        if self._is_closed or not (self._outlet.subscribers or self._is_latched):
-            self._skip(payload)
+        if self._is_closed or not (self._outlet.is_heard or self._is_latched):
+            self._skip()
         else:
             self._outlet.send(payload if isinstance(payload, Encoded) else self._encode(payload))
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send bytes that are encoded already. Raises `ClosedError`."""
-        if self._is_closed or not (self._outlet.subscribers or self._is_latched):
-            self._skip(Encoded(data))
+        if self._is_closed or not (self._outlet.is_heard or self._is_latched):
+            self._skip()
         else:
             self._outlet.send(encoded((data, extension)))
 
-    def _skip(self, payload: object) -> None:
+    def _skip(self) -> None:
         """Count a message that nobody wants."""
         if self._is_closed:
             raise ClosedError(f"publisher '{self.topic}'")
-        if self._is_unweighed:
-            self._is_unweighed = False
-            with suppress(EncodeError):  # told when somebody wants it
-                known = payload if isinstance(payload, Encoded) else self._encode(payload)
-                self._outlet.weigh(len(known.data))
         self._outlet.skip()
 
     def close(self, timeout_s: float = 2.0) -> None:

@@ -4,7 +4,7 @@ A message is three parts, or four: topic and `\0`, a header of 32 bytes, the pay
 the header's flag says so. Small ones travel with the first three in one part, to subscribers whose hello says
 that they read it. Beside messages three notices travel, all under a subscriber's own hello topic
 `\xffhello/<subscriber id>/<topic>`: *echo* (topic and header: "I have seen you; my messages are counted from
-here"), *bye* (the same with the flag BYE: "nothing comes after this") and the latched message (all parts).
+here"), *bye* (the same with the flag BYE: "nothing comes after this") and messages for it alone (all parts).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ __all__ = [
     "VERSION",
     "Header",
     "Hello",
+    "Read",
     "apart",
     "check_node_name",
     "check_size",
@@ -37,8 +38,10 @@ __all__ = [
     "join",
     "pack_quickly",
     "parse_hello",
+    "parse_read",
     "read_extension",
     "read_header",
+    "read_part",
     "topic_part",
     "unpack_at",
     "unpack_quickly",
@@ -62,6 +65,10 @@ HELLO = b"\xffhello/"
 """How a hello filter starts. 0xff sorts behind all of UTF-8, so it is installed after the topic filter."""
 HELLO_ONE = b"\xffhello1/"
 """The same of a subscriber that also reads messages of one part."""
+HELLO_TELLS = b"\xffhello2/"
+"""The same of one that besides answers every later echo with what it has read."""
+READ = b"\xffread/"
+"""How a filter starts that answers an echo. It is taken back at once."""
 
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
 _QUICKLY = struct.Struct("<IIQQQ")  # the first three in one
@@ -143,28 +150,59 @@ def topic_part(topic: str) -> bytes:
 
 
 class Hello(NamedTuple):
-    """What a hello filter says: who subscribes to what, and whether messages may come to it in one part."""
+    """What a hello filter says: who subscribes to what.
+
+    `one_part`: messages may come to it in one part. `tells`: it tells what it has read.
+    """
 
     subscriber: int
     topic: str
     one_part: bool
+    tells: bool = False
 
 
-def hello_part(subscriber: int, topic: str, *, one_part: bool = False) -> bytes:
+class Read(NamedTuple):
+    """What a subscriber has read of a publisher: everything up to `seq`. It wants `bound_bytes` under way."""
+
+    subscriber: int
+    publisher: int
+    seq: int
+    bound_bytes: int
+
+
+def hello_part(subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False) -> bytes:
     """The hello filter of a subscriber, and the first part of what is sent to it alone."""
-    return (HELLO_ONE if one_part else HELLO) + f"{subscriber:016x}/{topic}".encode()
+    begin = HELLO_TELLS if tells else HELLO_ONE if one_part else HELLO
+    return begin + f"{subscriber:016x}/{topic}".encode()
 
 
 def parse_hello(part: bytes) -> Hello | None:
     """What a hello filter says; None for anything else."""
-    one_part = part.startswith(HELLO_ONE)
-    if not one_part and not part.startswith(HELLO):
+    begin = next((each for each in (HELLO_TELLS, HELLO_ONE, HELLO) if part.startswith(each)), None)
+    if begin is None:
         return None
-    digits, slash, topic = part[len(HELLO_ONE if one_part else HELLO) :].partition(b"/")
+    digits, slash, topic = part[len(begin) :].partition(b"/")
     try:
         if len(digits) != 16 or not slash:
             return None
-        return Hello(int(digits, 16), topic.decode("utf-8"), one_part)
+        tells = begin == HELLO_TELLS
+        return Hello(int(digits, 16), topic.decode("utf-8"), tells or begin == HELLO_ONE, tells)
+    except ValueError:
+        return None
+
+
+def read_part(read: Read) -> bytes:
+    """The filter that answers an echo."""
+    return READ + b"/".join(b"%016x" % number for number in read)
+
+
+def parse_read(part: bytes) -> Read | None:
+    """What such a filter says; None for anything else."""
+    words = part[len(READ) :].split(b"/")
+    if not part.startswith(READ) or [len(each) for each in words] != [16] * 4:
+        return None
+    try:
+        return Read(*(int(each, 16) for each in words))
     except ValueError:
         return None
 

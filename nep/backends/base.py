@@ -74,15 +74,16 @@ class Outlet(Protocol):
         """How many subscribers are connected now."""
 
     @property
+    def is_heard(self) -> bool:
+        """Whether anybody gets what is sent, also those that are not counted in `subscribers`."""
+
+    @property
     def missing(self) -> tuple[str, ...]:
         """Names of nodes whose subscribers are registered and have not connected."""
 
     @property
     def count(self) -> int:
         """Messages published so far."""
-
-    def weigh(self, size_bytes: int) -> None:
-        """Nobody listens yet, and the messages will be of this size: choose how many may be queued."""
 
     def skip(self) -> None:
         """Count a message that nobody wants."""

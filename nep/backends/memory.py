@@ -91,8 +91,10 @@ class MemoryOutlet:
         """How many inlets there are on the topic."""
         return len(self.hub.inlets.get(self.spec.topic, ()))
 
-    def weigh(self, size_bytes: int) -> None:
-        """Nothing is ever queued here."""
+    @property
+    def is_heard(self) -> bool:
+        """Whether there is one."""
+        return self.subscribers > 0
 
     def skip(self) -> None:
         """Count a message that nobody wants."""

@@ -55,7 +55,7 @@ def test_gaps_are_losses_counted_from_the_echo() -> None:
     sources = Sources()
     sources.reached(1, 10)
     for seq in (11, 12, 15):
-        assert sources.arrived(1, seq, is_resent=False)
+        assert sources.arrived(1, seq, is_alone=False)
     assert (sources.received, sources.lost) == (3, 2)
     sources.reached(1, 17)  # it reconnected: two were published meanwhile
     assert sources.lost == 4
@@ -63,15 +63,15 @@ def test_gaps_are_losses_counted_from_the_echo() -> None:
 
 def test_counting_starts_at_the_first_message_when_there_is_no_echo_yet() -> None:
     sources = Sources()
-    assert sources.arrived(1, 100, is_resent=False)
+    assert sources.arrived(1, 100, is_alone=False)
     sources.reached(1, 100)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_a_latched_message_that_is_sent_again_is_dropped() -> None:
     sources = Sources()
-    assert sources.arrived(1, 5, is_resent=True)
-    assert not sources.arrived(1, 5, is_resent=True)
+    assert sources.arrived(1, 5, is_alone=True)
+    assert not sources.arrived(1, 5, is_alone=True)
     assert (sources.received, sources.lost) == (1, 0)
 
 
@@ -79,12 +79,12 @@ def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late()
     sources = Sources()
     sources.reached(1, 0)
     sources.get(1).has_echoed = True
-    sources.arrived(1, 1, is_resent=False)
+    sources.arrived(1, 1, is_alone=False)
     sources.promised(1, 3)
     assert sources.lost == 0  # they may be on their way
     sources.promised(1, 3)
     assert sources.lost == 2
-    assert sources.arrived(1, 2, is_resent=False)
+    assert sources.arrived(1, 2, is_alone=False)
     assert (sources.received, sources.lost) == (2, 1)
     sources.promised(99, 5)  # nobody we know
 
@@ -241,30 +241,30 @@ def test_the_public_names_are_there() -> None:
 def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
     sources = Sources()
     sources.reached(1, 0)
-    assert sources.arrived(1, 1, is_resent=False)
+    assert sources.arrived(1, 1, is_alone=False)
     with pytest.raises(nep.errors.WireError, match="its number leaps from 1 to 18446744073709551615"):
-        sources.arrived(1, 2**64 - 1, is_resent=False)
+        sources.arrived(1, 2**64 - 1, is_alone=False)
     assert not sources.reached(1, 2**64 - 1)
     sources.get(1).has_echoed = True
     for _ in range(3):
         sources.promised(1, 2**64 - 1)
-    assert sources.arrived(1, 3, is_resent=False)
+    assert sources.arrived(1, 3, is_alone=False)
     assert (sources.received, sources.lost, sources.get(1).last) == (2, 1, 3)
 
 
 def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
     sources = Sources()
-    assert sources.arrived(1, 1, is_resent=False)
+    assert sources.arrived(1, 1, is_alone=False)
     far = 1 + 2**32 + 1
     with pytest.raises(nep.errors.WireError):
-        sources.arrived(1, far, is_resent=False)
-    assert sources.arrived(1, far + 1, is_resent=False)
-    assert sources.arrived(1, far + 3, is_resent=False)
+        sources.arrived(1, far, is_alone=False)
+    assert sources.arrived(1, far + 1, is_alone=False)
+    assert sources.arrived(1, far + 3, is_alone=False)
     assert (sources.received, sources.lost) == (3, 1)
 
 
 def test_the_largest_gap_that_can_be_is_counted() -> None:
     sources = Sources()
-    assert sources.arrived(1, 1, is_resent=False)
-    assert sources.arrived(1, 1 + 2**32, is_resent=False)
+    assert sources.arrived(1, 1, is_alone=False)
+    assert sources.arrived(1, 1 + 2**32, is_alone=False)
     assert sources.lost == 2**32 - 1

@@ -90,10 +90,10 @@ def test_one_part_is_split_like_three(topic: str, header: wire.Header, payload: 
     assert wire.split([b"".join(parts)]) == wire.split(parts)
 
 
-@given(st.integers(0, 2**64 - 1), TOPICS, st.booleans())
-def test_a_hello_is_read_back(subscriber: int, topic: str, one_part: bool) -> None:
-    part = wire.hello_part(subscriber, topic, one_part=one_part)
-    assert wire.parse_hello(part) == (subscriber, topic, one_part)
+@given(st.integers(0, 2**64 - 1), TOPICS, st.booleans(), st.booleans())
+def test_a_hello_is_read_back(subscriber: int, topic: str, one_part: bool, tells: bool) -> None:
+    part = wire.hello_part(subscriber, topic, one_part=one_part, tells=tells)
+    assert wire.parse_hello(part) == (subscriber, topic, one_part or tells, tells)
     assert part > wire.topic_part(topic)  # libzmq sends filters in byte order
 
 
@@ -110,6 +110,19 @@ def test_a_hello_is_read_back(subscriber: int, topic: str, one_part: bool) -> No
 )
 def test_what_is_no_hello(part: bytes) -> None:
     assert wire.parse_hello(part) is None
+
+
+@given(st.builds(wire.Read, *[st.integers(0, 2**64 - 1)] * 4))
+def test_what_was_read_is_read_back(read: wire.Read) -> None:
+    assert wire.parse_read(wire.read_part(read)) == read
+    assert wire.parse_hello(wire.read_part(read)) is None
+
+
+@given(st.binary(max_size=80) | st.text("0123456789abcdef/-", max_size=70).map(str.encode))
+def test_what_is_no_such_answer(junk: bytes) -> None:
+    read = wire.parse_read(b"\xffread/" + junk)
+    assert read is None or wire.read_part(read) == b"\xffread/" + junk.lower()
+    assert wire.parse_read(junk) is None
 
 
 @pytest.mark.parametrize("topic", ["a", "/Pepper/camera", "ü/ä", "x" * 200, "a=b,c", "機器人"])

@@ -15,7 +15,6 @@ from nep.backends.native.readable import Into
 from nep.backends.native.reading import SocketInlet
 from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import (
-    SendMark,
     Socket,
     bind,
     connect,
@@ -23,6 +22,7 @@ from nep.backends.native.sockets import (
     wait_shortly,
     wait_until,
 )
+from nep.backends.native.window import BACKLOG_STEP_BYTES, Backlog
 from nep.codecs import codec_for
 from nep.configuration import Direct
 from nep.encoded import Encoded
@@ -30,6 +30,11 @@ from nep.errors import ClosedError, WireError
 from nep.message import Message
 
 __all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach"]
+
+_MARKS = {"image": 64, "bytes": 1000}
+_MARK = 10_000
+"""How many messages libzmq queues for each connection. For what is small these are fewer bytes than it may
+hold for all of them together, so that one subscriber that reads nothing takes nothing from the others."""
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
@@ -61,10 +66,17 @@ class OriginalOutlet:
         self._filters = 0
         self._is_closed = False
         self._linger_ms = 0
-        self._mark = SendMark(socket, spec.codec.name)
+        self._backlog = Backlog()
+        self._untracked_bytes = 0
+        socket.setsockopt(zmq.SNDHWM, _MARKS.get(spec.codec.name, _MARK))
         self._changed = threading.Condition(threading.Lock())
         socket.setsockopt(zmq.XPUB_VERBOSER, 1)  # so that filters can be counted: one a subscriber
         self.fd = int(socket.getsockopt(zmq.FD))
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether there are any filters."""
+        return self._filters > 0
 
     @property
     def subscribers(self) -> int:
@@ -75,12 +87,6 @@ class OriginalOutlet:
         """Wait until somebody listens."""
         with self._changed:
             wait_until(self._changed, lambda: self._filters > 0, timeout_s)
-
-    def weigh(self, size_bytes: int) -> None:
-        """Messages will be of this size. Better before anybody connects: see `SendMark`."""
-        with self._changed:
-            if not self._mark.is_set and not self._socket.closed:
-                self._mark.sending(size_bytes)
 
     def skip(self) -> None:
         """Count a message that nobody wants."""
@@ -96,10 +102,19 @@ class OriginalOutlet:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.count += 1
-            if not self._mark.is_set:
-                self._mark.sending(len(frame))
-            self._socket.send(frame, zmq.DONTWAIT, copy=len(frame) < 65_536)
+            if self._backlog.has_room(len(frame)):
+                self._send(frame)
             self._read_filters()
+
+    def _send(self, frame: bytes) -> None:
+        self._untracked_bytes += len(frame)
+        if self._untracked_bytes < BACKLOG_STEP_BYTES:
+            self._socket.send(frame, zmq.DONTWAIT)
+            return
+        tracked = zmq.Frame(frame, track=True, copy=False, copy_threshold=0)
+        self._socket.send(tracked, zmq.DONTWAIT)
+        self._backlog.sent(tracked.tracker, self._untracked_bytes)
+        self._untracked_bytes = 0
 
     def serve(self, now: float) -> Rest:  # noqa: ARG002 - it has nothing to do later
         """Read filters."""

@@ -193,14 +193,14 @@ class MasterLink:
         return Rest(due=min(self._pace.due_at, self._follow_at))
 
     def _follow_addresses(self) -> None:
-        """Move publishers when this computer or the master has another address, or they want other ports."""
+        """Move publishers when this computer or the master has another address."""
         if not self._is_near:
             self._own_host = host_towards(self.address) or self._own_host
-        is_elsewhere, self._moved_to = self.hosts != self._moved_to, self.hosts
+        if self.hosts == self._moved_to:
+            return
+        self._moved_to = self.hosts
         with self._lock:
             for id, (record, outlet) in self._publishers.items():
-                if not is_elsewhere and not outlet.wants_ports:
-                    continue
                 try:
                     moved = replace(record, endpoints=outlet.move(self.hosts), local=outlet.is_local)
                 except AddressInUseError:

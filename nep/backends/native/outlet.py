@@ -19,7 +19,8 @@ from nep.backends.native.io import Rest, Served
 from nep.backends.native.local import SMALL
 from nep.backends.native.places import Places
 from nep.backends.native.refusals import Refusals
-from nep.backends.native.sockets import Part, SendMark, Socket, sendable, wait_until
+from nep.backends.native.sockets import Part, Socket, send_mark, sendable, wait_until
+from nep.backends.native.window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
 from nep.encoded import Encoded
 from nep.errors import ClosedError
 from nep.records import Expected, PublisherCount
@@ -30,6 +31,7 @@ from nep.wire import (
     extension_part,
     form_of,
     pack_quickly,
+    parse_hello,
     topic_part,
 )
 from nep.wire import EXTENSION as EXTENSION_FLAG
@@ -67,15 +69,23 @@ class NativeOutlet:
         self.count = 0
         self.subscribers = 0
         """How many said hello and have not gone."""
+        self.is_heard = False
+        """Whether anybody reads, with or without a hello."""
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
+        send_mark(socket)
         self._places = Places(socket, may_be_local=spec.codec.name in SMALL)
         # Without pyzmq's layer for routing ids and groups, which takes half of the time.
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
         self._bytes = 0
+        self._settled_bytes = 0
+        """So many of them are counted in the windows of those who read."""
+        self._settle_at = 0
+        """From so many on a message is not simply sent to all."""
+        self._backlog = Backlog()
         self._last_stamp_ns: int | None = None
-        self._audience = Audience(spec.topic)
+        self._audience = Audience(spec.topic, spec.id)
         self._seen, self._apart = self._audience.seen, self._audience.apart
         self._names: dict[int, str] = {}
         self._waited: set[int] = set()
@@ -88,7 +98,6 @@ class NativeOutlet:
         self._codec = spec.codec.number
         self._flags = LATCHED if spec.is_latched else 0
         self._form = form_of(self._codec, self._flags)
-        self._mark = SendMark(socket, spec.codec.name)
         # `with` is three times faster on the lock itself than on the condition over it.
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
@@ -130,9 +139,6 @@ class NativeOutlet:
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Be reached at these addresses of this computer from now on; the endpoints. See `Places.move`."""
         with self._lock:
-            if self._mark.is_lowered:
-                self._mark.is_lowered = False
-                self._places.move_on()
             endpoints = () if self._socket.closed else self._places.move(hosts)
             self._read_subscriptions()  # binding may have swallowed the descriptor's signal
             return endpoints
@@ -147,18 +153,7 @@ class NativeOutlet:
         """Whether programs of this computer reach it without TCP: see `local`."""
         return self._places.is_local
 
-    @property
-    def wants_ports(self) -> bool:
-        """Whether to `move`, though to the same addresses: see `SendMark`."""
-        return self._mark.is_lowered
-
     # ---- sending
-
-    def weigh(self, size_bytes: int) -> None:
-        """Messages will be of this size. Better before anybody connects: see `SendMark`."""
-        with self._lock:
-            if not self._mark.is_set and not self._socket.closed:
-                self._mark.sending(size_bytes)
 
     def skip(self) -> None:
         """Count a message that nobody wants."""
@@ -178,12 +173,10 @@ class NativeOutlet:
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            if not self._mark.is_set:
-                self._mark.sending(size)
             self.count = seq = self.count + 1
-            self._bytes += size
+            self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
-            if extension or self._flags:
+            if total >= self._settle_at or extension or self._flags:
                 self._send_all(data, extension)
             elif size < _ONE_PART_BYTES and not self._apart and type(data) is bytes:
                 head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
@@ -204,15 +197,58 @@ class NativeOutlet:
                 self._serve_soon(self)
 
     def _send_all(self, data: Part, extension: bytes | None) -> None:
-        """Send what has flags, with the lock held."""
+        """Send what has flags, or when it is time to see what was read, with the lock held."""
         form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
         stamp_ns = self._last_stamp_ns or 0
-        size = len(data) if len(data) <= SIZE_MAX else 0
-        header = pack_quickly(form, size, self.count, stamp_ns, self._id)
+        size = len(data)
+        header = pack_quickly(form, size if size <= SIZE_MAX else 0, self.count, stamp_ns, self._id)
         tail = (header, data) if extension is None else (header, data, extension)
         if self.spec.is_latched:
             self._latched = tail
-        self._send_parts(self._topic, tail)
+        if self._bytes < self._settle_at:
+            self._send_parts(self._topic, tail)
+        else:
+            self._read_subscriptions()
+            self._send_to_those_with_room(tail, size)
+
+    def _send_to_those_with_room(self, tail: tuple[Part, ...], size: int) -> None:
+        """To all at once; while somebody has no room, to everybody else alone. With the lock held."""
+        windows = self._audience.windows
+        since = self._bytes - size - self._settled_bytes  # sent to all
+        if since:
+            for window in windows.values():
+                window.sent(self.count - 1, since)
+        self._settled_bytes = self._bytes
+        is_told = self._audience.tells_all
+        has_room = {each: window.has_room(size) for each, window in windows.items()}
+        if all(has_room.values()) and (is_told or self._backlog.has_room(size)):
+            if is_told:
+                self._send_parts(self._topic, tail)
+            else:
+                self._send_tracked(tail, size + since)
+            self._settle_at = self._bytes + (STEP_BYTES if is_told else BACKLOG_STEP_BYTES)
+            taking = windows
+        else:
+            self._settle_at = 0  # each message is looked at until all have room again
+            taking = {each: window for each, window in windows.items() if has_room[each]}
+            for each, window in windows.items():
+                if each in taking:
+                    self._send_parts(self._audience.hellos[each], tail)
+                else:
+                    window.missed()
+        for window in taking.values():
+            window.sent(self.count, size)
+        now = time.monotonic()
+        for each, window in windows.items():
+            if window.is_to_ask(now, has_room=has_room[each]):
+                self._send_parts(self._audience.hellos[each], (self._notice(0),))
+
+    def _send_tracked(self, tail: tuple[Part, ...], size: int) -> None:
+        """Send to all, and note until when libzmq holds it, with all of `size` bytes since the last one."""
+        data = tail[1].buffer if isinstance(tail[1], zmq.Frame) else tail[1]
+        frame = zmq.Frame(data, track=True, copy=False, copy_threshold=0)
+        self._send_parts(self._topic, (tail[0], frame, *tail[2:]))
+        self._backlog.sent(frame.tracker, size)
 
     def _send_parts(self, first: bytes, tail: tuple[Part, ...]) -> None:
         """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
@@ -240,14 +276,26 @@ class NativeOutlet:
             own = self._audience.note(self._socket.recv(zmq.DONTWAIT), self.count)
             # First: whoever gets the echo may rely on being counted.
             self.subscribers = len(self._seen)
+            self.is_heard = self._audience.is_there
             if own is not None:
                 self._greet(own)
             self._changed.notify_all()
+            if self._settle_at == 0:
+                self._tell_what_was_missed()
+
+    def _tell_what_was_missed(self) -> None:
+        for each, window in self._audience.windows.items():
+            if window.is_to_tell():
+                self._send_parts(self._audience.hellos[each], (self._notice(0),))
 
     def _greet(self, own: bytes) -> None:
         """What was latched, then the echo: from here on the subscriber counts."""
         if self._latched is not None:
             self._send_parts(own, self._latched)
+            hello = parse_hello(own)
+            window = self._audience.windows.get(hello.subscriber) if hello is not None else None
+            if window is not None:
+                window.sent(self.count, len(self._latched[1]))
         self._send_parts(own, (self._notice(0),))
 
     def _notice(self, flags: int) -> bytes:
@@ -279,8 +327,7 @@ class NativeOutlet:
                     len(self._seen),
                     most,
                 )
-                self._seen.clear()
-                self._audience.hellos.clear()
+                self._audience.forget()
                 self.subscribers = 0
 
     def release(self) -> None:

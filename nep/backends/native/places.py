@@ -55,11 +55,6 @@ class Places:
             raise problem
         return tuple(self._bound[host] for host in hosts if host in self._bound)
 
-    def move_on(self) -> None:
-        """Bind at other ports with the next `move`. Those that are bound stay, for whoever knows them."""
-        self._bound.clear()
-        self._local.clear()
-
     def _leave(self, host: str) -> None:
         for endpoint in filter(None, (self._bound.pop(host), self._local.pop(host, ""))):
             try:

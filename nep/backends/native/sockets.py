@@ -16,13 +16,13 @@ __all__ = [
     "LOOPBACK",
     "SHORT_WAIT_S",
     "Part",
-    "SendMark",
     "bind",
     "bind_free_port",
     "connect",
     "host_towards",
     "keep_alive",
     "receive_mark",
+    "send_mark",
     "sendable",
     "wait_shortly",
     "wait_until",
@@ -36,41 +36,18 @@ SHORT_WAIT_S = 0.005
 """How long a reader may wait in a subscriber's socket, holding its lock. A shorter time is not quicker: a
 timer that ends before the kernel's next tick costs more than the wait."""
 _SLICE_S = 0.1
-_QUEUE_BYTES = 256 * 2**20
 _MOST = 50_000
 _LEAST = 32
 _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 """Ports that programs of the original NEP expect to find something else on."""
 
 
-class SendMark:
-    """Keeps what is queued for each subscriber within bytes, though libzmq counts messages only.
+def send_mark(owner: Socket) -> None:
+    """Let libzmq queue so many messages for each connection. Their bytes are bounded elsewhere: see `window`.
 
-    The high-water mark is chosen once, at the first message, for streams of messages like it: 256 MB, with
-    room for four times its size. It cannot be lowered later: libzmq tells the sender of what was read in
-    portions of half a mark, and a sender whose new mark is below what is still untold waits for ever. And
-    libzmq 4.3.5 ends the program when the mark is set while one of the socket's connections is just closing,
-    because it tells the other end, which may be gone. So it is set once, only when the first one would allow
-    four times as much, and if possible before anybody connects. A connection has the mark of when its port
-    was bound: for whoever comes later, ports have to be bound anew.
+    Before it is bound: libzmq does not stand another mark while there are connections.
     """
-
-    def __init__(self, owner: Socket, codec: str) -> None:
-        self._owner = owner
-        self._mark = 2 * _LEAST if codec == "image" else _MOST
-        self.is_set = False
-        """Whether the mark was chosen."""
-        self.is_lowered = False
-        """Whether ports that were bound before have a higher one."""
-        owner.setsockopt(zmq.SNDHWM, self._mark)
-
-    def sending(self, size_bytes: int) -> None:
-        """The first message has this size and is about to be sent."""
-        self.is_set = True
-        mark = max(_LEAST, _QUEUE_BYTES // (4 * size_bytes + 1))
-        if 4 * mark < self._mark:
-            self._owner.setsockopt(zmq.SNDHWM, mark)
-            self.is_lowered = True
+    owner.setsockopt(zmq.SNDHWM, _MOST)
 
 
 def receive_mark(codec: str) -> int:

@@ -67,8 +67,13 @@ class Sources:
         """All of them, by id."""
         return list(self.by_id.items())
 
-    def arrived(self, publisher: int, seq: int, *, is_resent: bool) -> bool:
-        """A message arrived; False when it is one that was heard already and only sent again (latched).
+    @property
+    def echoing(self) -> int:
+        """How many publishers have said that they see this subscriber."""
+        return sum(source.has_echoed for source in self.by_id.values())
+
+    def arrived(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
+        """A message arrived; False when it was heard already: it came for this subscriber alone (latched).
 
         Raises `WireError` when more than `GAP_MAX` would be missing before it. A publisher that goes on from
         there counts anew: nobody knows then how many are missing.
@@ -83,13 +88,13 @@ class Sources:
             self.received += 1
             return True
         if last is None or seq > last:
-            if last is not None and not is_resent:
+            if last is not None:
                 self.lost += seq - last - 1
             source.last = seq
         elif source.written_off:  # it was only late
             source.written_off -= 1
             self.lost -= 1
-        elif is_resent:
+        elif is_alone:
             return False
         self.received += 1
         return True

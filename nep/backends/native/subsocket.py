@@ -11,18 +11,18 @@ from typing import Any
 
 import zmq
 
-from nep.addresses import host_of
 from nep.backends.base import SubscriberSpec
 from nep.backends.native.meaning import NO_COPY_BYTES, Meaning
 from nep.backends.native.readable import Into
 from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import Socket, keep_alive, receive_mark, wait_shortly
 from nep.backends.native.sources import Sources
+from nep.backends.native.window import WINDOW_BYTES
 from nep.codecs import codec_for
 from nep.errors import WireError
 from nep.message import NOTHING, UNDECODED, Message, arrived, new_message
 from nep.records import RemotePublisher
-from nep.wire import HEADER_BYTES, hello_part, topic_part, unpack_at, unpack_quickly
+from nep.wire import HEADER_BYTES, Read, hello_part, read_part, topic_part, unpack_at, unpack_quickly
 
 __all__ = ["SubSocket"]
 
@@ -46,8 +46,9 @@ class SubSocket:
         self._socket = socket
         self._recv: Callable[..., Any] = socket.recv
         self._topic = topic_part(spec.topic)
-        self._hello = hello_part(spec.id, spec.topic, one_part=True)
-        self._meaning = Meaning(spec, self._hello, self.sources, self.leave)
+        self._hello = hello_part(spec.id, spec.topic, tells=True)
+        self._id = spec.id
+        self._meaning = Meaning(spec, self._hello, self.sources, self.leave, self._tell)
         self._cut = len(self._topic)
         self._body = self._cut + HEADER_BYTES
         """Where header and payload of a message in one part begin."""
@@ -84,8 +85,8 @@ class SubSocket:
         source.is_lapsed = False
         source.ends_at = None
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
-        if endpoint and host_of(endpoint) != host_of(source.endpoint):  # another port is for others
-            if source.endpoint:  # its computer has another address now
+        if endpoint and endpoint != source.endpoint:
+            if source.endpoint:  # its computer has another address now, or its master listens anew
                 self._disconnect(source.endpoint)
                 source.has_echoed = False
             source.endpoint = endpoint
@@ -97,6 +98,13 @@ class SubSocket:
         source = self.sources.pop(publisher)
         if source is not None and source.endpoint:
             self._disconnect(source.endpoint)
+
+    def _tell(self, publisher: int, seq: int) -> None:
+        """Tell a publisher that everything up to `seq` was read, and what share of the room is for it."""
+        bound = WINDOW_BYTES // max(1, self.sources.echoing)
+        said = read_part(Read(self._id, publisher, seq, bound))
+        self._socket.setsockopt(zmq.SUBSCRIBE, said)
+        self._socket.setsockopt(zmq.UNSUBSCRIBE, said)
 
     def _disconnect(self, endpoint: str) -> None:
         try:

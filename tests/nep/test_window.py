@@ -1,0 +1,96 @@
+"""How many bytes may be under way: the counting alone, without sockets."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from nep.backends.native.window import STEP_BYTES, WINDOW_BYTES, WINDOW_LEAST_BYTES, Backlog, Window
+
+
+class Held:
+    """A tracked message that libzmq holds until told otherwise."""
+
+    done = False
+
+
+def test_what_is_under_way_is_bounded_for_any_sizes() -> None:
+    for seed in range(20):
+        chance, window, most = random.Random(seed), Window(), 0
+        for seq in range(1, 3000):
+            size = chance.choice([0, 1, 2**10, 2**20, 6 * 2**20, 64 * 2**20])
+            if window.has_room(size):
+                window.sent(seq, size)
+            most = max(most, window.under_way)
+            if chance.random() < 0.01:
+                window.read(chance.randrange(seq + 1), WINDOW_BYTES)
+        assert most <= WINDOW_BYTES
+        window.read(3000, WINDOW_BYTES)
+        assert window.under_way == 0
+
+
+def test_a_message_larger_than_the_window_goes_when_nearly_nothing_is_under_way() -> None:
+    window = Window()
+    window.sent(1, STEP_BYTES)
+    assert window.has_room(WINDOW_BYTES * 2)
+    window.sent(2, WINDOW_BYTES * 2)
+    assert not window.has_room(1)
+    window.read(1, WINDOW_BYTES)
+    assert not window.has_room(1)
+    window.read(2, WINDOW_BYTES)
+    assert window.has_room(1)
+
+
+@pytest.mark.parametrize("bound", [0, 1, WINDOW_LEAST_BYTES, 2**64 - 1])
+def test_a_subscriber_chooses_its_bound_within_limits(bound: int) -> None:
+    window = Window()
+    window.read(0, bound)
+    size, count = 2**20, 0
+    while window.has_room(size):
+        count += 1
+        window.sent(count, size)
+    assert count * size == max(WINDOW_LEAST_BYTES, min(bound, WINDOW_BYTES))
+
+
+def test_many_small_messages_need_few_entries() -> None:
+    window = Window()
+    for seq in range(1, 200_000):
+        window.sent(seq, 1000)
+    assert len(window._sent) < 250
+    window.read(2**64 - 1, WINDOW_BYTES)
+    assert window.under_way == 0
+
+
+def test_it_is_asked_for_each_step_and_again_while_it_has_no_room() -> None:
+    window = Window()
+    window.sent(1, STEP_BYTES - 1)
+    assert not window.is_to_ask(0.0, has_room=True)
+    window.sent(2, 1)
+    assert window.is_to_ask(0.0, has_room=True)
+    assert not window.is_to_ask(0.1, has_room=True)
+    assert not window.is_to_ask(0.1, has_room=False)
+    assert window.is_to_ask(0.6, has_room=False)
+    assert not window.is_to_ask(0.7, has_room=False)
+
+
+def test_who_missed_something_is_told_once_when_there_is_room_again() -> None:
+    window = Window()
+    window.sent(1, WINDOW_BYTES)
+    assert not window.is_to_tell()
+    window.missed()
+    assert not window.is_to_tell()
+    window.read(1, WINDOW_BYTES)
+    assert window.is_to_tell()
+    assert not window.is_to_tell()
+
+
+def test_what_cannot_be_asked_is_counted_until_it_is_let_go_of_in_order() -> None:
+    backlog, first, second = Backlog(), Held(), Held()
+    backlog.sent(first, 100 * 2**20)
+    backlog.sent(second, 92 * 2**20)
+    assert not backlog.has_room(1)
+    second.done = True
+    assert not backlog.has_room(1)
+    first.done = True
+    assert backlog.has_room(WINDOW_BYTES)
