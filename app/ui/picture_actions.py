@@ -58,6 +58,7 @@ class PictureActions(QObject):
         }
         self._by_name: dict[str, QAction] = {}
         self._by_key: dict[str, QAction] = {}
+        self._listed: list[QAction] = []  # with their lines
         for row in ROWS:
             action = QAction(f"{row.words}\t{row.keys[0]}", view)
             if row.icon is not None:
@@ -65,6 +66,11 @@ class PictureActions(QObject):
             action.setCheckable(row.check)
             action.triggered.connect(lambda _on=False, do=does[row.name]: do())
             self._by_name[row.name] = action
+            if row.above:
+                line = QAction(self)
+                line.setSeparator(True)
+                self._listed.append(line)
+            self._listed.append(action)
             self._by_key.update(dict.fromkeys(row.keys, action))
         view.keys = frozenset(self._by_key)
         view.key_pressed.connect(self._key)
@@ -76,14 +82,7 @@ class PictureActions(QObject):
 
     def listed(self) -> list[QAction]:
         """All of them with their lines, for a menu."""
-        found: list[QAction] = []
-        for row in ROWS:
-            if row.above:
-                line = QAction(self)
-                line.setSeparator(True)
-                found.append(line)
-            found.append(self._by_name[row.name])
-        return found
+        return list(self._listed)
 
     def set_enabled(self, there: bool) -> None:
         """Whether there is a picture to do something with."""

@@ -57,8 +57,17 @@ class ColumnChoice:
         return shown
 
     def menu(self, theme: Theme, parent: QWidget, changed: Callable[[], object]) -> Menu:
-        """A menu with every column but the first, checked when shown; ``changed`` after each choice."""
+        """A new menu as `fill` fills it."""
         menu = Menu(theme, parent, "Columns")
+        self.fill(menu, changed)
+        return menu
+
+    def fill(self, menu: Menu, changed: Callable[[], object]) -> None:
+        """Every column but the first, checked when shown, in place of what was in the menu.
+
+        ``changed`` is called after each choice.
+        """
+        menu.clear()
 
         def choose(name: str, shown: bool) -> None:
             self.show(name, shown)
@@ -77,7 +86,6 @@ class ColumnChoice:
         again = menu.addAction("As at first")
         again.setEnabled(self.changed)
         again.triggered.connect(lambda _on=False: begin_anew())
-        return menu
 
     def saved(self) -> dict[str, bool]:
         """The choices, for a layout."""

@@ -236,6 +236,10 @@ class TableView(QTableView, Generic[Row]):
         """The menu in which a person chooses the columns."""
         return self.choice.menu(self.theme, self, self.fit_columns)
 
+    def fill_column_menu(self, menu: Menu) -> None:
+        """The same in a menu that stays."""
+        self.choice.fill(menu, self.fit_columns)
+
     def _show_columns(self, at: QPoint) -> None:
         menu = self.column_menu()
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

@@ -63,6 +63,10 @@ class ImagePanel(PanelWidget):
     def _make_actions(self) -> None:
         own = {"freeze": self._freeze_or_not, "save": self.save_picture, "copy": self.copy_picture}
         self.actions_of = PictureActions(self.theme, self.view, own)
+        self._look_inside = QAction(self.theme.icon("list-tree"), "Show in the inspector", self)
+        self._look_inside.triggered.connect(self._inspect)
+        self._line = QAction(self)
+        self._line.setSeparator(True)
         self.job = SnapshotJob(self, lambda: snapshots.folder(self.session.settings))
         self.job.saved.connect(self._saved)
         self.job.copied.connect(self._copied)
@@ -210,16 +214,14 @@ class ImagePanel(PanelWidget):
             action.setCheckable(True)
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))
+        if menu.isEmpty():  # Qt shows no empty menu, and would keep it
+            menu.addAction("No camera sends pictures now").setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.choose)
 
     def more_actions(self) -> list[QAction]:
-        inspect = QAction(self.theme.icon("list-tree"), "Show in the inspector", self)
-        inspect.setEnabled(bool(self._topic))
-        inspect.triggered.connect(self._inspect)
-        line = QAction(self)
-        line.setSeparator(True)
-        return [*self.actions_of.listed(), line, inspect]
+        self._look_inside.setEnabled(bool(self._topic))
+        return [*self.actions_of.listed(), self._line, self._look_inside]
 
     def save_state(self) -> dict[str, object]:
         return {"topic": self._topic, "place": self.view.place.saved()}

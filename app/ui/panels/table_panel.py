@@ -15,6 +15,7 @@ from app.ui.panels.base import Density, PanelContext, PanelWidget
 from app.ui.table import TableModel
 from app.ui.table_view import TableView
 from app.ui.widgets import EmptyAction, EmptyState, Line, label
+from app.ui.widgets.menus import Menu
 
 Row = TypeVar("Row")
 
@@ -51,6 +52,8 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.pages.addWidget(self.table)
         self.pages.addWidget(self.empty)
         self.setFocusProxy(self.table)
+        self._columns = Menu(theme, self, "Columns")  # filled anew when "more" opens
+        self._columns.setIcon(theme.icon("columns-2"))
 
     def make_model(self) -> TableModel[Row]:
         """The model of the rows; asked once."""
@@ -107,9 +110,8 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
 
     def more_actions(self) -> list[QAction]:
-        columns = QAction(self.theme.icon("columns-2"), "Columns", self)
-        columns.setMenu(self.table.column_menu())
-        return [columns]
+        self.table.fill_column_menu(self._columns)
+        return [self._columns.menuAction()]
 
     def save_state(self) -> dict[str, object]:
         return self.table.saved_state()
