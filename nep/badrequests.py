@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections import OrderedDict
 from dataclasses import dataclass
 
@@ -74,15 +73,14 @@ class BadRequests:
         return tuple(sorted(told, key=lambda each: each.id))
 
 
-def who_sends(routing_id: str, node_name: str | None, peer: str) -> tuple[str, str]:
+def who_sends(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
     """Under what name to count what came from there, and how to say it.
 
-    Strangers without an id of a node have another routing id with each connection; they count by computer.
+    Only connections that speak for a node (`node_id` is not empty) count by node: strangers are another one
+    with each connection, so they count by their computer, `peer`.
     """
-    if node_name is not None:
-        return routing_id, f"“{node_name}”"
-    if re.fullmatch("[0-9a-f]{16}", routing_id):
-        return routing_id, f"The node {routing_id}, which is not registered,"
+    if node_id:
+        return node_id, f"“{node_name}”"
     return peer, f"A program on {peer or 'a computer that is not known'}"
 
 

@@ -21,6 +21,8 @@ from nep.views import Alert
 
 __all__ = ["Census", "Member", "Publisher", "Subscriber", "as_ratio"]
 
+_HUNG_MAX = 100
+"""So many nodes are noted that one does not answer."""
 _CORES_MAX = 100_000.0
 _PROBLEM_MAX = 500
 """Letters of the sentence about what a subscriber cannot read."""
@@ -53,15 +55,17 @@ class Subscriber:
 
 @dataclass
 class Member:
-    """A node with all that it has. `hung`: it did not answer the publishers of these node names.
+    """A node with all that it has. `hung`: it did not answer publishers of the nodes with these ids.
 
-    Its next renewal is due `renew_s` after `renewed_at`: that is what it was told.
+    Its next renewal is due `renew_s` after `renewed_at`: that is what it was told. `route` is the connection
+    that speaks for it; empty for what is attached to the master.
     """
 
     node: NodeRecord
     renewed_at: float
     renew_s: float = RENEW_S
     is_managed: bool = False
+    route: str = ""
     publishers: dict[int, Publisher] = field(default_factory=dict)
     subscribers: dict[int, Subscriber] = field(default_factory=dict)
     hung: set[str] = field(default_factory=set)
@@ -76,6 +80,12 @@ class Census:
 
     def __init__(self) -> None:
         self.members: dict[str, Member] = {}
+        self.speaking: dict[str, Member] = {}
+        """By connection: the node that it speaks for."""
+        self.publisher_owners: dict[int, Member] = {}
+        """By the id of a publisher: the node that has it."""
+        self.subscriber_owners: dict[int, Member] = {}
+        """The same of subscribers."""
         self.revision = 1
         self.publishers_revision = 0
         """The revision at which the publishers of some topic changed last."""
@@ -153,6 +163,18 @@ class Census:
             member.is_managed = is_managed
         return member
 
+    def bind(self, member: Member, route: str) -> None:
+        """From now on this connection speaks for the member."""
+        if member.route != route:
+            self._unbind(member)
+            member.route = route
+        if route:
+            self.speaking[route] = member
+
+    def _unbind(self, member: Member) -> None:
+        if self.speaking.get(member.route) is member:
+            del self.speaking[member.route]
+
     def add_publisher(self, member: Member, record: PublisherRecord) -> bool:
         """Register a publisher; False when it was registered just so before."""
         known = member.publishers.get(record.id)
@@ -161,6 +183,7 @@ class Census:
         if known is not None:
             self.remove_publisher(member.node.id, record.id)
         member.publishers[record.id] = Publisher(record)
+        self.publisher_owners[record.id] = member
         self._publishing.setdefault(record.topic, {})[record.id] = member
         self._changed(record.topic)
         return True
@@ -169,6 +192,7 @@ class Census:
         """Register a subscriber, once."""
         if record.id not in member.subscribers:
             member.subscribers[record.id] = Subscriber(record)
+            self.subscriber_owners[record.id] = member
             self._subscribing.setdefault(record.topic, {})[record.id] = member
             self.touched.add(record.topic)
             self.revision += 1
@@ -179,6 +203,7 @@ class Census:
         gone = member.publishers.pop(publisher, None) if member else None
         if gone is None:
             return None
+        self.publisher_owners.pop(publisher, None)
         _take_out(self._publishing, gone.record.topic, publisher)
         self._changed(gone.record.topic)
         return gone.record
@@ -188,6 +213,7 @@ class Census:
         member = self.members.get(node_id)
         gone = member.subscribers.pop(subscriber, None) if member else None
         if gone is not None:
+            self.subscriber_owners.pop(subscriber, None)
             _take_out(self._subscribing, gone.record.topic, subscriber)
             self.touched.add(gone.record.topic)
             self.revision += 1
@@ -199,6 +225,7 @@ class Census:
             self.remove_publisher(node_id, publisher)
         for subscriber in list(member.subscribers):
             self.remove_subscriber(node_id, subscriber)
+        self._unbind(member)
         del self.members[node_id]
         self.revision += 1
 
@@ -255,8 +282,8 @@ class Census:
             return
         for subscriber in subscribers:
             member = self._subscribing.get(known.record.topic, {}).get(subscriber)
-            if member is not None:
-                member.hung.add(reporter.node.name)
+            if member is not None and len(member.hung) < _HUNG_MAX:
+                member.hung.add(reporter.node.id)
 
     def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
         """These are all alerts of `source` now."""

@@ -60,6 +60,10 @@ class Leases:
                 return slot
         return min(slots, key=lambda slot: self._slots.get(slot, 0))
 
+    def is_late(self, member: Member, now: float) -> bool:
+        """Whether it missed a renewal."""
+        return not member.is_managed and member.renewed_at + member.renew_s <= now - _LATE_S
+
     def late(self, now: float) -> list[str]:
         """The nodes that missed a renewal."""
         return self._overdue(now, _LATE_S)

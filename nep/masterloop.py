@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 
 import zmq
@@ -21,7 +22,7 @@ from nep.listening import Listening
 from nep.masterport import MasterPort
 from nep.outgoing import Outgoing, with_hosts, without
 from nep.renewals import is_renewal, read_renewal, renewed_body
-from nep.requests import Done, Join, Listen, Look, Refused, Reply, ReportAlerts, Request, node_of
+from nep.requests import Done, Listen, Look, Refused, Reply, ReportAlerts, Request
 from nep.starting import Owner
 from nep.submission import Submission
 from nep.viewpacking import ViewPacker
@@ -167,7 +168,8 @@ class MasterLoop:
     def _tick(self, now: float) -> None:
         self._send(self._graph.tick(now))
         self._send(self._graph.silent(now))
-        self._send(self._graph.probes(_name_of(sender) for sender in self._port.ended(now)))
+        ended = (self._graph.node_at(_name_of(sender)) for sender in self._port.ended(now))
+        self._send(self._graph.probes([each.node.id for each in ended if each is not None]))
         self._graph.apply(ReportAlerts("requests", self._bad.alerts(now)), 0, now, "")
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
             self._closing = True
@@ -213,7 +215,7 @@ class MasterLoop:
             if answer is None:
                 self._serve(sender, [body], "")
             elif not self._port.send(sender, answer):
-                self._send(self._graph.drop((_name_of(sender),)))
+                self._send(self._graph.drop(self._speaking_at(_name_of(sender))))
 
     def _renew_safely(self, sender: bytes, body: bytes) -> bytes | None:
         """As `_renew_quickly`; what fails takes the usual way, which answers it."""
@@ -226,10 +228,10 @@ class MasterLoop:
     def _renew_quickly(self, sender: bytes, body: bytes) -> bytes | None:
         """The answer to a usual renewal; None when it is something else."""
         said = read_renewal(body)
-        if said is None or said.node_id.encode("utf-8", "surrogateescape") != sender:
+        if said is None:
             return None
         graph = self._graph
-        last_seqs = graph.renew_quickly(said, time.monotonic())
+        last_seqs = graph.renew_quickly(said, time.monotonic(), _name_of(sender))
         if last_seqs is None:
             return None
         hosts, next_s = self._listening.hosts, graph.members[said.node_id].renew_s
@@ -237,37 +239,34 @@ class MasterLoop:
 
     def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
-        request = asked.request
-        if not isinstance(request, str):
-            named = node_of(request)
-            if named is not None and named.encode() != sender:
-                asked = Asked(asked.call, "a node speaks for itself only")
-            elif isinstance(request, Join) and request.managed:
-                asked = Asked(asked.call, "only what is attached to the master manages nodes")
-            elif isinstance(request, Listen) and self._listening.hosts and peer != "127.0.0.1":
-                asked = Asked(asked.call, "who may connect is decided on the master's own computer")
+        if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
+            asked = Asked(asked.call, "who may connect is decided on the master's own computer")
         name = _name_of(sender)
-        if isinstance(asked.request, str):
-            member = self._graph.members.get(name)
-            who = who_sends(name, None if member is None else member.node.name, peer)
-            self._bad.add(*who, asked.request, time.monotonic())
-        self._apply(asked, name)
+        reason = self._apply(asked, name)
+        if reason:
+            member = self._graph.node_at(name)
+            node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
+            self._bad.add(*who_sends(node_id, node_name, peer), reason, time.monotonic())
 
-    def _apply(self, asked: Asked, sender: str) -> None:
+    def _apply(self, asked: Asked, sender: str) -> str:
+        """Carry out a request, of this process when `sender` is empty; why it was refused, or ""."""
+        request, outgoing = asked.request, tuple[Outgoing, ...]()
         try:
-            if isinstance(asked.request, str):
-                refused = Refused(self._graph.epoch, self._graph.revision, asked.request)
-                self._send((Outgoing(sender, refused, asked.call),))
-            elif isinstance(asked.request, Listen):
-                self._send((Outgoing(sender, self._listen(asked.request), asked.call),))
-            elif isinstance(asked.request, Look):
-                with collecting_later():
-                    self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
+            if isinstance(request, str):
+                outgoing = (Outgoing(sender, self._refused(request), asked.call),)
+            elif isinstance(request, Listen):
+                outgoing = (Outgoing(sender, self._listen(request), asked.call),)
             else:
-                self._send(self._graph.apply(asked.request, asked.call, time.monotonic(), sender))
+                now, is_foreign = time.monotonic(), bool(sender)
+                with collecting_later() if isinstance(request, Look) else nullcontext():
+                    outgoing = self._graph.apply(request, asked.call, now, sender, is_foreign=is_foreign)
+                    self._send(outgoing)
+                return _reason_in(outgoing)
         except Exception as error:  # noqa: BLE001 - logged; one request must never end the master
             self._failed(error, "a request")
-            self._send((Outgoing(sender, self._refused(), asked.call),))
+            outgoing = (Outgoing(sender, self._refused(), asked.call),)
+        self._send(outgoing)
+        return request if isinstance(request, str) else ""
 
     def _listen(self, request: Listen) -> Reply:
         try:
@@ -283,8 +282,8 @@ class MasterLoop:
         for each in outgoing:
             if each.call is not None and each.call < 0:
                 self._reply_inside(each)
-            elif each.to not in dead and not self._deliver(each, frozenset(dead)):
-                dead.add(each.to)
+            elif not self._deliver(each, frozenset(dead)):
+                dead.update([each.to] if each.call is None else self._speaking_at(each.to))
         if dead:
             self._send(self._graph.drop(dead))
 
@@ -295,7 +294,13 @@ class MasterLoop:
             submission.done.set()
 
     def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
-        """Send one answer; False when its node has no connection any more."""
+        """Send one answer; False when there is no such connection any more."""
+        route = each.to
+        if each.call is None:
+            member = None if each.to in dead else self._graph.members.get(each.to)
+            if member is None:
+                return True
+            route = member.route
         answer = with_hosts(without(each.answer, dead), self._listening.hosts)
         try:
             body = self._views.body(answer, each.call or 0)
@@ -304,10 +309,14 @@ class MasterLoop:
             if each.call is None:
                 return True
             body = encode_answer(self._refused(), each.call)
-        return self._port.send(each.to.encode("utf-8", "surrogateescape"), body)
+        return self._port.send(route.encode("utf-8", "surrogateescape"), body)
 
-    def _refused(self) -> Refused:
-        reason = "the master could not carry this out; its log says why"
+    def _speaking_at(self, route: str) -> tuple[str, ...]:
+        """The id of the node that this connection speaks for."""
+        member = self._graph.node_at(route)
+        return () if member is None else (member.node.id,)
+
+    def _refused(self, reason: str = "the master could not carry this out; its log says why") -> Refused:
         return Refused(self._graph.epoch, self._graph.revision, reason)
 
     def _tell_listeners(self, now: float) -> None:
@@ -325,6 +334,11 @@ class MasterLoop:
     def _release(self) -> None:
         self._port.close()
         self._waker.close()
+
+
+def _reason_in(outgoing: Sequence[Outgoing]) -> str:
+    """Why a request was refused that was answered so; "" when it was not."""
+    return next((each.answer.reason for each in outgoing if isinstance(each.answer, Refused)), "")
 
 
 def _name_of(sender: bytes) -> str:

@@ -13,7 +13,7 @@ from nep.errors import AddressInUseError
 
 __all__ = ["MasterPort"]
 
-REQUEST_MAX_BYTES = 64 * 2**20
+REQUEST_MAX_BYTES = 8 * 2**20
 """Whoever sends more in one part is disconnected."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
 _RETURN_S = 0.5
@@ -34,7 +34,13 @@ class MasterPort:
         self._send: Callable[..., object] = super(zmq.Socket, self.socket).send
         self.socket.setsockopt(zmq.LINGER, 200)
         self.socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # an error instead of silence when a peer is gone
-        self.socket.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a node that reconnects takes its name over
+        # No ROUTER_HANDOVER: whoever knows the routing id of a connection must not be able to end it.
+        self.socket.setsockopt(
+            zmq.TCP_KEEPALIVE, 1
+        )  # a computer that vanishes does not close its connections
+        self.socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
+        self.socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
+        self.socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
         self.socket.setsockopt(zmq.SNDHWM, 10_000)
         self.socket.setsockopt(zmq.MAXMSGSIZE, REQUEST_MAX_BYTES)
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import itertools
 import logging
 import os
 import platform
@@ -25,6 +26,7 @@ from nep.inbox import MAX_MESSAGES, Keep
 from nep.logs import LogHandler, handler_of
 from nep.pubsub import SLICE_S, Publisher, Subscriber
 from nep.records import NodeRecord
+from nep.registration import id_from, node_id_from
 from nep.wire import check_node_name, check_topic
 
 if TYPE_CHECKING:
@@ -58,7 +60,10 @@ class Node:
         generation: str = "native",
     ) -> None:
         self.name = check_node_name(name)
-        self.id = secrets.token_hex(8)
+        key = secrets.token_hex(16)
+        self.id = node_id_from(key)
+        self._key = key
+        self._numbers = itertools.count(1)
         self._backend = backend_named(transport)
         self._master = master or ("memory" if self._backend.name == "memory" else master_address())
         if self._backend.name != "memory":
@@ -71,7 +76,13 @@ class Node:
         self._is_closed = False
         self._log_handler: LogHandler | None = None
         record = NodeRecord(
-            self.id, name, platform.node(), os.getpid(), generation=generation, since_ns=time.time_ns()
+            self.id,
+            name,
+            platform.node(),
+            os.getpid(),
+            generation=generation,
+            since_ns=time.time_ns(),
+            key=key,
         )
         self._carrier: Carrier = self._backend.open(record)
         _alive.add(self)
@@ -123,14 +134,16 @@ class Node:
         `latched`: whoever subscribes later gets the last message at once. Raises `MasterUnreachable`,
         `BadTopicError`, `AddressInUseError`, `ClosedError`.
         """
+        number = next(self._numbers)
         spec = PublisherSpec(
-            _new_id(),
+            id_from(self._key, number),
             check_topic(topic),
             msg_type,
             codec_for(msg_type),
             latched,
             configuration or self.hybrid(),
             self._wait_s,
+            number,
         )
         publisher = Publisher(self._open_carrier().publisher(spec), spec)
         with self._lock:
@@ -153,8 +166,9 @@ class Node:
         256 MB), then the oldest are dropped and counted. `sink`: takes the messages in batches, 200 times a
         second at most, in the node's own thread, instead of `listen`. Raises as `new_pub` does.
         """
+        number = next(self._numbers)
         spec = SubscriberSpec(
-            _new_id(),
+            id_from(self._key, number),
             check_topic(topic),
             msg_type,
             configuration or self.hybrid(),
@@ -162,6 +176,7 @@ class Node:
             keep,
             max_messages,
             sink=sink,
+            number=number,
         )
         carrier = self._open_carrier()
         return Subscriber(carrier.subscriber(spec), spec)
@@ -175,8 +190,14 @@ class Node:
     ) -> Subscriber:
         """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`."""
         carrier = self._open_carrier()
+        number = next(self._numbers)
         spec = SubscriberSpec(
-            _new_id(), check_topic(topic), msg_type, configuration or self.hybrid(), self._wait_s
+            id_from(self._key, number),
+            check_topic(topic),
+            msg_type,
+            configuration or self.hybrid(),
+            self._wait_s,
+            number=number,
         )
         inlet = carrier.subscriber(spec)
         subscriber = Subscriber(inlet, spec)
@@ -277,11 +298,6 @@ class Node:
 
     def __repr__(self) -> str:
         return f"Node({self.name!r}, {self._backend.name!r}, master={self._master!r})"
-
-
-def _new_id() -> int:
-    """An id for a publisher or subscriber: random, not zero, and positive where integers have a sign."""
-    return secrets.randbits(62) + 1
 
 
 def _close_all() -> None:

@@ -11,7 +11,7 @@ __all__ = ["Outgoing", "with_hosts", "without"]
 
 
 class Outgoing(NamedTuple):
-    """One thing to send: a push (call is None), or the reply to `call`. `to` is a node id, or who asked."""
+    """One thing to send: a push to the node `to` (call is None), or the reply to `call` of a connection."""
 
     to: str
     answer: Reply | Push

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 COUNT_MAX = 2**63 - 1
 """Counters stop here: every language and every encoding has room for it."""
@@ -15,7 +15,10 @@ def as_count(value: int) -> int:
 
 @dataclass(frozen=True)
 class NodeRecord:
-    """A node as it presents itself. `since_ns` is its own clock when it was made."""
+    """A node as it presents itself. `since_ns` is its own clock when it was made.
+
+    `key` is known to the node and its masters only and proves its id: see `nep.registration`.
+    """
 
     id: str
     name: str
@@ -24,6 +27,7 @@ class NodeRecord:
     language: str = "Python"
     generation: str = "native"
     since_ns: int = 0
+    key: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class PublisherRecord:
     """A publisher as its node presents it. `endpoints` is empty when nobody can connect to it directly.
 
     `local` says that it is bound to the name of this computer that goes with its loopback endpoint, too.
+    `number` proves its id: see `nep.registration`.
     """
 
     id: int
@@ -40,15 +45,17 @@ class PublisherRecord:
     endpoints: tuple[str, ...] = ()
     latched: bool = False
     local: bool = False
+    number: int = 0
 
 
 @dataclass(frozen=True)
 class SubscriberRecord:
-    """A subscriber as its node presents it."""
+    """A subscriber as its node presents it. `number` proves its id: see `nep.registration`."""
 
     id: int
     topic: str
     msg_type: str
+    number: int = 0
 
 
 @dataclass(frozen=True)

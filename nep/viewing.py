@@ -12,6 +12,10 @@ from nep.views import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo,
 __all__ = ["Viewer"]
 
 
+_NAMES = 5
+"""So many programs are named in a sentence."""
+
+
 class Viewer:
     """Looks at `census` again and again. What has not changed is the very value of the last view."""
 
@@ -154,7 +158,7 @@ def _missing_alerts(census: Census) -> Iterator[Alert]:
         if member.hung:
             yield Alert(
                 f"missing:{member.node.id}",
-                f"“{member.node.name}” does not answer {_names(member.hung)}",
+                f"“{member.node.name}” does not answer {_names(_names_of(census, member.hung))}",
                 "It may be busy or stopped in a debugger. What is published meanwhile may not reach it.",
             )
 
@@ -183,5 +187,13 @@ def _topic_alerts(
             return
 
 
+def _names_of(census: Census, node_ids: Iterable[str]) -> set[str]:
+    """The names of these nodes, as far as they are there."""
+    return {census.members[each].node.name for each in node_ids if each in census.members} or {"programs"}
+
+
 def _names(names: Iterable[str]) -> str:
-    return ", ".join(f"“{name}”" for name in sorted(names))
+    """Some names for a sentence: all of them, or how many more there are."""
+    said = sorted(set(names))
+    more = f" and {len(said) - _NAMES} more" if len(said) > _NAMES else ""
+    return ", ".join(f"“{name}”" for name in said[:_NAMES]) + more

@@ -40,7 +40,10 @@ Sink = Callable[[Sequence[Message]], None]
 
 @dataclass(frozen=True)
 class PublisherSpec:
-    """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit."""
+    """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit.
+
+    `number` proves the id: see `nep.registration`.
+    """
 
     id: int
     topic: str
@@ -49,11 +52,12 @@ class PublisherSpec:
     is_latched: bool
     configuration: Configuration
     wait_s: float | None
+    number: int = 0
 
 
 @dataclass(frozen=True)
 class SubscriberSpec:
-    """What a subscriber shall be. With a `sink` nothing is kept for `Inlet.poll`."""
+    """What a subscriber shall be. With a `sink` nothing is kept for `Inlet.poll`. `number` proves the id."""
 
     id: int
     topic: str
@@ -64,6 +68,7 @@ class SubscriberSpec:
     max_messages: int = MAX_MESSAGES
     max_bytes: int = MAX_BYTES
     sink: Sink | None = None
+    number: int = 0
 
 
 class Outlet(Protocol):

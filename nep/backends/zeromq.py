@@ -67,7 +67,14 @@ class ZeromqCarrier:
             endpoints = outlet.move(link.hosts)
         self._hold(outlet)
         record = PublisherRecord(
-            spec.id, spec.topic, spec.msg_type, spec.codec.name, endpoints, spec.is_latched, outlet.is_local
+            spec.id,
+            spec.topic,
+            spec.msg_type,
+            spec.codec.name,
+            endpoints,
+            spec.is_latched,
+            outlet.is_local,
+            spec.number,
         )
         try:
             reply = link.add_publisher(record, outlet, spec.wait_s)
@@ -135,7 +142,7 @@ class ZeromqCarrier:
             self._inlets[spec.id] = inlet
         try:
             reply = link.add_subscriber(
-                SubscriberRecord(spec.id, spec.topic, spec.msg_type), inlet, spec.wait_s
+                SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number), inlet, spec.wait_s
             )
         except BaseException:
             inlet.close()

@@ -59,7 +59,7 @@ def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
     said = read_renewal(bodies.encode_request(request, 7))
     if said is None:
         return None
-    last_seqs = graph.renew_quickly(said, now)
+    last_seqs = graph.renew_quickly(said, now, said.node_id)
     return None if last_seqs is None else renewed_body(said.call, EPOCH, graph.revision, last_seqs, ())
 
 
@@ -117,7 +117,7 @@ def test_an_unusual_renewal_goes_the_long_way(change: dict[str, object]) -> None
     what = write(renewal(0, graph))
     assert isinstance(what, dict)
     said = read_renewal(pack({"do": "renew", "call": 7, "what": what | change}))
-    assert said is None or graph.renew_quickly(said, 1.0) is None
+    assert said is None or graph.renew_quickly(said, 1.0, said.node_id) is None
 
 
 @settings(deadline=None, max_examples=60)

@@ -57,9 +57,10 @@ def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None
         [pack(None)],
         [pack({"do": "fly", "call": 3})],
         [pack({"do": "renew", "call": 3, "what": [1]})],
-        [bodies.encode_request(Leave("somebody else"), 3)],
+        [bodies.encode_request(Leave(ORIGINAL.id), 3)],
         [bodies.encode_request(Join(ORIGINAL, managed=True), 3)],
     ]
+    master.submit(Join(ORIGINAL, managed=True))
     try:
         for parts in bad:
             socket.send_multipart(parts)
@@ -71,6 +72,7 @@ def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None
         socket.close()
         context.term()
     assert is_running(master.address)
+    assert ORIGINAL.id in master.view().nodes
 
 
 def test_nobody_takes_replies_that_are_for_the_masters_own_process(master: Master) -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from nep import wire
 from nep.errors import BadTopicError, WireError
+from nep.registration import id_from, node_id_from
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "wire" / "messages.json").read_text("utf-8"))
 
@@ -161,3 +162,11 @@ def test_an_unknown_version_is_named() -> None:
 def test_an_extension_that_msgpack_cannot_hold() -> None:
     with pytest.raises(WireError, match="an extension holds what msgpack cannot"):
         wire.extension_part({"a": object()})
+
+
+def test_ids_come_from_the_key_as_the_vectors_say() -> None:
+    vectors = json.loads((Path(__file__).parents[1] / "data" / "wire" / "ids.json").read_text("utf-8"))
+    assert len(vectors["nodes"]) == 3
+    for each in vectors["nodes"]:
+        assert node_id_from(each["key"]) == each["node_id"]
+        assert {number: str(id_from(each["key"], int(number))) for number in each["ids"]} == each["ids"]

@@ -48,7 +48,7 @@ class Answer(NamedTuple):
 class Calls:
     """`after_use` is called when the socket may have input that its descriptor no longer tells of."""
 
-    def __init__(self, socket: Socket, node_id: str, address: str, after_use: Callable[[], None]) -> None:
+    def __init__(self, socket: Socket, address: str, after_use: Callable[[], None]) -> None:
         self.address = address
         self._socket = socket
         self._after_use = after_use
@@ -60,7 +60,6 @@ class Calls:
         """Whether a master was there when the socket was read last."""
         self._changed = threading.Condition(threading.Lock())
         socket.setsockopt(zmq.LINGER, 0)
-        socket.setsockopt(zmq.ROUTING_ID, node_id.encode())
         socket.setsockopt(zmq.IMMEDIATE, 1)  # nothing is queued for a master that is not there
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
         socket.setsockopt(zmq.RECONNECT_IVL_MAX, 400)

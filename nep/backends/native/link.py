@@ -59,7 +59,7 @@ class MasterLink:
         self.address = address
         self._node = node
         self._io = io
-        self._calls = Calls(socket, node.id, address, after_use=lambda: io.serve_soon(self))
+        self._calls = Calls(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
         self._publishers: dict[int, tuple[PublisherRecord, NativeOutlet]] = {}
         self._subscribers: dict[int, tuple[SubscriberRecord, NativeInlet]] = {}

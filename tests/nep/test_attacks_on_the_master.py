@@ -1,0 +1,396 @@
+"""A hostile program at the master: it throws nobody out, speaks for nobody else, and registers no nonsense.
+
+Each attacker has what the graph shows to everybody: the ids of nodes, publishers and subscribers. The victims
+must go on as if it were not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+import zmq
+
+import nep
+from nep import bodies
+from nep.masters import Master
+from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.registration import id_from, is_endpoint, node_id_from
+from nep.requests import (
+    Added,
+    AddPublisher,
+    AddSubscriber,
+    Done,
+    Found,
+    Join,
+    Leave,
+    Look,
+    PublisherGone,
+    Refused,
+    RemovePublisher,
+    RemoveSubscriber,
+    Renew,
+    Renewed,
+    Reply,
+    ReportMissing,
+    Request,
+    Seen,
+)
+from nep.views import GraphView
+from tests.nep.programs import eventually
+
+OWN_KEY = "an attacker has a key of its own"
+OWN_ID = node_id_from(OWN_KEY)
+
+
+class Attacker:
+    """A connection to the master; with a `routing_id` of its choice."""
+
+    def __init__(self, master: Master, routing_id: bytes = b"") -> None:
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self.socket = self._context.socket(zmq.DEALER)
+        self.socket.setsockopt(zmq.LINGER, 0)
+        if routing_id:
+            self.socket.setsockopt(zmq.ROUTING_ID, routing_id)
+        self.socket.connect(f"tcp://{master.address}")
+        self._call = 0
+
+    def send(self, request: Request) -> int:
+        """Ask and do not wait."""
+        self._call += 1
+        self.socket.send(bodies.encode_request(request, self._call))
+        return self._call
+
+    def ask(self, request: Request) -> Reply:
+        """The reply, which has to come."""
+        call = self.send(request)
+        while True:
+            assert self.socket.poll(5000), "the master does not answer"
+            number, answer = bodies.decode_answer(self.socket.recv())
+            if number == call and isinstance(answer, Reply):
+                return answer
+
+    def close(self) -> None:
+        self.socket.close()
+        self._context.term()
+
+
+@contextmanager
+def attacker_at(master: Master, routing_id: bytes = b"") -> Iterator[Attacker]:
+    made = Attacker(master, routing_id)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+class Victims:
+    """A publisher and a subscriber of one topic, each with a node of its own."""
+
+    def __init__(self, address: str) -> None:
+        self.arm = nep.node("Arm", master=address)
+        self.eye = nep.node("Eye", master=address)
+        self.sub = self.eye.new_sub("/arm/state")
+        self.pub = self.arm.new_pub("/arm/state")
+        self._said = 0
+
+    def go_on(self) -> None:
+        """What is published arrives, and nothing was lost."""
+        self._said += 1
+        self.pub.publish(self._said)
+        assert self.sub.listen(2.0) == (True, self._said)
+        assert self.sub.lost == 0
+
+    def are_listed(self, view: GraphView) -> bool:
+        topic = view.topics.get("/arm/state")
+        return (
+            topic is not None
+            and [(each.id, each.node_id) for each in topic.publishers] == [(self.pub.id, self.arm.id)]
+            and [(each.id, each.node_id) for each in topic.subscribers] == [(self.sub.id, self.eye.id)]
+        )
+
+    def close(self) -> None:
+        self.arm.close()
+        self.eye.close()
+
+
+@pytest.fixture
+def victims(master: Master) -> Iterator[Victims]:
+    made = Victims(master.address)
+    made.go_on()
+    yield made
+    made.close()
+
+
+def node(**changes: object) -> NodeRecord:
+    return replace(NodeRecord(OWN_ID, "Mallory", "host", 1, key=OWN_KEY), **changes)  # type: ignore[arg-type]
+
+
+def publisher(**changes: object) -> PublisherRecord:
+    return replace(PublisherRecord(77, "/arm/state", "json", "json", ("tcp://127.0.0.1:9",)), **changes)  # type: ignore[arg-type]
+
+
+def test_a_routing_id_that_belongs_to_a_node_throws_it_not_out(master: Master, victims: Victims) -> None:
+    before = master.view().nodes
+    for victim in (victims.arm, victims.eye):
+        with attacker_at(master, victim.id.encode()) as attacker:
+            assert isinstance(attacker.ask(Leave(victim.id)), Refused)
+            assert victims.are_listed(master.view())
+        victims.go_on()
+    assert master.view().nodes.keys() == before.keys()
+    eventually(lambda: any(each.id == "request:127.0.0.1" for each in master.view().alerts))
+
+
+def test_a_second_connection_with_a_used_routing_id_takes_nothing_over(master: Master) -> None:
+    mine = node()
+    with attacker_at(master, b"first") as first:
+        assert isinstance(first.ask(Join(mine)), Found)
+        with attacker_at(master, b"first") as second:
+            for _ in range(3):
+                second.send(Leave(mine.id))
+                assert isinstance(first.ask(Renew(mine.id, master.epoch, 0)), Renewed)
+            with attacker_at(master) as third:
+                assert isinstance(third.ask(Leave(mine.id)), Refused)
+        assert isinstance(first.ask(Renew(mine.id, master.epoch, 0)), Renewed)
+        assert mine.id in master.view().nodes
+
+
+def requests_for(victims: Victims) -> list[Request]:
+    """All that a node says of itself, said by somebody else."""
+    return [
+        Leave(victims.arm.id),
+        RemovePublisher(victims.arm.id, victims.pub.id, 0),
+        RemoveSubscriber(victims.eye.id, victims.sub.id),
+        ReportMissing(victims.arm.id, victims.pub.id, (victims.sub.id,)),
+        Join(node(id=victims.arm.id)),
+        Join(node(id=victims.arm.id, key="")),
+        AddPublisher(node(id=victims.arm.id), publisher()),
+        AddSubscriber(node(id=victims.eye.id, key=""), SubscriberRecord(78, "/arm/state", "json")),
+        Join(node(), managed=True),
+    ]
+
+
+@pytest.mark.parametrize("number", range(9))
+def test_nobody_speaks_for_another_node(master: Master, victims: Victims, number: int) -> None:
+    request = requests_for(victims)[number]
+    with attacker_at(master) as attacker:
+        assert isinstance(attacker.ask(request), Refused)
+        assert attacker.ask(Join(node())) != Refused  # also as a registered node
+        assert isinstance(attacker.ask(request), Refused)
+        assert victims.are_listed(master.view())
+        assert not any(each.id.startswith("missing:") for each in master.view().alerts)
+    victims.go_on()
+
+
+def test_a_renewal_of_somebody_else_renews_and_counts_nothing(master: Master, victims: Victims) -> None:
+    seen = master.view()
+    lie = Renew(
+        victims.arm.id,
+        master.epoch,
+        seen.revision,
+        (PublisherCount(victims.pub.id, 10**9, 10**9, 10**9),),
+        (),
+    )
+    with attacker_at(master) as attacker:
+        answer = attacker.ask(lie)
+        assert isinstance(answer, Renewed)
+        assert answer.again
+        (told,) = master.view().topics["/arm/state"].publishers
+        assert told.count < 10
+    victims.go_on()
+
+
+@pytest.mark.parametrize("is_proven", [False, True])
+def test_nobody_takes_the_id_of_a_publisher_or_subscriber(
+    master: Master, victims: Victims, is_proven: bool
+) -> None:
+    number = 1 if is_proven else 0  # a number that does not prove it
+    with attacker_at(master) as attacker:
+        taken = publisher(id=victims.pub.id, number=number)
+        assert isinstance(attacker.ask(AddPublisher(node(), taken)), Refused)
+        assert isinstance(attacker.ask(AddPublisher(node(), replace(taken, topic="/other"))), Refused)
+        assert isinstance(attacker.ask(Join(node(), 0, (taken,))), Refused)
+        ears = SubscriberRecord(victims.sub.id, "/arm/state", "json", number)
+        assert isinstance(attacker.ask(AddSubscriber(node(), ears)), Refused)
+        assert victims.are_listed(master.view())
+        assert OWN_ID not in master.view().nodes
+    victims.go_on()
+
+
+def test_who_took_ids_first_loses_them_to_who_can_prove_them() -> None:
+    """A master was started again, and the attacker is quicker than those who come back."""
+    with Master("127.0.0.1:0", learn_s=0.0) as master:
+        address = master.address
+        victims = Victims(address)
+        victims.go_on()
+    with Master(address, learn_s=0.0) as again, attacker_at(again) as attacker:
+        arm, eye = victims.arm.id, victims.eye.id
+        ears = SubscriberRecord(victims.sub.id, "/arm/state", "json")
+        taken = publisher(id=victims.pub.id)
+        attacker.ask(Join(node(), 0, (taken,), (ears,)))
+        with attacker_at(again, arm.encode()) as unproven:
+            unproven.ask(Join(node(id=arm, key="")))
+            eventually(lambda: victims.are_listed(again.view()))
+            assert {arm, eye} <= again.view().nodes.keys()
+        victims.go_on()
+        victims.close()
+
+
+def test_one_connection_speaks_for_one_node(master: Master) -> None:
+    with attacker_at(master) as attacker:
+        assert isinstance(attacker.ask(Join(node())), Found)
+        second = Join(NodeRecord(node_id_from("b"), "Second", "host", 1, key="b"))
+        answer = attacker.ask(second)
+        assert isinstance(answer, Refused)
+        assert answer.reason == f"this connection speaks for the node '{OWN_ID}' already"
+        assert isinstance(attacker.ask(Leave(OWN_ID)), Done)
+        assert isinstance(
+            attacker.ask(Join(NodeRecord(node_id_from("b"), "Second", "host", 1, key="b"))), Found
+        )
+
+
+def test_a_node_whose_old_connection_hangs_is_not_locked_out(master: Master) -> None:
+    """Its computer lost the network and has it again; for the master the old connection is still there."""
+    with attacker_at(master) as old, attacker_at(master) as new:
+        arm = PublisherRecord(id_from(OWN_KEY, 1), "/arm", "json", "json", ("tcp://127.0.0.1:9",), number=1)
+        assert isinstance(old.ask(AddPublisher(node(), arm)), Added)
+        answer = new.ask(Renew(OWN_ID, master.epoch, 0, (PublisherCount(arm.id, 1, 1, 1),)))
+        assert isinstance(answer, Renewed)
+        assert answer.again
+        assert isinstance(new.ask(Join(node(), master.epoch, (arm,))), Found)
+        answer = new.ask(Renew(OWN_ID, master.epoch, 0, (PublisherCount(arm.id, 1, 1, 1),)))
+        assert answer == replace(answer, again=False)
+        assert isinstance(old.ask(Leave(OWN_ID)), Refused)
+        assert [each.node_id for each in master.view().topics["/arm"].publishers] == [OWN_ID]
+
+
+def test_nobody_makes_others_wait_not_for_a_subscriber(master: Master, victims: Victims) -> None:
+    """An attacker reports that it does not answer. Who publishes next waits for it all the same."""
+    with attacker_at(master) as attacker:
+        for n in range(3):
+            own = publisher(id=100 + n)
+            assert isinstance(attacker.ask(AddPublisher(node(), own)), Added)
+            assert isinstance(attacker.ask(ReportMissing(OWN_ID, own.id, (victims.sub.id,))), Done)
+            with nep.node(f"Other {n}", master=master.address) as other:
+                pub = other.new_pub("/arm/state")
+                pub.publish("first")
+                assert victims.sub.listen(2.0) == (True, "first")
+                assert pub.missing == ()
+
+
+GOOD = "tcp://127.0.0.1:5"
+BAD_ENDPOINTS = [
+    "", "tcp://", "127.0.0.1:5000", "tcp://127.0.0.1", "tcp://127.0.0.1:", "tcp://127.0.0.1:0", "tcp://127.0.0.1:65536",
+    "tcp://127.0.0.1:5000;10.0.0.1:5000", "tcp://eth0;10.0.0.1:5000", "tcp://*:5000", "tcp://127.0.0.1:*",
+    "ipc:///tmp/x", "ipc://@nep-5000", "inproc://ended", "pgm://10.0.0.1;239.192.1.1:5555", "ws://10.0.0.1:80",
+    "udp://10.0.0.1:5000", "tcp://127.0.0.1:5000\n", "tcp://127.0.0.1:٣٤", "tcp://a b:5000", "tcp://\x1b[2J:5000",
+    "tcp://" + "a" * 300 + ":5000", "memory", "TCP://127.0.0.1:5000", "tcp://@127.0.0.1:5000",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("endpoint", BAD_ENDPOINTS, ids=ascii)
+def test_an_endpoint_is_a_host_and_a_port_and_nothing_else(endpoint: str) -> None:
+    assert not is_endpoint(endpoint)
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    [
+        "tcp://127.0.0.1:1",
+        "tcp://0.0.0.0:65535",
+        "tcp://robot-2.local:5000",
+        "tcp://[::1]:5000",
+        "tcp://[fe80::1%eth0]:5",
+    ],
+)
+def test_all_forms_of_hosts_are_endpoints(endpoint: str) -> None:
+    assert is_endpoint(endpoint)
+
+
+def test_what_no_program_may_register_is_refused_counted_and_named(master: Master, victims: Victims) -> None:
+    with attacker_at(master) as attacker:
+        nonsense: list[Request] = [
+            *(
+                AddPublisher(node(), publisher(endpoints=("tcp://127.0.0.1:5", each)))
+                for each in BAD_ENDPOINTS
+            ),
+            AddPublisher(node(), publisher(endpoints=("tcp://127.0.0.1:5",) * 33)),
+            AddPublisher(node(), publisher(id=0)),
+            AddPublisher(node(), publisher(id=2**63)),
+            AddPublisher(node(), publisher(id=-5)),
+            AddPublisher(node(), publisher(topic="/a\x1b[2Jb")),
+            AddPublisher(node(), publisher(msg_type="x\u202ey")),
+            AddPublisher(node(), publisher(codec="j" * 1000)),
+            Join(node(name="Arm\x1b[2J")),
+            Join(node(name="Arm\u202e")),
+            Join(node(name="A" * 201)),
+            Join(node(name="")),
+            Join(node(host="h" * 10_000)),
+            Join(node(language="\n")),
+            Join(node(id="../../etc")),
+            Join(node(id=OWN_ID.upper())),
+            Join(node(pid=2**40)),
+            Join(node(since_ns=-1)),
+            Join(node(), 0, tuple(publisher(id=n) for n in range(1, 10_002))),
+        ]
+        for request in nonsense:
+            answer = attacker.ask(request)
+            assert isinstance(answer, Refused), request
+            assert answer.reason
+            assert answer.reason.isprintable()
+        assert victims.are_listed(master.view())
+        assert OWN_ID not in master.view().nodes
+        count = f"({len(nonsense)} times so far)"
+        eventually(lambda: any(count in each.sentence for each in master.view().alerts))
+    victims.go_on()
+
+
+def test_a_node_has_no_more_than_so_many_publishers(master: Master) -> None:
+    with attacker_at(master) as attacker:
+        many = tuple(publisher(id=n, topic=f"/t{n}") for n in range(1, 10_001))
+        assert isinstance(attacker.ask(Join(node(), 0, many)), Found)
+        more = attacker.ask(AddPublisher(node(), publisher(id=20_000)))
+        assert isinstance(more, Refused)
+        assert more.reason == "a node has 10000 publishers and subscribers at most"
+        assert isinstance(attacker.ask(RemovePublisher(OWN_ID, 1, 0)), Done)
+        assert isinstance(attacker.ask(AddPublisher(node(), publisher(id=20_000))), Added)
+
+
+def test_a_key_is_shown_to_nobody(master: Master, victims: Victims) -> None:
+    with attacker_at(master) as attacker:
+        answers = [
+            attacker.ask(Look()),
+            attacker.ask(AddSubscriber(node(), SubscriberRecord(5, "/arm/state", "json"))),
+        ]
+        assert isinstance(answers[0], Seen)
+    keys = [victims.arm._key, victims.eye._key]
+    for told in (repr(answers), repr(master.view()), repr(NodeRecord("a", "b", "c", 1, key=keys[0]))):
+        assert not any(key in told for key in keys)
+
+
+def test_who_evicts_is_told_to_those_who_listen(master: Master) -> None:
+    """Subscribers hear that the unproven publisher is gone before they hear of the proven one."""
+    real = PublisherRecord(id_from("k", 1), "/t", "json", "json", ("tcp://127.0.0.1:9",), number=1)
+    with attacker_at(master) as ear, attacker_at(master) as squatter, attacker_at(master) as owner:
+        listener = NodeRecord(node_id_from("ear"), "Ear", "host", 1, key="ear")
+        ear.ask(AddSubscriber(listener, SubscriberRecord(5, "/t", "json")))
+        assert isinstance(squatter.ask(AddPublisher(node(), replace(real, number=0))), Added)
+        owned = NodeRecord(node_id_from("k"), "Owner", "host", 1, key="k")
+        assert isinstance(owner.ask(AddPublisher(owned, real)), Added)
+        came, gone, again = (bodies.decode_answer(ear.socket.recv())[1] for _ in range(3))
+        assert isinstance(gone, PublisherGone)
+        assert not gone.is_closed
+        assert [each.publisher.node_name for each in (came, again)] == ["Mallory", "Owner"]
+
+
+def test_counts_of_subscribers_are_no_way_out_either(master: Master) -> None:
+    with attacker_at(master) as attacker, nep.node("honest", master=master.address) as honest:
+        record = SubscriberRecord(5, "/t", "json")
+        assert isinstance(attacker.ask(AddSubscriber(node(), record)), Found)
+        for lost in (2**64 - 1, -1, 2**63):
+            count = SubscriberCount(5, lost, lost, "a\x1b[2J" * 1000)
+            assert isinstance(attacker.ask(Renew(OWN_ID, master.epoch, 0, (), (count,))), Renewed)
+            topic = honest.graph().topics["/t"]
+            assert topic.lost in {0, 2**63 - 1}
