@@ -27,7 +27,6 @@ from nep.errors import NepError
 
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 ROBOT_WAIT_S = 10.0
-STOP_S = 1.0
 SLICE_S = 0.1
 _STARTER = re.compile(r"events_|robot_.*_when_")
 
@@ -150,7 +149,8 @@ def _run(
         ends=runner.program_id
     )  # at once; and again when the program is gone and can't move them any more
     runner.close()
-    report = stopper.stop_all(timeout_s=STOP_S, ends=runner.program_id)
+    names = [*(robot.name for robot in robots), *told.silent]
+    report = stopper.stop_all(names, ends=runner.program_id)
     for line in stop_lines(report):
         say(line)
     if was_interrupted:
@@ -165,6 +165,7 @@ class _Told:
         self._say = say
         self._last = ""
         self.ok = True
+        self.silent: tuple[str, ...] = ()
 
     def __call__(self, event: RunnerEvent) -> None:
         if event.kind == "running" and event.says != self._last:
@@ -174,18 +175,22 @@ class _Told:
         elif event.kind in ("print", "error") or (event.kind == "ended" and event.text):
             self._say(event.text)
         if event.kind == "ended":
-            self.ok = event.ok
+            self.ok, self.silent = event.ok, event.silent
             if event.elapsed_s is not None:
                 self._say(f"ended after {event.elapsed_s:.1f} s")
 
 
 def stop_lines(report: StopReport) -> list[str]:
     """The stop in words: "all 2 robots stopped (41 ms)", and each robot that did not."""
+    strange = [
+        f"“{program}” answered Stop in the name of {name}; that does not count."
+        for name, program in report.strangers
+    ]
     if not report.robots:
-        return []
+        return strange
     others = [robot.sentence for robot in report.robots if not robot.answered]
-    if others:
-        return [*(robot.sentence for robot in report.robots if robot.answered), *others]
+    if others or strange:
+        return [*(robot.sentence for robot in report.robots if robot.answered), *others, *strange]
     if len(report.robots) == 1:
         return [f"{report.robots[0].name} stopped ({report.elapsed_ms:.0f} ms)"]
     return [f"all {len(report.robots)} robots stopped ({report.elapsed_ms:.0f} ms)"]

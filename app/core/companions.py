@@ -86,6 +86,12 @@ class Companions:
             return tuple(name for name, (process, _) in self._robots.items() if process.poll() is None)
 
     @property
+    def process_ids(self) -> tuple[int, ...]:
+        """The processes of the virtual robots that were started here and run."""
+        with self._lock:
+            return tuple(process.pid for process, _ in self._robots.values() if process.poll() is None)
+
+    @property
     def started_master(self) -> bool:
         """Whether the master that runs was started here."""
         return self._master.runs

@@ -6,8 +6,12 @@ Found by their description, watched by their sensors, tried out by their actions
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
 
+from app.core.announcements import Announcements, Claim
 from app.core.heartbeat import Heartbeat
 from app.core.known_robots import KnownRobots
 from app.core.mailbox import Batch
@@ -15,18 +19,54 @@ from app.core.moving import MayNotMoveError, Moving
 from app.core.rize_names import RizeNames
 from app.core.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.settings import Settings
+from app.core.stopping import MOST_TOPICS, refusal_words
 from app.core.tries import Tries
 from app.core.watches import Watch, Watches
-from app.errors import AppError, DescriptionError, RobotInputError, RobotUnknownError
+from app.errors import AppError, RobotInputError, RobotUnknownError
 from app.robots import rize
-from app.robots.description import Robot, parse, topic_of
+from app.robots.description import Robot, topic_of
+from app.robots.identity import (
+    GATEWAY,
+    Identity,
+    Senders,
+    hearing,
+    is_home,
+    publishing,
+    reserved,
+)
 from nep.errors import NepError
 from nep.message import Message
 from nep.nodes import Node
 from nep.views import GraphView
 
-DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
+MOST_HELD = 256
+"""Answers of publishers that no master has told of yet, kept until the next graph."""
+MOST_EARLIER = 4
+SHARED = frozenset({rize.COMMANDS, rize.ANSWERS})
+"""Topics of all robots of RIZE together."""
+
+
+class Processes(Protocol):
+    """What is needed to know about the processes of robots."""
+
+    def is_ours(self, identity: Identity) -> bool:
+        """Whether this program is a virtual robot of this person."""
+
+    def has_ended(self, identity: Identity) -> bool:
+        """Whether it is sure that this program runs no more."""
+
+
+class Believed:
+    """Believes every robot that says that it is virtual (what tests need)."""
+
+    def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
+        """All are."""
+        return True
+
+    def has_ended(self, identity: Identity) -> bool:  # noqa: ARG002
+        """Nobody knows."""
+        return False
 
 
 class Fleet:
@@ -38,17 +78,25 @@ class Fleet:
         submit: Callable[[str, Callable[[Node], None]], None],
         clock: Callable[[], float] = time.monotonic,
         settings: Settings | None = None,
+        processes: Processes | None = None,
     ) -> None:
         """``watches`` subscribes topics, ``submit`` does something with the node in the source's thread.
 
-        ``settings`` keep who may move and who was here; without them only until this ends.
+        ``settings`` keep who may move and who was here; without them only until this ends. ``processes`` know
+        which robots are virtual; without them every robot is that says so.
         """
         self._watches = watches
         self._submit = submit
         self._clock = clock
         self._links: dict[str, RobotLink] = {}
-        self._descriptions: dict[str, Watch] = {}
-        self._named: dict[str, str] = {}
+        self._processes = processes if processes is not None else Believed()
+        self._senders = Senders()
+        self._announcements = Announcements(watches, self._senders)
+        self._names: dict[str, str] = {}
+        self._view = GraphView(0, 0)
+        self._held: deque[tuple[str, Message]] = deque(maxlen=MOST_HELD)
+        self._taken: dict[str, Claim] = {}
+        self._notes: list[str] = []
         self._rize = RizeNames()
         self._rize_events: Watch | None = None
         self._alive = Heartbeat(SENDER)
@@ -56,6 +104,7 @@ class Fleet:
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
         self._told = False
+        self._settled: dict[str, None] = {}
         self.revision = 0
 
     @property
@@ -74,7 +123,9 @@ class Fleet:
         None while nobody has told who is there.
         """
         link = self._links.get(name)
-        if (link is not None and link.connected) or topic_of(name, "description") in self._descriptions:
+        if (link is not None and link.connected) or self._announcements.is_announced(
+            topic_of(name, "description")
+        ):
             return True
         return False if self._told else None
 
@@ -143,40 +194,57 @@ class Fleet:
         if link.world is not None:
             link.world.publish(dict(change))
 
-    def stopped(self, words: Mapping[str, str]) -> None:
-        """These robots were told to stop; the words say what each did, by its name."""
+    def stopped(self, words: Mapping[str, str], wrong: Mapping[str, str]) -> None:
+        """These robots were told to stop; the words say what each did, by its name.
+
+        ``wrong`` says of those that are not proven to stand still why not; what they were asked ends when
+        they say so themselves.
+        """
         for name, said in words.items():
             link = self._links.get(name)
             if link is None:
                 continue
-            link.last_stop = said
-            self._tries.end_all(link, "canceled")
+            link.last_stop, link.not_stopped = said, wrong.get(name, "")
+            if not link.not_stopped:
+                self._tries.end_all(link, "canceled")
             self._alive.rest(name)
+
+    def stands_still(self, names: Iterable[str]) -> None:
+        """A person says that these robots stand still."""
+        for link in map(self._links.get, names):
+            if link is not None:
+                link.not_stopped = ""
+
+    def take_settled(self) -> tuple[str, ...]:
+        """The robots that were not stopped and have ended now, as they say, what would not end; once each."""
+        settled, self._settled = tuple(self._settled), {}
+        return settled
 
     # -- what the session tells ------------------------------------------------------------------------------
 
     def update(self, view: GraphView) -> None:
         """Take over a new graph: robots come and go."""
         self._told = True
-        there = {
-            name
-            for name, info in view.topics.items()
-            if info.msg_type == DESCRIPTION_TYPE and info.publishers
-        }
-        for topic in there - self._descriptions.keys():
-            self._descriptions[topic] = self._watches.open([topic])
-        for topic in self._descriptions.keys() - there:
-            self._descriptions.pop(topic).close()
-            link = self._links.get(self._named.get(topic, ""))
-            if link is not None:
-                self._away(link)
+        self._view = view
+        self._announcements.update(view)
+        topics = (self._topics_that_count(link.robot) for link in self._links.values())
+        self._senders.learn(view, {rize.ANSWERS}.union(*topics))
+        self._follow_announced()
         self._update_rize(view)
+        held, self._held = list(self._held), deque(maxlen=MOST_HELD)
+        for name, message in held:
+            link = self._links.get(name)
+            if link is not None and self._is_from(link, message):
+                self._answer(link, message)
+        for link in self._links.values():
+            if link.connected and link.publisher is None:
+                self._open_publisher(link)
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Take over what arrived: descriptions, answers, sensor values."""
-        for topic, batch in batches.items():
-            if topic in self._descriptions and batch.messages:
-                self._describe(topic, batch)
+        self._announcements.add(batches)
+        if any(self._announcements.is_announced(topic) for topic in batches):
+            self._follow_announced()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
             name = rize.ready(_mapping(message))
@@ -185,6 +253,16 @@ class Fleet:
         for link in self._links.values():
             self._read(link, batches)
         self._tries.look(self._links.values())
+
+    @property
+    def claims(self) -> Mapping[str, Claim]:
+        """What programs say of themselves and is not believed, by an id."""
+        return {**self._announcements.claims, **self._taken}
+
+    def take_notes(self) -> tuple[str, ...]:
+        """What a person may want to read: a robot was started anew. Each once."""
+        notes, self._notes = tuple(self._notes), []
+        return notes
 
     def close(self) -> None:
         """End the heartbeat and the command publishers."""
@@ -223,38 +301,117 @@ class Fleet:
             if link.robot.dialect == "rize" and link.connected and link.name not in there:
                 self._away(link)
 
-    def _describe(self, topic: str, batch: Batch) -> None:
-        try:
-            robot = parse(_mapping(batch.messages[-1]) or {})
-        except DescriptionError:
-            return  # the session's alert `message:<topic>` says so
-        self.join(robot, topic)
+    def _follow_announced(self) -> None:
+        """Join whom the announcements name; whose program is not there any more has gone."""
+        found = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
+        for topic, name in list(self._names.items()):
+            link, now = self._links.get(name), found.get(topic)
+            if link is None or not link.connected:
+                continue
+            is_same = now is not None and now[0].name == name and now[1] == link.identity
+            if not is_same and not (now is None and self._is_unread(topic, link)):
+                self._away(link)
+        for topic in self._taken.keys() - found.keys():
+            del self._taken[topic]
+        for topic, (robot, identity) in found.items():
+            claim = self._foreign(robot)
+            if claim is None:
+                self._taken.pop(topic, None)
+                self.join(robot, topic, identity)
+                continue
+            self._taken[topic] = claim
+            link = self._links.get(robot.name)
+            if link is not None and link.connected:
+                self._away(link)
 
-    def join(self, robot: Robot, topic: str) -> None:
+    def _is_unread(self, topic: str, link: RobotLink) -> bool:
+        """Whether its program still announces it there, in words that can't be read just now."""
+        there = publishing(self._view, topic)
+        return link.identity is not None and link.identity.node_id in there
+
+    def _foreign(self, robot: Robot) -> Claim | None:
+        """Why a robot can't have the topics that it names: they are another robot's."""
+        for topic in set(reserved(robot)) - SHARED:
+            if is_home(robot.name, topic):
+                continue
+            for other in self._links.values():
+                if other.name == robot.name:
+                    continue
+                if is_home(other.name, topic) or topic in reserved(other.robot):
+                    title = f"{robot.name} says that {topic} is its own; it belongs to {other.name}."
+                    return Claim(title, f"{robot.name} is left out. Find out what this program is.")
+        return None
+
+    def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
         """A robot is there, known by ``topic``; said again it does nothing unless the robot changed."""
-        self._named[topic] = robot.name
         link = self._links.get(robot.name)
+        was_real = not robot.virtual or (link is not None and link.identity == identity and link.was_real)
+        if identity is not None:
+            self._names[topic] = robot.name
+            is_virtual = not was_real and self._processes.is_ours(identity)
+            robot = replace(robot, virtual=is_virtual)
         if link is None:
             link = self._links[robot.name] = RobotLink(robot.name, robot)
-        elif link.connected and link.robot == robot:
+        elif link.connected and link.robot == robot and link.identity == identity:
             return
-        link.robot, link.connected, link.gone_s = robot, True, None
+        self._take_identity(link, identity)
+        link.was_real = was_real
+        before, link.robot = link.robot, robot
+        link.connected, link.gone_s = True, None
+        if before.topics != robot.topics or before.dialect != robot.dialect:
+            if before.dialect == robot.dialect:
+                link.topics_before = tuple(dict.fromkeys((before.topics, *link.topics_before)))[:MOST_TOPICS]
+            self._leave_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.answer])
+        self._senders.learn(self._view, self._topics_that_count(robot))
         self._open_publisher(link)
         self.known.saw([robot])
         self.revision += 1
 
+    def _take_identity(self, link: RobotLink, identity: Identity | None) -> None:
+        """It is this program now; the one before may still run somewhere and move the robot."""
+        before, link.identity = link.identity, identity
+        if before is None or identity is None or before.node_id == identity.node_id:
+            return
+        self._notes.append(f"{link.name} was started anew: it is {identity.words} now, before {before.words}")
+        link.not_stopped = link.goes_on = ""
+        if not self._processes.has_ended(before):
+            link.earlier = (before, *link.earlier)[:MOST_EARLIER]
+
+    def _leave_topics(self, link: RobotLink) -> None:
+        """Its description names other topics: what was asked on the old ones has ended."""
+        self._alive.rest(link.name)
+        self._tries.end_all(link, "failed", f"{link.name} has changed; try it again")
+        if link.watch is not None:
+            link.watch.close()
+            link.watch = None
+        old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
+        link.publisher = link.world = None
+
+        def close_them(_node: Node) -> None:
+            for publisher in old:
+                publisher.close()
+
+        if old:
+            self._submit(f"leave the old topics of {link.name}", close_them)
+
     def _open_publisher(self, link: RobotLink) -> None:
         topics = link.robot.topics
-        if link.publisher is not None:
+        if link.publisher is not None or link.is_opening:
             return
+        link.is_opening = True
 
         def open_them(node: Node) -> None:
             native = link.robot.dialect == "native"
-            link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json")
-            if topics.world is not None:
-                link.world = node.new_pub(topics.world, "json")
+            try:
+                if link.robot.topics != topics:
+                    return  # it has changed meanwhile, and is reached by the next graph
+                world = node.new_pub(topics.world, "json") if topics.world is not None else None
+                link.world = world
+                link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json")
+            finally:
+                link.is_opening = False
 
         self._submit(f"reach {link.name}", open_them)
 
@@ -280,23 +437,69 @@ class Fleet:
             return False
         return True
 
+    def _topics_that_count(self, robot: Robot) -> set[str]:
+        """Where what a robot tells comes from its own program only, if that publishes there."""
+        return {robot.topics.answer, *topics_of(robot)}
+
+    def _is_from(self, link: RobotLink, message: Message) -> bool | None:
+        """Whether the robot's own program sent a message; None while that is not known.
+
+        Robots of RIZE can't be told apart: for them it is who hears their commands, or the gateway.
+        """
+        if link.identity is None and link.robot.dialect == "native":
+            return True
+        node = self._senders.node_of(message)
+        if link.robot.dialect != "native":
+            known = self._view.nodes.get(node or "")
+            is_gateway = known is None or known.generation == GATEWAY
+            return is_gateway or node in hearing(self._view, link.robot.topics.command)
+        return None if node is None or link.identity is None else node == link.identity.node_id
+
+    def _newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
+        """The newest message that counts: from the robot's own program, if that publishes the topic."""
+        if batch is None or not batch.messages:
+            return None
+        own = link.identity.node_id if link.identity is not None else ""
+        if own not in publishing(self._view, topic):
+            return _mapping(batch.messages[-1])
+        found = (message for message in reversed(batch.messages) if self._senders.node_of(message) == own)
+        newest = next(found, None)
+        return None if newest is None else _mapping(newest)
+
     def _read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
         answers = batches.get(link.robot.topics.answer)
         for message in answers.messages if answers is not None else ():
-            answer = _mapping(message)
-            if answer is not None and link.robot.dialect == "rize":
-                answer = rize.from_answer(answer)
-            if answer is not None:
-                self._tries.answer(link, answer)
+            is_own = self._is_from(link, message)
+            if is_own:
+                self._answer(link, message)
+            elif is_own is None:
+                self._held.append((link.name, message))
         for sensor in link.robot.sensors:
-            batch = batches.get(sensor.topic)
-            if batch is not None and batch.messages and not sensor.is_image:
-                value = _mapping(batch.messages[-1])
-                if value is not None:
-                    link.values[sensor.name] = value.get("value", value)
-        state = batches.get(link.robot.topics.state or "")
-        if state is not None and state.messages:
-            link.drawing = _mapping(state.messages[-1]) or link.drawing
+            if sensor.is_image:
+                continue
+            value = self._newest(link, batches.get(sensor.topic), sensor.topic)
+            if value is not None:
+                link.values[sensor.name] = value.get("value", value)
+        topic = link.robot.topics.state or ""
+        link.drawing = self._newest(link, batches.get(topic), topic) or link.drawing
+
+    def _answer(self, link: RobotLink, message: Message) -> None:
+        answer = _mapping(message)
+        if answer is not None and link.robot.dialect == "rize":
+            answer = rize.from_answer(answer)
+        if answer is not None:
+            self._tries.answer(link, answer)
+            self._take_life(link, answer)
+
+    def _take_life(self, link: RobotLink, answer: Payload) -> None:
+        """Take a robot's sign of life, which names the actions that it could not end."""
+        if answer.get("op") != "alive" or "not_ended" not in answer:
+            return
+        before, link.goes_on = link.goes_on, ""
+        if answer["not_ended"]:
+            link.goes_on = refusal_words(link.name, answer.get("error") or "an action has not ended")
+        elif before and link.not_stopped:
+            self._settled[link.name] = None
 
 
 def _mapping(message: Message) -> Payload | None:

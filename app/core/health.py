@@ -39,6 +39,8 @@ class Health:
         """Look at these; ``clock`` gives monotonic seconds."""
         self._topics, self._fleet, self._alerts, self._clock = topics, fleet, alerts, clock
         self._from_graph: set[str] = set()
+        self._claims: set[str] = set()
+        self._unreachable: set[str] = set()
         self._bad: dict[str, _Bad] = {}
         self._away: dict[str, float] = {}
 
@@ -74,8 +76,10 @@ class Health:
         now = self._clock()
         for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= CURE_S]:
             self.forget(topic)
+        self._check_claims()
         for link in self._fleet.links:
             self._check_camera(link)
+            self._check_motion(link)
             if link.connected:
                 self._away.pop(link.name, None)
                 self._alerts.cure(f"robot:{link.name}")
@@ -153,6 +157,40 @@ class Health:
             VIRTUAL if link.virtual else REAL,
             button="Start it again" if link.virtual else ASK_DOCTOR,
             action=f"connect:{link.name}" if link.virtual else "help.doctor",
+            count=0,
+        )
+
+    def _check_claims(self) -> None:
+        """Tell of programs that say that they are a robot and are not believed."""
+        claims = self._fleet.claims
+        for id in self._claims - claims.keys():
+            self._alerts.cure(f"claim:{id}")
+        for id, claim in claims.items():
+            self._alerts.put(f"claim:{id}", "error", claim.title, claim.detail, count=0)
+        self._claims = set(claims)
+
+    def unreachable(self, problems: Mapping[str, str]) -> None:
+        """Tell of robots that a stop can't reach, by their names, and why."""
+        for name in self._unreachable - problems.keys():
+            self._alerts.cure(f"stop:{name}")
+        for name, why in problems.items():
+            said = f"{why[:1].upper()}{why[1:]}. It is tried again each second."
+            self._alerts.put(f"stop:{name}", "error", f"Stop can't reach {name}.", said, count=0)
+        self._unreachable = set(problems)
+
+    def _check_motion(self, link: RobotLink) -> None:
+        """Tell of a robot that says itself that it could not end an action."""
+        if not (link.connected and link.goes_on):
+            self._alerts.cure(f"moving:{link.name}")
+            return
+        said = "Switch it off by hand if it does not stand still."
+        self._alerts.put(
+            f"moving:{link.name}",
+            "error",
+            f"{link.goes_on}.",
+            said,
+            button="Stop",
+            action="run.stop",
             count=0,
         )
 

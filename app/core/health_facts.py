@@ -109,6 +109,8 @@ def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[flo
 
 
 def _stop(link: RobotLink) -> HealthFact:
+    if link.goes_on:
+        return HealthFact("Stop", "error", link.goes_on)
     if link.last_stop is not None:
         kinds = {"answered": "ok", "sent": "off"}
         return HealthFact("Stop", kinds.get(link.last_stop.partition(" ")[0], "error"), link.last_stop)

@@ -8,12 +8,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from app.core.watches import Watch
-from app.robots.description import Robot
+from app.robots.description import Robot, Topics
+from app.robots.identity import Identity
 from nep.pubsub import Publisher
 
 SENDER = "studio"
 """Who the commands of try-outs are from."""
 TRIES_KEPT = 40
+NOT_STOPPED = "not stopped"
+MAY_MOVE = "may still move"
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 
 Payload = Mapping[str, object]
@@ -68,6 +71,11 @@ class RobotLink:
     ``values`` has the newest value of each sensor while somebody looks. ``tried`` are the last tries, the
     newest at the end. ``mute`` says that it did not answer a command; ``heard_s`` is when it last answered
     anything or was asked, ``answered_s`` when it last answered, ``gone_s`` since when it is away.
+    ``not_stopped`` says why the last stop is not proven ("Arm may still move: the brake does not answer"),
+    ``goes_on`` what it says itself about actions that it could not end; both are empty when all is well.
+    ``identity`` is the program that it is; ``earlier`` are programs of its name that went away and may still
+    move it, ``topics_before`` those of its earlier descriptions. ``was_real`` says that it has not always
+    been virtual.
     """
 
     name: str
@@ -83,6 +91,13 @@ class RobotLink:
     answered_s: float | None = None
     gone_s: float | None = None
     last_stop: str | None = None
+    not_stopped: str = ""
+    goes_on: str = ""
+    identity: Identity | None = None
+    earlier: tuple[Identity, ...] = ()
+    topics_before: tuple[Topics, ...] = ()
+    is_opening: bool = False
+    was_real: bool = False
     publisher: Publisher | None = None
     world: Publisher | None = None
     watch: Watch | None = None
@@ -99,9 +114,11 @@ class RobotLink:
 
     @property
     def state(self) -> str:
-        """``away``, ``silent``, ``busy`` or ``ready``."""
+        """``away``, ``not stopped``, ``silent``, ``busy`` or ``ready``."""
         if not self.connected:
             return "away"
+        if self.not_stopped or self.goes_on:
+            return NOT_STOPPED
         if self.silent is not None or self.mute:
             return "silent"
         return "busy" if self.running else "ready"
@@ -116,6 +133,8 @@ class RobotLink:
     def chip(self) -> str:
         """The words of its chip: ``virtual, ready``."""
         words = self.state
+        if words == NOT_STOPPED and MAY_MOVE in f"{self.goes_on} {self.not_stopped}":
+            words = MAY_MOVE
         if self.connected and words == "silent":
             words = "does not answer" if self.mute else self.silent or words
         return f"virtual, {words}" if self.virtual else words

@@ -163,7 +163,9 @@ def _stopping_early(run: RunState, now: float) -> RunView:
 
 
 def _stopping(run: RunState, now: float) -> RunView:
+    # one that refuses, or that somebody else serves too, is done only when all of it has stopped
     done = {robot.name for robot in run.answered if robot.answered}
+    done -= {robot.name for robot in run.answered if robot.wrong}
     waiting = [name for name in run.asked if name not in done]
     detail = f"Waiting for {listed(waiting)}, {now - run.pressed_s:.1f} s" if waiting else ""
     result = f"{len(done)} of {len(run.asked)} robots stopped" if run.asked else None
@@ -223,10 +225,9 @@ def connected_words(names: Sequence[str]) -> str:
 def result_words(report: StopReport) -> tuple[str, bool]:
     """``all 2 robots stopped (41 ms)`` and whether every robot that can answer did."""
     robots = report.robots
-    silent = [robot for robot in robots if robot.can_confirm and not robot.answered]
-    unsure = [robot.name for robot in robots if not robot.can_confirm]
-    proven = [robot.name for robot in robots if robot.can_confirm and robot.answered]
-    if silent:
+    unsure = [robot.who for robot in robots if not robot.can_confirm]
+    proven = [robot.who for robot in robots if robot.can_confirm and robot.answered]
+    if report.unproven:
         return f"{len(proven)} of {len(robots)} robots stopped", False
     if not robots:
         return "no robot to stop", True
@@ -244,21 +245,32 @@ def _cannot_confirm(names: Sequence[str]) -> str:
 
 
 def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
-    """Title, detail, compact sentence and the confirming button for robots that did not answer a stop."""
-    silent = [robot.name for robot in report.robots if robot.can_confirm and not robot.answered]
+    """Title, detail, compact sentence and the confirming button when robots are not proven to stand still.
+
+    What a robot said itself ("Arm may still move: the brake is stuck") comes first, in its own words.
+    """
     proven = [robot for robot in report.robots if robot.can_confirm and robot.answered]
-    names = listed(silent)
+    names = listed(report.silent)
     stopped = ""
     if proven:
         slowest = max(1, round(max(robot.elapsed_ms or 0 for robot in proven)))
-        stopped = f"{listed([robot.name for robot in proven])} stopped ({slowest} ms). "
-    them = names if len(silent) <= 2 else "them"
+        stopped = f"{listed([robot.who for robot in proven])} stopped ({slowest} ms). "
+    them = names if len(report.silent) <= 2 else "them"
+    title = _wrong_words(report)
     return (
-        f"{names} did not answer",
+        title,
         f"{stopped}Switch {them} off by hand.",
-        f"{names} did not answer; switch {'it' if len(silent) == 1 else 'them'} off by hand",
-        f"{names} {'is' if len(silent) == 1 else 'are'} still",
+        f"{title}; switch {'it' if len(report.silent) == 1 else 'them'} off by hand",
+        f"{names} {'is' if len(report.silent) == 1 else 'are'} still",
     )
+
+
+def _wrong_words(report: StopReport) -> str:
+    """What is wrong with those that are not proven: what they said, who could not be told, who is silent."""
+    told = [robot.wrong for robot in report.unproven if robot.refused]
+    untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
+    silent = [robot.who for robot in report.unproven if not robot.error]
+    return "; ".join([*told, *untold, *([f"{listed(silent)} did not answer"] if silent else [])])
 
 
 def stop_words(robot: RobotStop, clock: str) -> str:
@@ -267,7 +279,21 @@ def stop_words(robot: RobotStop, clock: str) -> str:
         return f"sent at {clock}; this robot cannot confirm"
     if robot.answered:
         return f"answered in {max(1, round(robot.elapsed_ms or 0))} ms, at {clock}"
+    if robot.error:
+        return f"{robot.wrong}, at {clock}"
+    if robot.program:
+        return f"“{robot.program}” has not answered, at {clock}"
     return f"not answered, at {clock}"
+
+
+def stops_by_name(report: StopReport) -> Mapping[str, RobotStop]:
+    """What became of each robot: the worst of what its own and other programs that serve it said."""
+    worst: dict[str, RobotStop] = {}
+    for robot in report.robots:
+        before = worst.get(robot.name)
+        if before is None or (robot.wrong and not (before.wrong and not before.program)):
+            worst[robot.name] = robot
+    return worst
 
 
 def clock_words(now: time.struct_time) -> str:

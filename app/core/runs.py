@@ -13,14 +13,25 @@ from app.core.document import Document
 from app.core.fleet import Fleet
 from app.core.moving import wanted_by
 from app.core.run_needs import Behaviours, Network
-from app.core.run_view import RunState, RunView, clock_words, place_of, result_words, stop_words, view_of
+from app.core.run_view import (
+    RunState,
+    RunView,
+    clock_words,
+    place_of,
+    result_words,
+    stop_words,
+    stops_by_name,
+    view_of,
+)
 from app.core.run_view import unanswered_words as unanswered_words_of
 from app.core.runner import Runner, RunnerEvent
-from app.core.stop_events import OneStopped, RobotAnswered, StopDone
+from app.core.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.stopping import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.stopping import RobotStop, RobotStopper, StopReport
 from app.errors import AppError
 
-STOP_TIMEOUT_S = 1.0
+CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
+NO_NETWORK = "there is no connection to the network yet"
 
 
 class Runs:
@@ -117,18 +128,30 @@ class Runs:
         """Stop one robot; while a program runs this is `stop`, because it would move the robot again."""
         if self.active:
             self.stop()
-        elif self._network.stopper is not None:
-            stopper, post = self._network.stopper, self._post_event
+            return
+        stopper, post = self._network.stopper, self._post_event
 
-            def stop_it() -> None:
-                post(OneStopped(stopper.stop_all([name], timeout_s=STOP_TIMEOUT_S)))
+        def stop_it() -> None:
+            report = StopReport((), 0.0).with_asked([name], NO_NETWORK)
+            if stopper is not None:
+                report = stopper.stop_all([name], on_late=lambda late: post(LateAnswer(None, late)))
+            post(OneStopped(report))
 
-            threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
+        threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
+
+    def stop_again(self, name: str) -> None:
+        """A robot that was not stopped says that it could end what went on: it is asked to prove it."""
+        report = self._run.report
+        if self._run.state == "unanswered" and report is not None and name in report.silent:
+            self._stop(self._run.asked)
+        elif self._run.state in {"ready", "proven"}:
+            self.stop_robot(name)
 
     def confirm_still(self) -> None:
         """A person says that the robot that did not answer stands still."""
         if self._run.state == "unanswered":
             self._run.state, self._run.report = "ready", None
+            self._fleet.stands_still(self.kept)
             self.kept = frozenset()
             self._alerts.cure("stop")
 
@@ -137,7 +160,7 @@ class Runs:
         if self._runner is not None:
             self._runner.stop()
         if self._stop_thread is not None:
-            self._stop_thread.join(timeout=STOP_TIMEOUT_S + 1)
+            self._stop_thread.join(timeout=CLOSE_WAIT_S)
 
     # -- what the session tells --------------------------------------------------------------------------
 
@@ -163,24 +186,36 @@ class Runs:
             case "ended":
                 self._on_end(event)
 
-    def on_stop(self, event: StopDone | RobotAnswered | OneStopped) -> None:
+    def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
         """Take over what robots answered to the newest stop."""
+        run = self._run
         if isinstance(event, OneStopped):
             self._tell_fleet(event.report)
             self._tell_person(event.report, "stop")
-            return
-        if event.number != self._stop_number:
-            return
+        elif isinstance(event, LateAnswer):
+            self._on_late(event)
+        elif event.number == self._stop_number:
+            if isinstance(event, RobotAnswered):
+                run.answered.append(event.robot)
+            else:
+                self._take_report(event.report)
+                run.dashed = bool(self.stopped_blocks)
+
+    def _take_report(self, report: StopReport) -> None:
         run = self._run
-        if isinstance(event, RobotAnswered):
-            run.answered.append(event.robot)
-            return
-        run.report, (run.last_words, good) = event.report, result_words(event.report)
-        self.kept = frozenset(event.report.silent)
+        run.report, (run.last_words, good) = report, result_words(report)
+        self.kept = frozenset(report.silent)
         run.state = "proven" if good else "unanswered"
-        run.dashed = bool(self.stopped_blocks)
-        self._tell_fleet(event.report)
-        self._tell_person(event.report, run.name or "stop")
+        self._tell_fleet(report)
+        self._tell_person(report, run.name or "stop")
+
+    def _on_late(self, event: LateAnswer) -> None:
+        """A robot answered too late: what it says now counts, if nothing else has happened since."""
+        run = self._run
+        if event.number is None:
+            self.on_stop(OneStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0)))
+        elif event.number == self._stop_number and run.state == "unanswered" and run.report is not None:
+            self._take_report(run.report.with_late(event.robot))
 
     # -- inside ------------------------------------------------------------------------------------------
 
@@ -234,7 +269,7 @@ class Runs:
         if finished:
             self._mark()
         # the end of a program is a stop like any other: every robot that it used is told and must answer
-        self._stop(self._used)
+        self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run.finished = finished
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
@@ -251,7 +286,12 @@ class Runs:
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(
-            self._stop_all, self._stop_number, self._runner, self._network.stopper, names, self._program_id
+            self._stop_all,
+            self._stop_number,
+            self._runner,
+            self._network.stopper,
+            run.asked,
+            self._program_id,
         )
         self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
         self._stop_thread.start()
@@ -261,22 +301,30 @@ class Runs:
         number: int,
         runner: Runner | None,
         stopper: RobotStopper | None,
-        names: tuple[str, ...] | None,
+        names: tuple[str, ...],
         ends: str | None,
     ) -> None:
         def answered(robot: RobotStop) -> None:
             self._post_event(RobotAnswered(number, robot))
 
+        def late(robot: RobotStop) -> None:
+            self._post_event(LateAnswer(number, robot))
+
         if runner is not None:
             if stopper is not None:
                 stopper.send_stop(ends=ends)  # at once; told again below for robots that don't know `ends`
             runner.stop()
-        report = StopReport((), 0.0)
+        report = StopReport((), 0.0).with_asked(names, NO_NETWORK)
         if stopper is not None:
-            report = stopper.stop_all(names, timeout_s=STOP_TIMEOUT_S, on_answer=answered, ends=ends)
+            report = stopper.stop_all(names, on_answer=answered, ends=ends, on_late=late)
         self._post_event(StopDone(number, report))
 
     def _tell_person(self, report: StopReport, origin: str) -> None:
+        for name, program in report.strangers:
+            said = f"“{program}” answered Stop in the name of {name}; that does not count"
+            self._console.add("error", origin, said)
+            detail = "Find out what this program is and close it."
+            self._alerts.put(f"stranger:{name}", "error", f"{said}.", detail)
         words, good = result_words(report)
         if good:
             self._console.add("info", origin, words)
@@ -287,8 +335,11 @@ class Runs:
             self._alerts.put("stop", "error", f"{title}.", detail, button="Stop again", action="run.stop")
 
     def _tell_fleet(self, report: StopReport) -> None:
-        clock = clock_words(time.localtime())
-        self._fleet.stopped({robot.name: stop_words(robot, clock) for robot in report.robots})
+        clock, stops = clock_words(time.localtime()), stops_by_name(report)
+        self._fleet.stopped(
+            {name: stop_words(robot, clock) for name, robot in stops.items()},
+            {name: robot.wrong for name, robot in stops.items()},
+        )
 
     def _set_errors(self, errors: Mapping[str, str]) -> None:
         self.block_errors = self._run.errors = errors

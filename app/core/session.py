@@ -14,7 +14,7 @@ from pathlib import Path
 from app.core.alerts import Alerts
 from app.core.arrivals import arrivals
 from app.core.checks import Checks
-from app.core.companions import CompanionFailed, Companions
+from app.core.companions import VIRTUAL_ROBOTS, CompanionFailed, Companions
 from app.core.console import Console
 from app.core.doctor import doctor_of
 from app.core.document import Document
@@ -27,6 +27,7 @@ from app.core.kept_tabs import KeptTabs
 from app.core.mailbox import Drained, Mailbox
 from app.core.master_state import Learning, MasterState
 from app.core.nodes import Nodes
+from app.core.processes import Processes
 from app.core.reach import Reach, ReachChanged
 from app.core.runner import RunnerEvent
 from app.core.runs import Runs
@@ -40,12 +41,11 @@ from app.core.source import (
     Source,
     WatchFailed,
 )
-from app.core.stop_events import OneStopped, RobotAnswered, StopDone
-from app.core.stopping import RobotStopper
+from app.core.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.stopping import RobotStopper, StopTarget
 from app.core.topics import Topics
 from app.core.traffic import Traffic
 from app.core.watches import Watch, Watches
-from app.robots.description import Robot
 from nep.logs import LOG_TOPIC, LOG_TYPE
 from nep.masters import master_address
 from nep.message import Message
@@ -84,7 +84,9 @@ class Session:
         self._watches = Watches(self._begin_watch, self._end_watch, self._forget_watch)
         self.images = Images(self.watch, clock)
         self.source: Source = source if source is not None else self._live_network()
-        self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings)
+        modules = VIRTUAL_ROBOTS.values()
+        processes = Processes(modules, lambda: self.companions.process_ids)
+        self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
@@ -105,7 +107,8 @@ class Session:
         self.reach = Reach(self.address, self.settings, self.alerts, self._mailbox.post_event)
         self.tick_ms = 0.0
         self._robots_seen = -1
-        self._reachable: tuple[Robot, ...] = ()
+        self._reachable: tuple[StopTarget, ...] = ()
+        self._tries_to_reach = False
         self._topics_seen = -1
         self._next_check = 0.0
         self._learning = Learning()
@@ -146,12 +149,15 @@ class Session:
         self.topics.age(now, now_ns)
         self.nodes.age(now)
         self._follow_robots()
+        for name in self.fleet.take_settled():
+            self.runs.stop_again(name)
         self.companions.follow()
         if now >= self._next_check:
             self._next_check = now + CHECK_S
             self.companions.check()
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
+            self._look_for_problems_of_stop()
             self._health.check(self.runs.kept if self.runs.active else (), self.companions.virtual_robots)
             if self.runs.kept and self.companions.ended >= self.runs.kept:
                 self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
@@ -227,7 +233,7 @@ class Session:
                 self._on_master_lost(event)
             case RunnerEvent():
                 self.runs.on_runner(event)
-            case StopDone() | RobotAnswered() | OneStopped():
+            case StopDone() | RobotAnswered() | OneStopped() | LateAnswer():
                 self.runs.on_stop(event)
             case CompanionFailed():
                 self.console.add("error", event.what, f"{event.sentence} {event.detail}".strip())
@@ -262,6 +268,10 @@ class Session:
         self.topics.update(view, now)
         self.nodes.update(view, now)
         self.fleet.update(view)
+        for note in self.fleet.take_notes():
+            self.console.add("warn", "robots", note)
+        if self.stopper is not None:
+            self.stopper.see(view)
         self.traffic.follow(view, now)
         self._health.graph_alerts(view)
 
@@ -292,11 +302,25 @@ class Session:
             self._topics_seen = self.topics.revision
             self.documents.set_topics(sorted(topic.name for topic in self.topics.live()))
 
+    def _look_for_problems_of_stop(self) -> None:
+        """Once a second: whom a stop can't reach is told, and tried again."""
+        problems = self.stopper.problems if self.stopper is not None else {}
+        self._health.unreachable(problems)
+        self._tries_to_reach = bool(problems)
+
     def _keep_within_reach(self) -> None:
         """Whom a stop reaches: who is there, and who went away while a program used it."""
         kept = self.runs.kept
-        robots = tuple(link.robot for link in self.fleet.links if link.connected or link.name in kept)
+        for link in self.fleet.links:
+            if link.earlier and link.name not in kept:
+                link.earlier = ()  # nothing moved it when it was started anew
+        targets = tuple(
+            StopTarget(link.robot, link.identity, link.earlier, link.topics_before)
+            for link in self.fleet.links
+            if link.connected or link.name in kept
+        )
         stopper = self.stopper
-        if stopper is not None and robots != self._reachable:
-            self._reachable = robots
-            self.source.submit("watch over the robots", lambda _node: stopper.set_robots(robots))
+        if stopper is not None and (targets != self._reachable or self._tries_to_reach):
+            self._reachable, self._tries_to_reach = targets, False
+            stopper.expect(targets)
+            self.source.submit("watch over the robots", lambda _node: stopper.set_robots(targets))

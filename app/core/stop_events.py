@@ -28,3 +28,14 @@ class OneStopped:
     """One robot was told to stop while nothing ran."""
 
     report: StopReport
+
+
+@dataclass(frozen=True, slots=True)
+class LateAnswer:
+    """A robot answered when it was not waited for any more, or stands still after it had said no.
+
+    ``number`` is that of the stop; None for one robot's.
+    """
+
+    number: int | None
+    robot: RobotStop

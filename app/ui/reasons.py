@@ -9,7 +9,7 @@ from app.ui.theme import TEXT_PERCENT
 RUN = {
     "running": "A program runs already",
     "stopping": "Robots are being stopped",
-    "unanswered": "A robot did not answer Stop",
+    "unanswered": "A robot has not confirmed Stop",
 }
 
 

@@ -15,7 +15,7 @@ from app.ui.widgets import Chip, paint
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
 
-STATUS = {"ready": "ok", "busy": "running", "silent": "warn", "away": "off"}
+STATUS = {"ready": "ok", "busy": "running", "silent": "warn", "not stopped": "error", "away": "off"}
 LIST_WIDTH = 300
 
 

@@ -12,6 +12,10 @@ def robots_chip(session: Session) -> tuple[str, str]:
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
         return "No robot", "off"
+    moving = [link for link in links if link.state == "not stopped"]
+    if moving:
+        others = f" and {len(moving) - 1} more" if len(moving) > 1 else ""
+        return f"{moving[0].name}{others}: {moving[0].chip.removeprefix('virtual, ')}", "error"
     silent = [link for link in links if link.state == "silent"]
     if silent:
         words = silent[0].silent or "silent"

@@ -25,7 +25,7 @@ class Case:
         self.now = 50.0
         self.alerts = Alerts()
         self.links: list[SimpleNamespace] = []
-        fleet = cast("Fleet", SimpleNamespace(links=self.links))
+        fleet = cast("Fleet", SimpleNamespace(links=self.links, claims={}))
         self.topics = Topics()
         self.health = Health(self.topics, fleet, self.alerts, lambda: self.now)
 
@@ -111,7 +111,9 @@ def test_a_taken_port_leads_to_the_doctor_and_other_notes_of_the_master_do_not(c
 
 def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
     shown = SimpleNamespace(sensors=())
-    return SimpleNamespace(name="Rover", virtual=virtual, connected=connected, silent=None, robot=shown)
+    return SimpleNamespace(
+        name="Rover", virtual=virtual, connected=connected, silent=None, robot=shown, goes_on=""
+    )
 
 
 def test_a_real_robot_that_has_gone_is_told_after_a_while_and_cured_when_it_is_back(case: Case) -> None:

@@ -39,7 +39,7 @@ def session(tmp_path) -> Session:
 
 def test_robots_are_told_before_the_program_has_ended_and_asked_after(session: Session) -> None:
     steps = Steps()
-    session.runs._stop_all(1, cast("Runner", steps), cast("RobotStopper", steps), None, "p1")
+    session.runs._stop_all(1, cast("Runner", steps), cast("RobotStopper", steps), (), "p1")
     assert steps.done == [("told", "p1"), ("program ended", None), ("asked", "p1")]
 
 

@@ -59,8 +59,14 @@ def test_a_silent_robot_is_named(stopper, robots):
 
 
 def test_only_the_robots_that_are_named_are_stopped(stopper, robots):
-    assert [robot.name for robot in stopper.stop_all(["Turtle", "Nobody"]).robots] == ["Turtle"]
+    assert [robot.name for robot in stopper.stop_all(["Turtle"]).robots] == ["Turtle"]
     assert robots[0].heard("stop") == []
+
+
+def test_a_name_that_could_not_be_told_is_in_the_report(stopper, robots):
+    report = stopper.stop_all(["Turtle", "Nobody"])
+    assert (report.proven, report.silent) == (False, ("Nobody",))
+    assert report.robots[1].sentence == "Nobody was not told to stop. Switch it off by hand."
 
 
 def test_no_robots_is_proven_at_once(stopper):
@@ -74,8 +80,8 @@ def test_a_stop_that_failed_is_told_with_the_robots_words(stopper, robots):
     say_ = robots[0]._say
     robots[0]._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")
     report = stopper.stop_all(["Pepper"])
-    assert not report.proven
-    assert report.robots[0].sentence == "Pepper: the brake is stuck."
+    assert (report.proven, report.robots[0].refused) == (False, True)
+    assert report.robots[0].sentence == "Pepper may still move: the brake is stuck. Switch it off by hand."
 
 
 def test_a_robot_that_answers_for_another_or_twice_proves_nothing(stopper, robots):

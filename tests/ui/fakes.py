@@ -221,6 +221,8 @@ class RobotLink:
     mute: bool = False
     answered_s: float | None = None
     gone_s: float | None = None
+    not_stopped: str = ""
+    goes_on: str = ""
 
 
 class Kept(dict[str, object]):

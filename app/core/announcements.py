@@ -1,0 +1,167 @@
+"""Who says that it is a robot: one program for each name, the one that announced it first.
+
+What others say under the same name changes nothing and is told as a claim. A robot's program is replaced only
+when the master does not list its announcement any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from app.core.mailbox import Batch
+from app.core.watches import Watch, Watches
+from app.errors import DescriptionError
+from app.robots.description import Robot, parse
+from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
+from nep.errors import NepError
+from nep.message import Message
+from nep.views import GraphView
+
+MOST_ROBOTS = 200
+MOST_CLAIMANTS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """Somebody says of itself what is not believed: what is wrong, and what it means."""
+
+    title: str
+    detail: str
+
+
+@dataclass(slots=True)
+class _Announced:
+    """A description topic: whose it is, and the newest description of each of its publishers."""
+
+    watch: Watch | None = None
+    owner: Identity | None = None
+    told: dict[int, Message] = field(default_factory=dict)
+    parsed: Message | None = None
+    robot: Robot | None = None
+    wrong: str = ""
+    twins: tuple[Identity, ...] = ()
+
+
+class Announcements:
+    """The descriptions on the network, each with the program that it counts from. One thread uses it."""
+
+    def __init__(self, watches: Watches, senders: Senders) -> None:
+        """``watches`` subscribes description topics; ``senders`` learns who publishes them."""
+        self._watches, self._senders = watches, senders
+        self._topics: dict[str, _Announced] = {}
+        self._left_out = 0
+
+    def is_announced(self, topic: str) -> bool:
+        """Whether somebody announces a robot on this topic now."""
+        known = self._topics.get(topic)
+        return known is not None and known.watch is not None
+
+    @property
+    def robots(self) -> Iterator[tuple[str, Robot, Identity]]:
+        """Each robot that is announced now: its topic, its description, its program."""
+        for topic, known in self._topics.items():
+            if known.watch is not None and known.robot is not None and known.owner is not None:
+                yield topic, known.robot, known.owner
+
+    @property
+    def claims(self) -> Mapping[str, Claim]:
+        """What is not believed, by an id."""
+        found = {}
+        for topic, known in self._topics.items():
+            if known.watch is None:
+                continue
+            if known.twins and known.owner is not None:
+                name = known.robot.name if known.robot is not None else topic
+                others = " and ".join(twin.words for twin in known.twins[:MOST_CLAIMANTS])
+                found[topic] = Claim(
+                    f"{len(known.twins) + 1} programs say that they are {name}.",
+                    f"{known.owner.words} was first and is the robot; {others} changes nothing. Close one.",
+                )
+            elif known.wrong:
+                found[topic] = Claim(f"{known.wrong}.", "Find out what this program is and close it.")
+        if self._left_out:
+            title = f"{self._left_out} more robots than the {MOST_ROBOTS} that Studio shows are announced."
+            found["robots"] = Claim(title, "Find out which program announces them and close it.")
+        return found
+
+    def update(self, view: GraphView) -> None:
+        """Take over a new graph: who announces robots now, and whose announcement counts."""
+        there = {
+            topic: nodes
+            for topic, info in view.topics.items()
+            if info.msg_type == DESCRIPTION_TYPE and (nodes := publishing(view, topic))
+        }
+        self._senders.learn(view, there)
+        for topic, known in self._topics.items():
+            if topic not in there:
+                self._end(known)
+        self._left_out = 0
+        for topic, nodes in there.items():
+            begun = self._topics.get(topic) or self._begin(topic)
+            if begun is None:
+                self._left_out += 1
+                continue
+            known = begun
+            if known.watch is None:
+                known.watch = self._watches.open([topic])
+            if known.owner is None or known.owner.node_id not in nodes:
+                known.owner, known.robot, known.parsed = identity_of(view, nodes[0]), None, None
+            others = (node for node in nodes if node != known.owner.node_id)
+            known.twins = tuple(identity_of(view, node) for node in others)
+            ids = {publisher.id for publisher in view.topics[topic].publishers}
+            known.told = {id: message for id, message in known.told.items() if id in ids}
+            self._read(topic, known)
+
+    def add(self, batches: Mapping[str, Batch]) -> None:
+        """Take over the descriptions that arrived."""
+        for topic in batches.keys() & self._topics.keys():
+            known = self._topics[topic]
+            for message in batches[topic].messages:
+                if message.publisher is not None:
+                    known.told[message.publisher] = message
+            while len(known.told) > MOST_CLAIMANTS:
+                self._drop_one(known)
+            self._read(topic, known)
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _begin(self, topic: str) -> _Announced | None:
+        """A new topic; None when there are too many. Topics that are gone make room."""
+        if len(self._topics) >= MOST_ROBOTS:
+            gone = next((name for name, known in self._topics.items() if known.watch is None), None)
+            if gone is None:
+                return None
+            del self._topics[gone]
+        return self._topics.setdefault(topic, _Announced())
+
+    def _end(self, known: _Announced) -> None:
+        """Nobody announces it any more; whose it was is kept: after a new master that one comes back."""
+        if known.watch is not None:
+            known.watch.close()
+        known.watch, known.robot, known.parsed, known.twins = None, None, None, ()
+        known.told.clear()
+
+    def _drop_one(self, known: _Announced) -> None:
+        """Make room among the publishers; what the robot's own program said stays."""
+        others = (id for id, told in known.told.items() if not self._is_owners(known, told))
+        del known.told[next(others, next(iter(known.told)))]
+
+    def _is_owners(self, known: _Announced, message: Message) -> bool:
+        return known.owner is not None and self._senders.node_of(message) == known.owner.node_id
+
+    def _read(self, topic: str, known: _Announced) -> None:
+        """Parse the newest description of the robot's own program, once."""
+        newest = next((told for told in reversed(known.told.values()) if self._is_owners(known, told)), None)
+        if newest is None or newest is known.parsed:
+            return
+        known.parsed, known.wrong = newest, ""
+        try:
+            payload = newest.payload
+            robot = parse(payload) if isinstance(payload, Mapping) else None
+        except (NepError, DescriptionError):
+            return  # the session's alert `message:<topic>` says so; what it said before still counts
+        if robot is None:
+            return
+        known.wrong = wrong_topic(robot, topic) or ""
+        known.robot = None if known.wrong else robot

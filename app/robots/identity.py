@@ -1,0 +1,125 @@
+"""Whose words count: which node a robot is, who else says so, who hears its commands. No sockets.
+
+A robot is its name, its topics and the node that announced it first. What the master knows decides: it lists
+each publisher's node, and every native message carries its publisher's id. This holds against programs that
+do not lie to the master (docs/trust.md).
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from app.robots.description import topic_of
+from app.robots.parts import Robot
+from nep.message import Message
+from nep.views import GraphView
+
+DESCRIPTION_TYPE = "robot/description"
+GATEWAY = "gateway"
+MOST_SENDERS = 20_000
+_NATIVE = frozenset({"native", GATEWAY})
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """The program that is a robot, as the master knows its node. ``pid`` is a process on ``host``."""
+
+    node_id: str
+    node: str = ""
+    host: str = ""
+    pid: int | None = None
+
+    @property
+    def words(self) -> str:
+        """For people: "“rover driver” on lab-2"."""
+        name = f"“{self.node or self.node_id}”"
+        return f"{name} on {self.host}" if self.host else name
+
+
+def identity_of(view: GraphView, node_id: str) -> Identity:
+    """What the master knows about this node; only its id when it is not there."""
+    node = view.nodes.get(node_id)
+    return Identity(node_id) if node is None else Identity(node_id, node.name, node.host, node.pid)
+
+
+def publishing(view: GraphView, topic: str) -> tuple[str, ...]:
+    """The ids of the nodes that publish a topic, whoever came first at the front.
+
+    For programs of the original NEP their gateway stands: its node is whom their messages come from.
+    """
+    info = view.topics.get(topic)
+    found = (each.node_id for each in info.publishers) if info is not None else ()
+    return tuple(dict.fromkeys(id for id in found if _is_native(view, id)))
+
+
+def hearing(view: GraphView, topic: str) -> tuple[str, ...]:
+    """The ids of the nodes that subscribe a topic; programs of the original NEP, but not their gateway."""
+    info = view.topics.get(topic)
+    found = (each.node_id for each in info.subscribers) if info is not None else ()
+    nodes = view.nodes
+    return tuple(dict.fromkeys(id for id in found if id not in nodes or nodes[id].generation != GATEWAY))
+
+
+def _is_native(view: GraphView, node_id: str) -> bool:
+    node = view.nodes.get(node_id)
+    return node is None or node.generation in _NATIVE
+
+
+def first_to_announce(view: GraphView, topic: str) -> Identity | None:
+    """The node that announced a robot on its description topic first; None when nobody does."""
+    found = publishing(view, topic)
+    return identity_of(view, found[0]) if found else None
+
+
+def wrong_topic(robot: Robot, topic: str) -> str | None:
+    """Why a description that came on this topic is nobody's; None when it is at home there.
+
+    A robot is announced on ``/NAME/description`` of its own name and nowhere else, or one program could
+    speak for another's robot.
+    """
+    home = topic_of(robot.name, "description")
+    if topic == home and robot.topics.description == home:
+        return None
+    return f"{topic} says that it is {robot.name}, which is announced on {home} only; it is left out"
+
+
+def reserved(robot: Robot) -> tuple[str, ...]:
+    """The topics with which a robot is moved, or answers: no other robot may have them, too."""
+    topics = robot.topics
+    return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
+
+
+def is_home(robot_name: str, topic: str) -> bool:
+    """Whether a topic lies among those that belong to a robot of this name: ``/NAME/...``."""
+    return topic.startswith(topic_of(robot_name, ""))
+
+
+class Senders:
+    """Which node sent a message: the nodes of publishers' ids, as masters told them. Works in any thread.
+
+    What was learnt once stays, the last 20 000 of them: who takes another's id while that one is there, is
+    not believed.
+    """
+
+    def __init__(self) -> None:
+        """Know nobody yet."""
+        self._lock = threading.Lock()
+        self._nodes: dict[int, str] = {}
+
+    def learn(self, view: GraphView, topics: Iterable[str]) -> None:
+        """Take over who publishes these topics."""
+        with self._lock:
+            for topic in topics:
+                info = view.topics.get(topic)
+                for publisher in info.publishers if info is not None else ():
+                    if self._nodes.get(publisher.id) not in view.nodes:
+                        self._nodes[publisher.id] = publisher.node_id
+            while len(self._nodes) > MOST_SENDERS:
+                del self._nodes[next(iter(self._nodes))]
+
+    def node_of(self, message: Message) -> str | None:
+        """The id of the node that sent it; None while no master has told of its publisher."""
+        with self._lock:
+            return None if message.publisher is None else self._nodes.get(message.publisher)

@@ -1,0 +1,288 @@
+"""Programs that say that they are somebody's robot: the first one is, whatever the others say."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from typing import cast
+
+import pytest
+
+import nep
+from app.core.announcements import MOST_ROBOTS, Announcements
+from app.core.robot_link import RobotLink
+from app.core.session import Session
+from app.core.watches import Watches
+from app.robots.identity import DESCRIPTION_TYPE, Senders
+from nep.masters import Master
+from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from tests.blocks.samples import block, number, robot, started, workspace
+from tests.blocks.wire_robot import WireRobot
+from tests.core.waiting import tick_until
+
+
+@pytest.fixture
+def pepper(master: Master) -> Iterator[WireRobot]:
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def evil(master: Master) -> Iterator[nep.Node]:
+    with nep.node("evil", master=master.address) as node:
+        yield node
+
+
+def the_link(session: Session, name: str = "Pepper") -> RobotLink:
+    def ready() -> bool:
+        return session.stopper is not None and name in session.stopper.robots
+
+    tick_until(session, ready)
+    link = session.fleet.link(name)
+    assert link is not None
+    tick_until(session, lambda: link.publisher is not None)
+    return link
+
+
+def description(name: str = "Pepper", **topics: str) -> dict[str, object]:
+    made = copy.deepcopy(dict(robot(name).source))
+    made["rb:topics"] = {**cast("Mapping[str, object]", made.get("rb:topics") or {}), **topics}
+    return made
+
+
+def announce(node: nep.Node, topic: str, described: Mapping[str, object]) -> nep.Publisher:
+    publisher = node.new_pub(topic, DESCRIPTION_TYPE, latched=True)
+    publisher.publish(dict(described))
+    return publisher
+
+
+def claimed(session: Session, id: str) -> str:
+    """The words of the alert about a claim, as soon as it is there."""
+    tick_until(session, lambda: session.alerts.has(f"claim:{id}"))
+    (alert,) = (each for each in session.alerts.active if each.id == f"claim:{id}")
+    assert alert.severity == "error"
+    return f"{alert.title} {alert.detail}"
+
+
+def stop_is_proven(session: Session) -> None:
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state in {"proven", "unanswered"})
+    assert session.runs.view().state == "proven", session.runs.view().title
+
+
+def test_a_description_on_another_topic_does_not_replace_the_robot(
+    session: Session, pepper: WireRobot, evil: nep.Node
+) -> None:
+    link = the_link(session)
+    known, identity = link.robot, link.identity
+    topics = {"command": "/Evil/command", "answer": "/Evil/answer"}
+    announce(evil, "/Evil/description", description("Pepper", **topics))
+    said = claimed(session, "/Evil/description")
+    assert "/Evil/description says that it is Pepper" in said
+    assert session.fleet.link("Pepper") is link
+    assert (link.robot, link.identity) == (known, identity)
+    stop_is_proven(session)
+    assert len(pepper.heard("stop")) == 1
+
+
+def test_a_second_program_of_the_name_changes_nothing_and_both_are_named(
+    session: Session, pepper: WireRobot, evil: nep.Node
+) -> None:
+    link = the_link(session)
+    announcement = announce(evil, "/Pepper/description", description("Pepper", command="/Evil/command"))
+    said = claimed(session, "/Pepper/description")
+    assert "2 programs say that they are Pepper." in said
+    assert "“Pepper” on " in said
+    assert "“evil” on " in said
+    assert link.robot.topics.command == "/Pepper/command"
+    announcement.close()
+    tick_until(session, lambda: not session.alerts.has("claim:/Pepper/description"))
+    assert link.connected
+
+
+def test_an_answer_of_a_stranger_ends_no_try(session: Session, pepper: WireRobot, evil: nep.Node) -> None:
+    link = the_link(session)
+    pepper.slow = {"say"}
+    tried = session.fleet.invoke("Pepper", "say", {"text": "Hi"})
+    tick_until(session, lambda: tried.state == "accepted")
+    forged = evil.new_pub("/Pepper/answer", "robot/answer")
+    told = {"id": tried.id, "op": "invoke", "action": "say", "state": "succeeded", "output": {}}
+    forged.publish({**told, "feedback": {}, "error": None})
+    forged.publish({"op": "alive", "id": "", "state": "running", "not_ended": ["say"], "error": "forged"})
+    graph = session.graph
+    tick_until(session, lambda: session.graph is not graph)  # its publisher is known now
+    pepper._say(pepper.heard("invoke")[0], "running")
+    tick_until(session, lambda: tried.state == "running")
+    assert (tried.running, link.goes_on) == (True, "")
+    pepper._say(pepper.heard("invoke")[0], "succeeded")
+    tick_until(session, lambda: tried.state == "succeeded")
+
+
+def test_a_value_of_a_stranger_is_not_the_robots(session: Session, pepper: WireRobot, evil: nep.Node) -> None:
+    link = the_link(session)
+    with session.fleet.look_at("Pepper"):
+        forged = evil.new_pub("/Pepper/battery", "json")
+        tick_until(session, lambda: forged.subscribers)
+
+        def told() -> bool:
+            pepper.tell("battery", {"value": 84})
+            forged.publish({"value": 7})
+            return "battery" in link.values
+
+        tick_until(session, told)
+        assert link.values["battery"] == 84
+
+
+def test_an_answer_from_a_publisher_that_the_graph_does_not_show_yet_is_kept(session: Session) -> None:
+    with nep.node("late") as node:
+        announce(node, "/Pepper/description", description())
+        heard: list[Mapping[str, object]] = []
+        node.new_sub("/Pepper/command", sink=lambda messages: heard.extend(_payloads(messages)))
+        the_link(session)
+        tick_until(session, lambda: _subscribers(session, "/Pepper/answer") == 2)  # also the stop's
+        tried = session.fleet.invoke("Pepper", "say", {"text": "Hi"})
+        tick_until(session, lambda: any(command["op"] == "invoke" for command in heard))
+        answers = node.new_pub("/Pepper/answer", "robot/answer")
+        answers.publish({"id": tried.id, "op": "invoke", "state": "succeeded", "output": {}})
+        tick_until(session, lambda: not tried.running)
+        assert tried.state == "succeeded"
+
+
+def _subscribers(session: Session, topic: str) -> int:
+    info = session.graph.topics.get(topic) if session.graph is not None else None
+    return len(info.subscribers) if info is not None else 0
+
+
+def _payloads(messages: object) -> list[Mapping[str, object]]:
+    assert isinstance(messages, list | tuple)
+    return [message.payload for message in messages]
+
+
+def test_a_robot_that_is_started_anew_is_taken_over_from(session: Session, master: Master) -> None:
+    first = WireRobot(master.address)
+    link = the_link(session)
+    before = link.identity
+    second = WireRobot(master.address)
+    try:
+        claimed(session, "/Pepper/description")
+        first.close()
+        tick_until(session, lambda: link.connected and link.identity != before)
+        assert any("Pepper was started anew" in record.text for record in session.console.records)
+        stop_is_proven(session)
+        assert len(second.heard("stop")) == 1
+    finally:
+        second.close()
+
+
+def test_who_takes_the_name_of_a_robot_in_motion_does_not_prove_its_stop(
+    session: Session, master: Master, pepper: WireRobot
+) -> None:
+    """It is frozen, so the master unlists it; the new one answers, and the old one may still move."""
+    link = the_link(session)
+    session.document.edited(workspace(started(block("control_wait", SECONDS=number(600)))))
+    session.runs.run()
+    session.runs.kept = frozenset({"Pepper"})  # as if the program had used it
+    before = link.identity
+    pepper._node.close()
+    thief = WireRobot(master.address)
+    try:
+        tick_until(session, lambda: link.connected and link.identity != before)
+        tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "unanswered")
+        assert session.runs.view().title == "Pepper (“Pepper”) did not answer"
+        assert thief.heard("stop")
+        session.runs.confirm_still()
+        stop_is_proven(session)
+    finally:
+        thief.close()
+
+
+@pytest.mark.parametrize("leaf", ["command", "answer", "world"])
+def test_a_robot_may_not_name_the_topics_of_another_its_own(
+    session: Session, pepper: WireRobot, evil: nep.Node, leaf: str
+) -> None:
+    the_link(session)
+    announce(evil, "/Evil/description", description("Evil", **{leaf: f"/Pepper/{leaf}"}))
+    assert "it belongs to Pepper" in claimed_of(session, "/Evil/description")
+    assert session.fleet.link("Evil") is None
+
+
+def claimed_of(session: Session, topic: str) -> str:
+    return claimed(session, topic)
+
+
+def test_nor_before_the_other_is_there(session: Session, master: Master, evil: nep.Node) -> None:
+    announce(evil, "/Evil/description", description("Evil", command="/Pepper/command"))
+    evil_link = the_link(session, "Evil")
+    pepper = WireRobot(master.address)
+    try:
+        link = the_link(session)
+        tick_until(session, lambda: not evil_link.connected)
+        assert "it belongs to Pepper" in claimed(session, "/Evil/description")
+        assert link.connected
+    finally:
+        pepper.close()
+
+
+def test_a_changed_description_moves_what_is_sent_to_the_new_topic(session: Session, evil: nep.Node) -> None:
+    announcement = announce(evil, "/Pepper/description", description())
+    link = the_link(session)
+    old, new = [], []
+    evil.new_sub("/Pepper/command", sink=lambda messages: old.extend(_payloads(messages)))
+    evil.new_sub("/Pepper/orders", sink=lambda messages: new.extend(_payloads(messages)))
+    tick_until(session, lambda: link.publisher is not None and link.publisher.subscribers)
+    announcement.publish(description("Pepper", command="/Pepper/orders"))
+    tick_until(session, lambda: link.publisher is not None and link.publisher.topic == "/Pepper/orders")
+    session.fleet.invoke("Pepper", "say", {"text": "Hi"})
+    tick_until(session, lambda: any(command["op"] == "invoke" for command in new))
+    assert not any(command["op"] == "invoke" for command in old)
+    tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
+    session.runs.stop()  # goes to both
+    tick_until(session, lambda: any(command["op"] == "stop" for command in old))
+    tick_until(session, lambda: any(command["op"] == "stop" for command in new))
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+
+
+# ---- the tables have bounds ----------------------------------------------------------------------------
+
+
+def _view(topics: Mapping[str, int]) -> GraphView:
+    node = NodeInfo("n", "many", "here", 1, "python", "native", 0)
+
+    def publisher(id: int) -> PublisherInfo:
+        return PublisherInfo(id, "n", ("tcp://127.0.0.1:1",), True, 0, 0, 0, None, None, None)
+
+    infos = {
+        topic: TopicInfo(topic, DESCRIPTION_TYPE, "json", (publisher(id),)) for topic, id in topics.items()
+    }
+    return GraphView(1, 1, {"n": node}, infos)
+
+
+def test_a_flood_of_robots_is_bounded_and_told() -> None:
+    opened: list[str] = []
+    announcements = Announcements(Watches(opened.append, opened.remove), Senders())
+    announcements.update(_view({f"/r{number}/description": number + 1 for number in range(1000)}))
+    assert len(opened) == MOST_ROBOTS
+    assert announcements.claims["robots"].title.startswith("800 more robots")
+    announcements.update(_view({"/new/description": 5000}))
+    assert opened == ["/new/description"]
+    assert announcements.is_announced("/new/description")
+    assert not announcements.claims
+
+
+def test_senders_do_not_believe_who_takes_a_publishers_id() -> None:
+    senders, view = Senders(), _view({"/Pepper/answer": 7})
+    senders.learn(view, ["/Pepper/answer"])
+    thief = NodeInfo("thief", "thief", "there", 2, "python", "native", 0)
+    taken = PublisherInfo(7, "thief", (), False, 0, 0, 0, None, None, None)
+    info = TopicInfo("/Pepper/answer", "robot/answer", "json", (taken,))
+    message = nep.Message("/Pepper/answer", b"{}", "json", "robot/answer", publisher=7)
+    senders.learn(
+        GraphView(1, 2, {**view.nodes, "thief": thief}, {"/Pepper/answer": info}), ["/Pepper/answer"]
+    )
+    assert senders.node_of(message) == "n"
+    senders.learn(GraphView(1, 3, {"thief": thief}, {"/Pepper/answer": info}), ["/Pepper/answer"])
+    assert senders.node_of(message) == "thief"  # it is the only one that there is
+    assert senders.node_of(nep.Message("/x", b"{}", "json", "json")) is None

@@ -1,0 +1,198 @@
+"""A robot that says itself that it may still move: what it says stands everywhere, and nothing looks well."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core.health_facts import facts_of
+from app.core.robot_link import RobotLink
+from app.core.runner_event import RunnerEvent
+from app.core.session import Session
+from app.robots.kit import Call, Driver, Failed, Kind, Link, action, safe_stop
+from app.run import FAILED, run_file
+from app.ui.robots_chip import robots_chip
+from nep.masters import Master
+from tests.blocks.samples import block, number, started, workspace
+from tests.blocks.wire_robot import WireRobot
+from tests.core.waiting import tick_until
+
+SAID = "Arm may still move: the brake does not answer"
+
+
+class ArmBody:
+    """An arm whose brake does not answer while a test says so."""
+
+    stuck = True
+
+    def __init__(self, link: Link) -> None:
+        """Nothing to connect to."""
+
+    @action("wave", category="Movement", icon="hand")
+    def wave(self, call: Call) -> None:
+        """Wave at once."""
+
+    @safe_stop(watchdog_s=5)
+    def stop(self) -> None:
+        """Refuse."""
+        if self.stuck:
+            raise Failed("the brake does not answer")
+
+
+ARM = Kind("arm", "Arm", ArmBody)
+
+
+@pytest.fixture
+def arm(master: Master) -> Iterator[Driver]:
+    with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node) as driver:
+        yield driver
+
+
+def the_link(session: Session, name: str = "Arm") -> RobotLink:
+    def ready() -> bool:
+        return session.stopper is not None and name in session.stopper.robots
+
+    tick_until(session, ready)
+    link = session.fleet.link(name)
+    assert link is not None
+    return link
+
+
+def test_a_robot_that_refuses_stop_is_said_to_refuse_everywhere(session: Session, arm: Driver) -> None:
+    link = the_link(session)
+    assert link.chip == "virtual, ready" if link.virtual else "ready"
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    view = session.runs.view()
+    assert "the brake does not answer" in view.title
+    assert view.title.startswith("Arm may still move")
+    assert view.detail == "Switch Arm off by hand."
+    assert (view.result_ok, view.confirm) == (False, "Arm is still")
+    assert "did not answer" not in f"{view}"
+    assert (link.state, link.chip.removeprefix("virtual, ")) == ("not stopped", "may still move")
+    words, status = robots_chip(session)
+    assert (words, status) == ("Arm: may still move", "error")
+    (fact,) = (each for each in facts_of(link, session.topics, 0.0, str) if each.title == "Stop")
+    assert fact.status == "error"
+    assert "the brake does not answer" in fact.words
+    (alert,) = (each for each in session.alerts.active if each.id == "stop")
+    assert (alert.severity, "the brake does not answer" in alert.title) == ("error", True)
+    assert any("the brake does not answer" in record.text for record in session.console.records)
+    arm.body.stuck = False  # type: ignore[attr-defined]
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "proven")
+    assert link.chip.removeprefix("virtual, ") == "ready"
+    assert not session.alerts.has("stop")
+
+
+def test_a_person_who_says_that_it_is_still_is_believed(session: Session, arm: Driver) -> None:
+    link = the_link(session)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    session.runs.confirm_still()
+    assert link.state == "ready"
+
+
+def test_one_robot_that_refuses_is_said_to_refuse(session: Session, arm: Driver) -> None:
+    link = the_link(session)
+    session.runs.stop_robot("Arm")
+    tick_until(session, lambda: session.alerts.has("stop"))
+    assert "the brake does not answer" in link.not_stopped
+
+
+def test_run_prints_what_the_robot_said(master: Master, arm: Driver, tmp_path: Path) -> None:
+    path, out = tmp_path / "wave.nepb", io.StringIO()
+    wave = workspace(started(block("robot_arm_do_wave", ROBOT="Arm")))
+    robots = {"Arm": arm.description}
+    content = {"format": "nep-behaviour", "version": 1, "name": "Wave", "workspace": wave, "robots": robots}
+    path.write_text(json.dumps(content))
+    assert run_file(path, out=out, allow_moving=True) == FAILED
+    assert "Arm may still move" in out.getvalue()
+    assert "the brake does not answer. Switch it off by hand." in out.getvalue()
+    assert "did not answer." not in out.getvalue()
+
+
+# ---- what a robot says later, and of itself ------------------------------------------------------------
+
+
+@pytest.fixture
+def pepper(master: Master) -> Iterator[WireRobot]:
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+def lives(pepper: WireRobot, *not_ended: str) -> None:
+    """A sign of life, as the kit gives it."""
+    error = f"Pepper may still move: {', '.join(not_ended)} has not ended" if not_ended else None
+    told = {"op": "alive", "id": "", "action": "", "state": "running"}
+    pepper._answer.publish({**told, "not_ended": list(not_ended), "error": error})
+
+
+def test_an_action_that_goes_on_is_shown_until_the_robot_says_that_it_has_ended(
+    session: Session, pepper: WireRobot
+) -> None:
+    link = the_link(session, "Pepper")
+    say_ = pepper._say
+    said = "Pepper may still move: turn has not ended"
+    pepper._say = lambda command, state, error="": say_(command, "failed", said)  # type: ignore[method-assign]
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().title == said)
+    lives(pepper, "turn")
+    tick_until(session, lambda: link.goes_on == said)
+    tick_until(session, lambda: session.alerts.has("moving:Pepper"))
+    pepper._say = say_  # type: ignore[method-assign]
+    lives(pepper)
+    tick_until(session, lambda: session.runs.view().state == "proven")  # it was asked again
+    assert len(pepper.heard("stop")) == 2
+    assert link.state == "ready"
+    tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
+
+
+def test_an_action_that_goes_on_after_a_time_out_needs_no_stop(session: Session, pepper: WireRobot) -> None:
+    link = the_link(session, "Pepper")
+    lives(pepper, "turn")
+    tick_until(session, lambda: link.state == "not stopped")
+    lives(pepper)
+    tick_until(session, lambda: link.state == "ready")
+    session.tick()
+    assert pepper.heard("stop") == []
+
+
+def test_a_late_answer_changes_what_stands_there(session: Session, pepper: WireRobot) -> None:
+    the_link(session, "Pepper")
+    pepper.silent = {"stop"}
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().title == "Pepper did not answer")
+    pepper._say(pepper.heard("stop")[0], "failed", "the brake is stuck")
+    tick_until(session, lambda: session.runs.view().title == "Pepper may still move: the brake is stuck")
+    pepper._say(pepper.heard("stop")[0], "succeeded")
+    tick_until(session, lambda: session.runs.view().state == "proven")
+    assert not session.alerts.has("stop")
+
+
+def test_the_programs_own_silent_robots_are_asked_again(session: Session, pepper: WireRobot) -> None:
+    the_link(session, "Pepper")
+    pepper.silent = {"stop"}
+    session.document.edited(workspace(started(block("control_wait", SECONDS=number(600)))))
+    session.runs.run()
+    runner = session.runs._runner
+    assert runner is not None
+    session.runs.on_runner(RunnerEvent("ended", runner.run, silent=("Pepper",)))
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    assert session.runs.view().title == "Pepper did not answer"
+    runner.close()
+
+
+def test_a_stop_without_a_network_names_every_robot(session: Session, pepper: WireRobot) -> None:
+    the_link(session, "Pepper")
+    stopper, session.stopper = session.stopper, None
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    assert session.runs.view().title.startswith("Pepper was not told to stop: ")
+    session.stopper = stopper

@@ -1,0 +1,230 @@
+"""Who may prove a stop: the robot's own program. Strangers, twins and lines that fail prove nothing."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import pytest
+
+import nep
+from app.core.stopping import RobotStop, RobotStopper, StopReport, StopTarget, not_reached
+from app.robots.description import Topics
+from app.robots.identity import first_to_announce, identity_of
+from nep.errors import AddressInUseError
+from nep.masters import Master
+from tests.blocks.fakes import until
+from tests.blocks.wire_robot import WireRobot
+
+SHORT_S = 0.4
+
+
+@pytest.fixture
+def pepper(master: Master) -> Iterator[WireRobot]:
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def stopper(master: Master, pepper: WireRobot) -> Iterator[RobotStopper]:
+    with nep.node("studio", master=master.address) as node:
+        made = RobotStopper(node)
+        made.set_robots([pepper.described])
+        yield made
+        made.close()
+
+
+class Stranger:
+    """A program that answers every stop in Pepper's name."""
+
+    def __init__(self, address: str) -> None:
+        self.node = nep.node("stranger", master=address)
+        self.answers = self.node.new_pub("/Pepper/answer", "robot/answer")
+        self.answered = threading.Event()
+        self.node.new_sub("/Pepper/command", "robot/command", sink=self._take)
+
+    def _take(self, messages: Sequence[nep.Message]) -> None:
+        for message in messages:
+            command = message.payload
+            assert isinstance(command, dict)
+            if command["op"] == "stop":
+                self.answers.publish({"id": command["id"], "op": "stop", "state": "succeeded"})
+                self.answered.set()
+
+
+@pytest.fixture
+def stranger(master: Master) -> Iterator[Stranger]:
+    made = Stranger(master.address)
+    yield made
+    made.node.close()
+
+
+def test_an_answer_of_a_stranger_does_not_stop_a_robot_that_is_frozen(stopper, pepper, stranger) -> None:
+    pepper.silent = {"stop"}
+    report = stopper.stop_all(["Pepper"], timeout_s=SHORT_S)
+    assert stranger.answered.is_set()
+    assert not report.proven
+    assert report.robots[0] == RobotStop("Pepper", False, None)
+
+
+def test_a_stranger_that_only_answers_is_named(master, stopper, pepper) -> None:
+    """It has guessed the id of the stop: it read it on the command topic and left again."""
+    pepper.silent = {"stop"}
+    with nep.node("liar", master=master.address) as liar:
+        forged = liar.new_pub("/Pepper/answer", "robot/answer")
+        reports: list[StopReport] = []
+        asking = threading.Thread(target=lambda: reports.append(stopper.stop_all(timeout_s=SHORT_S)))
+        asking.start()
+        until(lambda: bool(pepper.heard("stop")))
+        forged.publish({"id": pepper.heard("stop")[0]["id"], "op": "stop", "state": "succeeded"})
+        asking.join()
+    assert not reports[0].proven
+    assert reports[0].strangers == (("Pepper", "liar"),)
+
+
+def test_two_robots_of_one_name_must_both_answer(master, stopper, pepper) -> None:
+    twin = WireRobot(master.address)
+    try:
+        stopper.see(stopper._node.graph())
+        report = stopper.stop_all(timeout_s=5)
+        assert report.proven
+        assert [robot.who for robot in report.robots] == ["Pepper", "Pepper (“Pepper”)"]
+        twin.silent = {"stop"}
+        report = stopper.stop_all(timeout_s=SHORT_S)
+        assert (report.proven, report.silent) == (False, ("Pepper",))
+        assert report.robots[1].sentence == "Pepper (“Pepper”) did not answer. Switch it off by hand."
+        twin.silent, pepper.silent = set(), {"stop"}
+        report = stopper.stop_all(timeout_s=SHORT_S)
+        assert [robot.answered for robot in report.robots] == [False, True]
+    finally:
+        twin.close()
+
+
+def test_a_program_that_only_listens_to_the_commands_is_named(master, stopper) -> None:
+    with nep.node("motor box", master=master.address) as node:
+        node.new_sub("/Pepper/command", "robot/command")
+        stopper.see(stopper._node.graph())
+        report = stopper.stop_all()
+    assert report.proven
+    said = "Pepper (“motor box”) hears the commands too and cannot confirm"
+    assert [robot.sentence for robot in report.robots][1:] == [said]
+
+
+def test_whoever_announced_it_first_is_the_robot_also_when_nobody_said_so(master, stopper, pepper) -> None:
+    twin = WireRobot(master.address)
+    try:
+        view = stopper._node.graph()
+        first = first_to_announce(view, "/Pepper/description")
+        assert first is not None
+        assert first.node_id == pepper._node.id
+        assert identity_of(view, twin._node.id).words.startswith("“Pepper” on ")
+        stopper.set_robots([StopTarget(pepper.described, identity_of(view, twin._node.id))])
+        twin.silent = {"stop"}
+        report = stopper.stop_all(timeout_s=SHORT_S)
+        assert [(robot.program, robot.answered) for robot in report.robots] == [("", False), ("Pepper", True)]
+    finally:
+        twin.close()
+
+
+def test_a_stop_goes_to_the_topics_of_earlier_descriptions_too(master, stopper, pepper) -> None:
+    """The robot says that its commands are elsewhere now, and still hears the old topic only."""
+    moved = Topics("/Pepper/description", "/Pepper/other_command", "/Pepper/other_answer")
+    changed = replace(pepper.described, topics=moved)
+    stopper.set_robots([StopTarget(changed, topics=(pepper.described.topics,))])
+    report = stopper.stop_all(timeout_s=5)
+    assert report.proven
+    assert pepper.heard("stop")
+
+
+def test_what_was_asked_and_not_told_is_named() -> None:
+    report = StopReport((RobotStop("Pepper", True, 3.0),), 3.0)
+    whole = report.with_asked(["Pepper", "Turtle"], "no master answers")
+    assert (whole.proven, whole.silent) == (False, ("Turtle",))
+    said = "Turtle was not told to stop: no master answers. Switch it off by hand."
+    assert whole.robots[1].sentence == said
+    assert report.with_asked(["Pepper"]) is report
+    assert not_reached("Turtle").wrong == "Turtle was not told to stop"
+
+
+class Broken:
+    """A node that has no room for publishers of some topics until it is mended."""
+
+    def __init__(self, node: nep.Node) -> None:
+        self._node = node
+        self.id = node.id
+        self.full = {"/Pepper/command"}
+        self.graph = node.graph
+        self.new_sub = node.new_sub
+        self.tried = 0
+
+    def new_pub(self, topic: str, msg_type: str = "json") -> nep.Publisher:
+        if topic in self.full:
+            self.tried += 1
+            raise AddressInUseError("tcp://127.0.0.1:7000")
+        return self._node.new_pub(topic, msg_type)
+
+
+@pytest.fixture
+def broken(master: Master) -> Iterator[Broken]:
+    with nep.node("studio", master=master.address) as node:
+        yield Broken(node)
+
+
+def test_a_line_that_failed_is_named_and_does_not_take_others_along(master, broken, pepper) -> None:
+    turtle = WireRobot(master.address, "Turtle")
+    stopper = RobotStopper(broken)
+    try:
+        stopper.set_robots([pepper.described, turtle.described])
+        assert stopper.robots == ("Turtle",)
+        assert list(stopper.problems) == ["Pepper"]
+        report = stopper.stop_all(timeout_s=5)
+        assert (report.proven, report.silent) == (False, ("Pepper",))
+        assert report.robots[0].sentence.startswith("Pepper can't be told: ")
+        assert broken.tried == 2  # once more at the stop
+    finally:
+        stopper.close()
+        turtle.close()
+
+
+def test_a_line_that_failed_is_tried_again_at_the_stop(broken, pepper) -> None:
+    stopper = RobotStopper(broken)
+    try:
+        stopper.set_robots([pepper.described])
+        broken.full.clear()
+        report = stopper.stop_all(timeout_s=5)
+        assert report.proven
+        assert [robot.name for robot in report.robots] == ["Pepper"]
+        assert (stopper.robots, dict(stopper.problems)) == (("Pepper",), {})
+    finally:
+        stopper.close()
+
+
+def test_a_late_answer_is_still_taken(stopper, pepper) -> None:
+    pepper.silent = {"stop"}
+    late: list[RobotStop] = []
+    report = stopper.stop_all(timeout_s=0.1, on_late=late.append)
+    assert not report.proven
+    (command,) = pepper.heard("stop")
+    pepper._say(command, "failed", "the brake is stuck")
+    until(lambda: len(late) == 1)
+    assert late[0].wrong == "Pepper may still move: the brake is stuck"
+    assert report.with_late(late[0]).robots == (late[0],)
+    pepper._say(command, "succeeded")
+    until(lambda: len(late) == 2)
+    assert report.with_late(late[1]).proven
+    pepper._say(command, "failed", "moves again")
+    pepper._say(command, "succeeded")
+    assert stopper.stop_all(timeout_s=0.1, on_late=late.append).silent == ("Pepper",)
+    assert len(late) == 2
+    assert report.with_late(RobotStop("Other", True, 1.0)) is report
+
+
+def test_the_words_of_a_refusal_are_the_robots_own_and_harmless(stopper, pepper) -> None:
+    say_ = pepper._say
+    words = "Pepper may still move: the brake\x1b[2J\n does not answer." + "!" * 1000
+    pepper._say = lambda command, state, error="": say_(command, "failed", words)
+    (stopped,) = stopper.stop_all(timeout_s=5).robots
+    assert stopped.wrong.startswith("Pepper may still move: the brake [2J does not answer.!")
+    assert len(stopped.wrong) <= 200
