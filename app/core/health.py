@@ -111,6 +111,19 @@ class Health:
             count=0,
         )
 
+    def settings(self, sentence: str | None) -> None:
+        """Whether what a person chooses is kept: the sentence that says why not, or None."""
+        if sentence is None:
+            self._alerts.cure("settings")
+            return
+        self._alerts.put(
+            "settings",
+            "warn",
+            "What you choose now is forgotten when Studio ends.",
+            f"{sentence[0].upper()}{sentence[1:]}.",
+            count=0,
+        )
+
     def graph_alerts(self, view: GraphView) -> None:
         """Take over what the master noticed (a name used twice, types that differ, a port that is taken)."""
         ids = set()

@@ -162,6 +162,7 @@ class Session:
             if self.runs.kept and self.companions.ended >= self.runs.kept:
                 self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
             self._health.journal(self.documents.journal_error)
+            self._health.settings(self.settings.not_kept)
             if self.master.kind == "none" and self._start_companions:
                 self.companions.keep_master()
         self.tick_ms = (self._clock() - began) * 1000

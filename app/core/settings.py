@@ -43,6 +43,9 @@ class Settings:
         """Read ``settings.json`` in ``folder`` (default: `home`); none yet is fine."""
         self.path = (folder if folder is not None else home()) / "settings.json"
         self.damaged: Path | None = None
+        self.not_kept: str | None = None
+        """Why the file could not be written last, as a sentence; None when it could."""
+        self._unwritten: dict[str, object] = {}
         self._clock = clock
         self._values: dict[str, object] = self._read()
 
@@ -58,11 +61,11 @@ class Settings:
 
         What another Studio on this computer has kept meanwhile stays, but for this key.
         """
-        if key in self._values and self._values[key] == value:
+        if key in self._values and self._values[key] == value and self.not_kept is None:
             return
-        self._values[key] = value
+        self._values[key] = self._unwritten[key] = value
         with locked(self.path):
-            self._values = {**self._of_others(), key: value}
+            self._values = self._of_others()
             self._write()
 
     @property
@@ -111,12 +114,12 @@ class Settings:
         return values if isinstance(values, dict) else self._set_aside()
 
     def _of_others(self) -> dict[str, object]:
-        """What the file says now; what is known here when it can't be read."""
+        """What the file says now, with what is not written yet; what is known here if it can't be read."""
         try:
             values = json.loads(self.path.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError):
             return self._values
-        return values if isinstance(values, dict) else self._values
+        return {**values, **self._unwritten} if isinstance(values, dict) else self._values
 
     def _set_aside(self) -> dict[str, object]:
         self.damaged = self.path.with_name("settings.damaged.json")
@@ -131,4 +134,8 @@ class Settings:
         try:
             write_atomically(self.path, text.encode("utf-8"), durable=False)
         except OSError as error:
-            raise SettingsError(self.path, error.strerror or str(error)) from error
+            failed = SettingsError(self.path, error.strerror or str(error))
+            self.not_kept = str(failed)
+            raise failed from error
+        self.not_kept = None
+        self._unwritten.clear()

@@ -99,10 +99,14 @@ class Arrangements:
 
     # -- names ------------------------------------------------------------------------------------
 
-    def keep_as(self, bench: Workbench, base: str, name: str) -> None:
-        """Keep what shows under a new name, and show that from now on; the old one stays as it was."""
-        self._state.keep_layouts({OWN + name.strip(): {**bench.save(), "base": base}})
+    def keep_as(self, bench: Workbench, base: str, name: str) -> bool:
+        """Keep what shows under a new name, and show that from now on; the old one stays as it was.
+
+        False when it could not be written: it is there until Studio ends.
+        """
+        kept = self._state.keep_layouts({OWN + name.strip(): {**bench.save(), "base": base}})
         self._choose(base, name.strip())
+        return kept
 
     def rename(self, old: str, new: str) -> None:
         """Give an own layout another name."""
@@ -115,23 +119,26 @@ class Arrangements:
         if shown:
             self._choose(found.base, new.strip())
 
-    def delete(self, bench: Workbench | None, name: str) -> Callable[[], None]:
-        """Forget an own layout; what is returned brings it back. Its workbench shows the built-in one."""
+    def delete(self, bench: Workbench | None, name: str) -> tuple[bool, Callable[[], None]]:
+        """Forget an own layout: whether that is kept, and what brings it back.
+
+        Its workbench shows the built-in one.
+        """
         found = self.named(name)
         if found is None:
-            return lambda: None
+            return True, lambda: None
         base, shown = found.base, self.own(found.base) == name
         if shown and bench is not None:
             self.use(bench, base, "")
         saved = dict(self._state.of_layout(OWN + name))
-        self._state.forget_layout(OWN + name)
+        kept = self._state.forget_layout(OWN + name)
 
         def undo() -> None:
             self._state.keep_layouts({OWN + name: saved})
             if shown and bench is not None:
                 self.use(bench, base, name)
 
-        return undo
+        return kept, undo
 
     def _choose(self, base: str, own: str) -> None:
         self._current[base] = own

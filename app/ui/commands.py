@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from PySide6.QtCore import Qt
 
 from app.core.companions import VIRTUAL_ROBOTS
+from app.errors import SettingsError
 from app.ui.actions import Actions, Handler
 from app.ui.docks import Dock
 from app.ui.file_dialogs import Asks, SystemDialogs
 from app.ui.files import Files
-from app.ui.habits import Habits
+from app.ui.habits import UNTIL_END, Habits
 from app.ui.main_window import START, MainWindow
 from app.ui.mends import RobotMends
 from app.ui.others_sheet import OthersSheet
@@ -235,8 +236,13 @@ class Commands:
         self._window.toast.say("The virtual Turtle is coming")
 
     def _ask_before_moving(self) -> None:
-        self._session.fleet.moving.forget()
-        self._window.toast.say("Studio asks again before a real robot moves")
+        words = "Studio asks again before a real robot moves"
+        try:
+            self._session.fleet.moving.forget()
+        except SettingsError as error:
+            self._window.complain(str(error))
+            words += f", {UNTIL_END}"
+        self._window.toast.say(words)
 
     def _doctor(self) -> None:
         self._session.doctor.look()

@@ -32,6 +32,7 @@ else:
 
 TEXT_STEP = 25
 PANEL_KEYS = range(1, 10)
+UNTIL_END = "until Studio ends"
 NEXT_LAYOUT = "Keep this layout as"
 
 
@@ -213,8 +214,8 @@ class Habits:
             return
 
         def keep(name: str) -> None:
-            arrangements.keep_as(bench, base, name)
-            self._window.toast.say(f"Kept the layout “{name}”")
+            kept = arrangements.keep_as(bench, base, name)
+            self._window.toast.say(f"Kept the layout “{name}”" if kept else f"“{name}” is there {UNTIL_END}")
 
         self._ask_name().ask(NEXT_LAYOUT, "Keep it", arrangements.refusal, keep)
 
@@ -234,8 +235,9 @@ class Habits:
         arrangements, window = self._window.arrangements, self._window
         name = arrangements.own(window.showing)
         if name:
-            undo = arrangements.delete(window.bench, name)
-            window.toast.say(f"Deleted the layout “{name}”", "Undo", undo)
+            kept, undo = arrangements.delete(window.bench, name)
+            words = f"Deleted the layout “{name}”" if kept else f"“{name}” is gone {UNTIL_END}"
+            window.toast.say(words, "Undo", undo)
 
     def _freeze(self) -> None:
         freeze_or_go_on(self._window.bench)
@@ -266,12 +268,14 @@ class Habits:
     def _forget_recent(self) -> None:
         settings = self._session.settings
         before: list[RecentFile] = settings.recent_known
+        words = "Cleared the list of recent files"
         try:
             settings.set_recent([])
         except SettingsError as error:
             self._window.complain(str(error))
+            words = f"The list of recent files is empty {UNTIL_END}"
         self._window.show_recent()
-        self._window.toast.say("Cleared the list of recent files", "Undo", lambda: self._remember(before))
+        self._window.toast.say(words, "Undo", lambda: self._remember(before))
 
     def _remember(self, files: list[RecentFile]) -> None:
         try:

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 from app.core.lazy_json import LazyList, LazyObject
 from app.ui.theme import Theme
 from app.ui.widgets import Changing, IconButton, Line, label, paint
-from app.ui.words import grouped, latency_words, size_words
+from app.ui.words import age_words, grouped, latency_words, size_words
 from nep.errors import NepError
 
 if TYPE_CHECKING:
@@ -79,14 +79,20 @@ def live_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
     return "live", "info", ""
 
 
-def message_facts(message: Message) -> str:
-    """``seq 18 204   412 B   latency 0.6 ms``; what is not known is left out."""
+def message_facts(message: Message, since_ns: int = 0) -> str:
+    """``seq 18 204   412 B   latency 0.6 ms``, just when it came; what is not known is left out.
+
+    A latched message from before ``since_ns``, when somebody began to look, took no time on its way: it says
+    how long ago it was sent.
+    """
     facts = [size_words(message.size_bytes)]
     if message.seq is not None:
         facts.insert(0, f"seq {grouped(message.seq)}")
     if message.stamp_ns is not None:
         latency = (time.time_ns() - message.stamp_ns) / 1e9
-        if 0 <= latency < 3600:
+        if message.is_latched and message.stamp_ns < since_ns:
+            facts.append(f"latched, sent {age_words(latency)} ago")
+        elif 0 <= latency < 3600:
             facts.append(f"latency {latency_words(latency)}")
     return "   ".join(facts)
 

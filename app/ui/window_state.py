@@ -83,9 +83,9 @@ class WindowState:
         found = self.layouts().get(name)
         return found if isinstance(found, Mapping) else {}
 
-    def forget_layout(self, name: str) -> None:
-        """Keep nothing about a layout any more."""
-        self._set("layouts", {key: value for key, value in self.layouts().items() if key != name})
+    def forget_layout(self, name: str) -> bool:
+        """Keep nothing about a layout any more; False when it is there again at the next start."""
+        return self._set("layouts", {key: value for key, value in self.layouts().items() if key != name})
 
     def chosen(self, base: str) -> str:
         """The name of the own layout that a built-in one's workbench showed last; "" for none."""
@@ -98,12 +98,14 @@ class WindowState:
         kept: Saved = self._settings.get("chosen_layouts", {})
         self._set("chosen_layouts", {**kept, base: name})
 
-    def keep_layouts(self, found: Mapping[str, Mapping[str, object]]) -> None:
-        """Keep what these layouts look like now."""
-        self._set("layouts", {**self.layouts(), **found})
+    def keep_layouts(self, found: Mapping[str, Mapping[str, object]]) -> bool:
+        """Keep what these layouts look like now; False when they are forgotten at the end."""
+        return self._set("layouts", {**self.layouts(), **found})
 
-    def _set(self, key: str, value: object) -> None:
+    def _set(self, key: str, value: object) -> bool:
         try:
             self._settings.set(key, value)
         except SettingsError as error:
             self._complain(str(error))
+            return False
+        return True

@@ -55,3 +55,25 @@ def test_a_folder_that_cant_be_written_is_told(tmp_path: Path) -> None:
 def test_the_folder_can_be_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     assert home() == tmp_path
+
+
+def test_what_could_not_be_written_is_known_until_it_can_be(tmp_path: Path) -> None:
+    settings = Settings(tmp_path)
+    settings.set("theme", "light")
+    assert settings.not_kept is None
+    settings.path.unlink()
+    settings.path.mkdir()  # as a disk that can't be written
+    with pytest.raises(SettingsError):
+        settings.set("theme", "dark")
+    with pytest.raises(SettingsError):
+        settings.set("text_percent", 125)
+    assert settings.not_kept is not None
+    assert (settings.get("theme", ""), settings.get("text_percent", 0)) == ("dark", 125)
+    settings.path.rmdir()
+    Settings(tmp_path).set("layout", "developer")  # another Studio, when the disk is there again
+    settings.set("text_percent", 125)
+    assert settings.not_kept is None
+    again = Settings(tmp_path)
+    assert (again.get("theme", ""), again.get("text_percent", 0), again.get("layout", "")) == (
+        "dark", 125, "developer",
+    )  # fmt: skip

@@ -176,3 +176,28 @@ def test_the_palette_shows_own_layouts(shown: MainWindow, commands: Commands) ->
     found = {entry.words: entry for entry in commands.habits._offers.all()}
     commands.habits.do(found["Two cameras"])
     assert shown.arrangements.own("developer") == "Two cameras"
+
+
+def test_what_can_not_be_written_is_not_said_to_be_kept(shown: MainWindow, commands: Commands) -> None:
+    path = shown.session.settings.path
+    keep_as(shown, commands, "One")
+    path.unlink()
+    path.mkdir()  # as a disk that can't be written
+    keep_as(shown, commands, "Two")
+    assert shown.toast.text == "“Two” is there until Studio ends"
+    assert "Two" in menu(shown, commands)
+    shown.session.tick()
+    alert = next(each for each in shown.session.alerts.active if each.id == "settings")
+    assert alert.title == "What you choose now is forgotten when Studio ends."
+    commands.run("layout.delete")
+    assert shown.toast.text == "“Two” is gone until Studio ends"
+    commands.habits._forget_recent()
+    assert shown.toast.text == "The list of recent files is empty until Studio ends"
+    commands.run("robots.ask")
+    assert shown.toast.text == "Studio asks again before a real robot moves, until Studio ends"
+    path.rmdir()
+    keep_as(shown, commands, "Three")
+    assert shown.toast.text == "Kept the layout “Three”"
+    shown.session._next_check = 0.0
+    shown.session.tick()
+    assert not shown.session.alerts.has("settings")

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from app.ui.panels.camera import CameraPanel
 from app.ui.panels.image import PANEL, ImagePanel
 from app.ui.picture_actions import ROWS
 from app.ui.picture_boxes import boxes_of
+from app.ui.picture_place import PicturePlace
 from app.ui.picture_view import PictureView, pixel_words, rate_sentence
 from app.ui.picture_zoom import ZoomablePicture
 from app.ui.snapshot_job import SnapshotJob
@@ -423,6 +425,43 @@ def test_how_a_person_looked_comes_back_with_the_layout(qtbot, qapp) -> None:
     assert again.view.place == panel.view.place
     assert again.actions_of["across"].isChecked()
     again.restore_state({"topic": 3, "place": "nonsense"})
+
+
+def test_how_a_person_looked_belongs_to_its_topic(qtbot, qapp) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    QTest.keyClicks(panel.view, "+rh")
+    first, place = panel.subtitle(), panel.view.place
+    assert place.zoom is not None
+    panel.show_topic("/robot/depth")
+    assert panel.view.place == PicturePlace()
+    assert not panel.actions_of["across"].isChecked()
+    panel.show_topic(first)
+    assert panel.view.place is place
+    assert panel.actions_of["across"].isChecked()
+
+
+def test_a_job_tells_in_the_windows_thread_and_nothing_after_the_end(qtbot, qapp, tmp_path) -> None:
+    window = Window(Session.full())
+    panel = made(qtbot, window)
+    told: list[int] = []
+    job = SnapshotJob(panel, lambda: tmp_path / "kept")
+    job.saved.connect(lambda _path: told.append(threading.get_ident()), Qt.ConnectionType.DirectConnection)
+    job.failed.connect(lambda _words: told.append(threading.get_ident()), Qt.ConnectionType.DirectConnection)
+    message = panel._message()
+    assert message is not None
+    job.save(message)
+    assert job.busy
+    qtbot.waitUntil(lambda: bool(told))
+    job._start(lambda: Path(str(1 / 0)))  # whatever goes wrong is told, and the next one can begin
+    qtbot.waitUntil(lambda: len(told) == 2)
+    assert set(told) == {threading.get_ident()}
+    assert not job.busy
+    job.save(message)
+    job.wait()
+    qapp.processEvents()
+    assert len(told) == 2
+    assert len(list((tmp_path / "kept").iterdir())) == 2
 
 
 def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:

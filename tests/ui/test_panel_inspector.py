@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from collections.abc import Iterator, Mapping
 
 import pytest
@@ -17,7 +18,7 @@ from app.ui.inspector_parts import LARGE_BYTES, image_summary, message_facts, pl
 from app.ui.panels.inspector import PANEL, InspectorPanel
 from app.ui.tree import Node
 from app.ui.tree_difference import OFF
-from nep.message import Message
+from nep.message import Message, kind_of
 from tests.ui.fakes import Session, blackboard
 from tests.ui.panel_case import Window, button, press, ticks
 
@@ -69,6 +70,28 @@ def test_the_newest_message_as_a_tree_with_its_facts(panel, window) -> None:
     assert panel.foot.facts.text().startswith("seq 18\u2009204   ")
     assert "latency" in panel.foot.facts.text()
     assert panel.live.text == "live"
+
+
+def test_a_latched_message_from_before_says_when_it_was_sent(panel, window) -> None:
+    now = time.time_ns()
+    half_an_hour_ago = Message("/a", b"1", "json", "json")
+    half_an_hour_ago.kind = kind_of("/a", "json", "json", is_latched=True)
+    half_an_hour_ago.stamp_ns = now - 1800 * 10**9
+    assert message_facts(half_an_hour_ago, now).endswith("latched, sent 30 min ago")
+    half_an_hour_ago.stamp_ns = now - 10**6
+    assert "latency" in message_facts(half_an_hour_ago, now - 10**9), "it came while somebody looked"
+
+
+def test_how_long_a_message_took_does_not_grow_while_it_is_looked_at(panel, window) -> None:
+    panel.show_topic("/blackboard")
+    window.session.send("/blackboard", blackboard())
+    panel.refresh()
+    panel.freeze.setChecked(True)
+    said = panel._facts(panel._shown)
+    panel._shown.stamp_ns -= 600 * 10**9  # as ten minutes later
+    panel._set_mode("raw")
+    assert panel.foot._facts_next in {"", said}
+    assert panel._facts(panel._shown) == said
 
 
 class Layouts(QObject):

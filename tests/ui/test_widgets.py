@@ -29,6 +29,7 @@ from app.ui.widgets import (
     paint,
 )
 from app.ui.widgets.slider import decimals_of
+from app.ui.widgets.small import paint_sparkline
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -228,6 +229,27 @@ def test_a_sparkline_paints_a_stroke(qtbot, theme: Theme) -> None:
     before = colours(spark)
     spark.set_values([1, 5, 2, 8])
     assert len(colours(spark)) > len(before)
+
+
+def stroke(values: list[float]) -> list[int]:
+    """In which rows of 16 a sparkline of this has ink."""
+    image = QImage(56, 16, QImage.Format.Format_RGB32)
+    image.fill(Qt.GlobalColor.white)
+    painter = QPainter(image)
+    paint_sparkline(painter, QRectF(0, 0, 56, 16), values, QColor("black"))
+    painter.end()
+    return [y for y in range(16) if any(image.pixelColor(x, y).lightness() < 128 for x in range(56))]
+
+
+def test_a_sparkline_stands_on_zero(qapp) -> None:
+    steady = stroke([30.0, 29.0, 30.0, 29.5])
+    assert max(steady) <= 3, "a rate that changes little is a level line at the top"
+    assert min(stroke([0.0, 0.0, 0.0])) >= 13, "none is on the ground"
+    fell = stroke([30.0, 30.0, 0.0, 0.0])
+    assert (min(fell) <= 3, max(fell) >= 13) == (True, True)
+    assert max(stroke([30.0, 15.0])) <= 9, "half of it is half as high"
+    assert min(stroke([-10.0, -10.0])) >= 13
+    assert stroke([1.0, float("nan")]) == stroke([float("inf"), 2.0]) == []
 
 
 def test_an_empty_state_leads_on(qtbot, theme: Theme) -> None:

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 from app.core import snapshots
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_actions import PictureActions
+from app.ui.picture_place import PicturePlace
 from app.ui.picture_zoom import ZoomablePicture
 from app.ui.robot_boxes import boxes_on, owner_of
 from app.ui.snapshot_job import SnapshotJob
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 CODEC = "image"
 ROOMY = 320
+MOST_PLACES = 200
 
 
 class ImagePanel(PanelWidget):
@@ -39,6 +41,7 @@ class ImagePanel(PanelWidget):
         self._stream: ImageStream | None = None
         self._watch: Watch | None = None
         self._watched_robot = ""
+        self._places: dict[str, PicturePlace] = {}
         self._revision = -1
         self._there: bool | None = None
         self.choose = IconButton(self.theme, "chevron-down", "Choose a picture topic", size=26)
@@ -90,6 +93,8 @@ class ImagePanel(PanelWidget):
         if name == self._topic and self._stream is not None:
             return
         self.shut()
+        if name != self._topic:
+            self._show_place_of(name)
         self._topic = name
         self.view.clear()
         self.freeze.setChecked(False)
@@ -98,6 +103,13 @@ class ImagePanel(PanelWidget):
             self._stream = self.session.images.stream(name)
             self.session.topics.mark_seen(name)
         self._say_nothing()
+
+    def _show_place_of(self, topic: str) -> None:
+        """How a person looked, zoomed and turned, belongs to a topic: it comes back with it."""
+        if len(self._places) >= MOST_PLACES:
+            self._places.clear()
+        self.view.place = self._places.setdefault(topic, PicturePlace())
+        self.actions_of.show_checks()
 
     def refresh(self) -> None:
         if self.session.topics.revision != self._revision:

@@ -49,6 +49,8 @@ class InspectorPanel(PanelWidget):
         self._allowed: Message | None = None  # a large message that a person wants to read
         self._reading: Reading | None = None  # what the tree shows, when it was read elsewhere
         self._raw_wanted = False
+        self._since_ns = 0  # when the panel began to look
+        self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
         self._before: object = OFF  # what stood here before, of the same topic
         self._pinned: object = OFF
@@ -105,6 +107,7 @@ class InspectorPanel(PanelWidget):
             button.setChecked(False)
         self.set_title("Inspector", name)
         if name:
+            self._since_ns = time.time_ns()
             self._watch = self.session.watch(name)
             self.session.topics.mark_seen(name)
         self._say_nothing()
@@ -165,8 +168,14 @@ class InspectorPanel(PanelWidget):
             self.finder.forget()
         self._value = value
         self._show_value()
-        self.foot.show_facts(message_facts(message), self.clock())
+        self.foot.show_facts(self._facts(message), self.clock())
         self._page(TREE)
+
+    def _facts(self, message: Message) -> str:
+        """What is said of a message stays as it was when it came, however long it is looked at."""
+        if message is not self._facts_of[0]:
+            self._facts_of = (message, message_facts(message, self._since_ns))
+        return self._facts_of[1]
 
     def _show_value(self) -> None:
         """Put the message into the tree, compared or not."""
@@ -185,7 +194,7 @@ class InspectorPanel(PanelWidget):
 
     def _show_raw(self, message: Message, sentence: str) -> None:
         self._shown = message
-        self.foot.show_facts(message_facts(message), self.clock())
+        self.foot.show_facts(self._facts(message), self.clock())
         self.bytes.show_bytes(message.data)
         self.body.sentence.setText(f"This can't be read as {message.codec}: {sentence}." if sentence else "")
         self._page(RAW)
@@ -286,6 +295,11 @@ class InspectorPanel(PanelWidget):
         if self._watch is not None:
             self._watch.close()
             self._watch = None
+
+    def wake(self) -> None:
+        if self._watch is not None and self._watch.resting:
+            self._since_ns = time.time_ns()
+        super().wake()
 
     def looks(self) -> Iterable[Look | None]:
         return (self._watch,)

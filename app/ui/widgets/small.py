@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
@@ -148,13 +149,13 @@ class Switch(QAbstractButton):
 def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], colour: QColor) -> None:
     """One stroke through the values, oldest left, no axes; fewer than two values paint nothing.
 
-    The height shows how the values differ from 0 to their largest; equal values make a level line.
+    The lower edge is 0 (or the least, where that is below), the upper one the largest: a rate that changes
+    little is a level line, and one that stops falls to the ground. Values that are no numbers paint nothing.
     """
-    if len(values) < 2:
+    if len(values) < 2 or not isfinite(sum(values)):
         return
-    least, most = min(values), max(values)
-    steady = most - least <= 0.1 * abs(most) or most == least
-    lowest, span = (most - (abs(most) or 1), 2 * (abs(most) or 1)) if steady else (least, most - least)
+    lowest = min(0.0, *values)
+    span = (max(0.0, *values) - lowest) or 1.0
     left, step = rect.left(), rect.width() / (len(values) - 1)
     bottom, rise = rect.bottom() - 1, (rect.height() - 2) / span
     curve = QPainterPath()
