@@ -9,10 +9,16 @@ from __future__ import annotations
 import argparse
 import gc
 import importlib
+import os
 import runpy
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from nep.addresses import MASTER_VARIABLE, master_address
+from nep.errors import NepError
+from nep.streams import close_streams, prepare_streams, words_given
+from nep.version import __version__
 
 PROCESSES = ("app.blocks.child", "app.robots.simulated", "app.robots.turtle", "nep")
 
@@ -29,6 +35,8 @@ def window_parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--demo", action="store_true", help="begin with the virtual robot and the first example"
     )
+    made.add_argument("--master", metavar="HOST:PORT", help="the master to join")
+    made.add_argument("--version", action="version", version=f"NEP Studio {__version__}")
     made.add_argument("--theme", choices=("light", "dark", "system"), help="its colours")
     made.add_argument(
         "--self-drive", metavar="DIR", type=Path, help="do the main job alone; screenshots go to DIR"
@@ -57,14 +65,27 @@ def run_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do what the command line asks; the exit code is 0 when it went well."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    prepare_streams()
+    try:
+        return _main(words_given() if arguments is None else list(arguments))
+    finally:
+        close_streams()
+
+
+def _main(given: Sequence[str]) -> int:
     if given[:1] == ["--child"]:
         return hand_over("app.blocks.child", given[1:])
     if given[:1] == ["--module"] and len(given) > 1:
         return hand_over(given[1], given[2:])
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
-    options = window_parser().parse_intermixed_args(given)
+    parser = window_parser()
+    options = parser.parse_intermixed_args(given)
+    if options.master is not None:
+        try:  # for the window, and for the processes that it starts
+            os.environ[MASTER_VARIABLE] = master_address(options.master)
+        except NepError as error:
+            parser.error(str(error))
     gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.garbage`)
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")

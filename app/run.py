@@ -23,7 +23,10 @@ from app.core.runner import Runner, RunnerEvent
 from app.core.stopping import RobotStopper, StopReport
 from app.errors import AppError, DescriptionError
 from app.robots.description import Robot, parse
-from nep.errors import NepError
+from nep.errors import MasterUnreachable, NepError
+from nep.network import unknown_host
+from nep.streams import tell
+from nep.text import escaped
 
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 ROBOT_WAIT_S = 10.0
@@ -45,8 +48,11 @@ def run_file(
     It waits `robot_wait_s` for the robots that its blocks name. What happens is written to `out` (stdout),
     one line each. Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots
     stopped. Without `allow_moving` a behaviour that would move a robot which is not virtual is refused.
+    When `out` takes nothing more (its reader has left, its disk is full) the behaviour is stopped in the same
+    way, and the exit code is 1.
     """
-    say = _writer(out or sys.stdout)
+    ending = interrupted or threading.Event()
+    say = _Lines(out or sys.stdout, ending)
     try:
         name, workspace, descriptions = read(Path(path))
         known = _known(descriptions)
@@ -63,14 +69,17 @@ def run_file(
             stopper = RobotStopper(node)
             try:
                 stopper.set_robots(used)
-                return _run(program, used, master, stopper, say, interrupted or threading.Event())
+                return _run(program, used, master, stopper, say, ending)
             finally:
                 stopper.close()
     except KeyboardInterrupt:
         return INTERRUPTED
     except (AppError, NepError) as error:
-        say(f"{error}.")
+        unknown = unknown_host(error.address) if isinstance(error, MasterUnreachable) else None
+        say(f"{unknown or error}.")
         return UNUSABLE
+    finally:
+        say.tell_problem()
 
 
 def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
@@ -81,12 +90,39 @@ def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
     return tuple(sorted({block.field_id("ROBOT") for block in blocks if block.enabled} - {""}))
 
 
-def _writer(stream: TextIO) -> Callable[[str], None]:
-    def say(line: str) -> None:
-        stream.write(line + "\n")
-        stream.flush()
+class _Lines:
+    """Writes lines from any thread. When they can't be written any more, the behaviour is to end."""
 
-    return say
+    def __init__(self, stream: TextIO, ending: threading.Event) -> None:
+        self._stream = stream
+        self._ending = ending
+        self._lock = threading.Lock()
+        self._problem: str | None = None
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether a line could not be written."""
+        return self._problem is not None
+
+    def __call__(self, text: str) -> None:
+        """Write one line, or those of a text of several; letters that a terminal obeys are shown."""
+        line = escaped(text, lines=True)
+        with self._lock:
+            if self._problem is not None:
+                return
+            try:
+                self._stream.write(line + "\n")
+                self._stream.flush()
+            except (OSError, ValueError) as error:
+                is_gone = isinstance(error, (BrokenPipeError, ValueError))
+                reason = getattr(error, "strerror", None) or str(error)
+                self._problem = "" if is_gone else reason.lower()
+                self._ending.set()
+
+    def tell_problem(self) -> None:
+        """Say on the error stream why nothing was written any more; nothing when its reader has left."""
+        if self._problem:
+            tell(f"the output cannot be written: {self._problem}; the behaviour was stopped.")
 
 
 def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
@@ -131,12 +167,14 @@ def _run(
     robots: Sequence[Robot],
     master: str | None,
     stopper: RobotStopper,
-    say: Callable[[str], None],
+    say: _Lines,
     interrupted: threading.Event,
 ) -> int:
     told = _Told(say)
     runner = Runner(told)
     say(f"“{program.name}” runs")
+    if interrupted.is_set():
+        return FAILED if say.is_lost else INTERRUPTED
     runner.start(program, [robot.source for robot in robots], master)
     was_interrupted = False
     try:
@@ -154,7 +192,7 @@ def _run(
     for line in stop_lines(report):
         say(line)
     if was_interrupted:
-        return INTERRUPTED if report.proven else FAILED
+        return INTERRUPTED if report.proven and not say.is_lost else FAILED
     return OK if told.ok and report.proven else FAILED
 
 

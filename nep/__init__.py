@@ -29,6 +29,7 @@ from nep.masters import Master, is_running, master_address, start_process
 from nep.message import Message
 from nep.nodes import Node
 from nep.pubsub import Publisher, Subscriber
+from nep.version import __version__
 
 __all__ = [
     "AddressInUseError",
@@ -58,6 +59,7 @@ __all__ = [
     "TopicInfo",
     "UnknownBackendError",
     "WaitTimeoutError",
+    "__version__",
     "is_running",
     "master",
     "master_address",

@@ -7,8 +7,9 @@ import re
 
 from nep.errors import NepError
 
-__all__ = ["DEFAULT_MASTER", "endpoint_of", "host_of", "is_loopback", "master_address"]
+__all__ = ["DEFAULT_MASTER", "MASTER_VARIABLE", "endpoint_of", "host_of", "is_loopback", "master_address"]
 
+MASTER_VARIABLE = "NEP_MASTER"
 DEFAULT_MASTER = "127.0.0.1:7780"
 _DEFAULT_PORT = 7780
 _HOST = re.compile(r"[\w.-]+|\*|\[[\w:.%]+\]", re.ASCII)
@@ -16,7 +17,7 @@ _HOST = re.compile(r"[\w.-]+|\*|\[[\w:.%]+\]", re.ASCII)
 
 def master_address(address: str | None = None) -> str:
     """`address`, else $NEP_MASTER, else "127.0.0.1:7780"; the port 7780 is added when there is none."""
-    chosen = (address or os.environ.get("NEP_MASTER") or DEFAULT_MASTER).removeprefix("tcp://")
+    chosen = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
     host, colon, port = chosen.rpartition(":")
     if not colon:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)

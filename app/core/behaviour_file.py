@@ -41,6 +41,8 @@ def read_file(path: Path) -> BehaviourFile:
         data = path.read_bytes() if size <= LARGEST_BYTES else b""
     except OSError as error:
         raise DocumentError(path, f"can't be read ({error.strerror or error})") from error
+    except ValueError as error:  # letters that no file's name has here
+        raise DocumentError(path, "can't be read (no file has such a name here)") from error
     if size > LARGEST_BYTES:
         raise DocumentError(path, f"is {size // 1_000_000} MB; a behaviour has at most 32 MB")
     return parse_file(data, path)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from nep.streams import close_streams, prepare_streams
+
 __all__ = ["main"]
 
 INTERRUPTED = 130
@@ -12,9 +14,13 @@ INTERRUPTED = 130
 
 def main() -> None:
     """Run the command line and leave with its exit code. Ctrl+C ends it at once, from the first import on."""
+    prepare_streams()
     try:
         from nep.cli.app import run  # noqa: PLC0415 - typer is heavy: Ctrl+C must work while it loads
 
-        sys.exit(run())
+        code = run()
     except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+        code = INTERRUPTED
+    finally:
+        close_streams()
+    sys.exit(code)

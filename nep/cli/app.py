@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import os
-import sys
+from typing import Annotated
 
 import typer
 
+from nep.addresses import MASTER_VARIABLE, master_address
 from nep.cli import doctor, log, masters, nodes, topics
-from nep.cli.screen import say_error
-from nep.errors import NepError
+from nep.cli.screen import say_error, write
+from nep.errors import MasterUnreachable, NepError
+from nep.network import unknown_host
+from nep.streams import output_problem, words_given
+from nep.version import __version__
+
+
+def _say_version(is_wanted: bool) -> None:
+    if is_wanted:
+        write(f"nep {__version__}\n")
+        raise typer.Exit
+
 
 app = typer.Typer(
     name="nep",
@@ -26,15 +37,52 @@ app.add_typer(nodes.app, name="node")
 app.add_typer(topics.app, name="topic")
 
 
+@app.callback()
+def common(
+    master: Annotated[
+        str | None,
+        typer.Option("--master", metavar="ADDRESS", help="Where the master is.", show_default=False),
+    ] = None,
+    version: Annotated[  # noqa: ARG001 - `_say_version` has done it
+        bool,
+        typer.Option("--version", is_eager=True, callback=_say_version, help="Say the version, and end."),
+    ] = False,
+) -> None:
+    """See and make messages between robots, programs and people."""
+    if master is not None:
+        os.environ[MASTER_VARIABLE] = master_address(master)  # for the command, and for what it starts
+
+
 def run() -> int:
-    """Run the command line; its exit code. What goes wrong is one sentence on the standard error stream."""
+    """Run the command line; its exit code. What goes wrong is one sentence on the standard error stream.
+
+    A reader that has enough (`| head`) ends it without a word, with 1.
+    """
     try:
-        app()
+        code = _code()
     except NepError as error:
-        say_error(str(error))
-        return 1
-    except BrokenPipeError:
-        # Whoever read us (`nep topic echo x | head`) has enough; Python must not flush into it at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        say_error(_sentence(error))
+        code = 1
+    except OSError:
+        if output_problem() is None:
+            raise
+        code = 1
+    problem = output_problem()
+    if problem:
+        say_error(f"the output cannot be written: {problem}")
+    return code if problem is None else code or 1
+
+
+def _code() -> int:
+    """The exit code that typer leaves with."""
+    try:
+        app(words_given())
+    except SystemExit as ended:
+        return ended.code if isinstance(ended.code, int) else 0 if ended.code is None else 1
     return 0
+
+
+def _sentence(error: NepError) -> str:
+    """What went wrong; of a master that is not reached, whether its name is known at all."""
+    unknown = unknown_host(error.address) if isinstance(error, MasterUnreachable) else None
+    return unknown or str(error)

@@ -7,10 +7,12 @@ print or raise: it would land in the line that a person is typing.
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Iterator
 
 import typer
 
+from nep.addresses import host_of, master_address
 from nep.cli.fields import leaves
 from nep.cli.graphs import look
 from nep.errors import NepError
@@ -18,13 +20,15 @@ from nep.graph import GraphView
 from nep.nodes import Node
 
 _ASK_S = 0.4
+_ANSWER_S = 3.0
+"""A busy computer may take so long until everybody had their turn; an idle one takes a few milliseconds."""
 _MESSAGE_S = 0.6
 
 
 def complete_topic(ctx: typer.Context, incomplete: str) -> list[str]:
     """Topics that begin so, but those that the line names already."""
     view = _view(ctx)
-    given = ctx.params.get("topics") or ()
+    given = _given(ctx)
     names = sorted(view.topics) if view is not None else []
     return [name for name in names if name.startswith(incomplete) and name not in given]
 
@@ -36,17 +40,29 @@ def complete_node(ctx: typer.Context, incomplete: str) -> list[str]:
     return sorted(name for name in names if name.startswith(incomplete))
 
 
-def complete_field(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Fields of the topic that the line names: those of the next message, or of the one that is kept."""
+def complete_more(ctx: typer.Context, incomplete: str) -> list[str]:
+    """What may follow a topic: fields of it (of its next message, or of the one that is kept), and topics."""
     topic = ctx.params.get("topic")
-    if not isinstance(topic, str):
-        return []
-    return [path for path in _fields(ctx, topic) if path.startswith(incomplete)]
+    fields = _fields(ctx, topic) if isinstance(topic, str) else ()
+    return [path for path in fields if path.startswith(incomplete)] + complete_topic(ctx, incomplete)
+
+
+def _given(ctx: typer.Context) -> set[str]:
+    """The words that the line has already."""
+    words = [ctx.params.get("topic"), *(ctx.params.get("topics") or ()), *(ctx.params.get("more") or ())]
+    return {word for word in words if isinstance(word, str)}
+
+
+def _master(ctx: typer.Context) -> str:
+    """Raises `NepError` when none answers at the address that the line, or else the environment, names."""
+    chosen = master_address(ctx.params.get("master") or ctx.find_root().params.get("master"))
+    with socket.create_connection((host_of(chosen).strip("[]"), int(chosen.rpartition(":")[2])), _ASK_S):
+        return chosen  # where nobody listens that is known at once; who listens gets time to answer
 
 
 def _view(ctx: typer.Context) -> GraphView | None:
     try:
-        return look(ctx.params.get("master"), _ASK_S)
+        return look(_master(ctx), _ANSWER_S)
     except (NepError, OSError):
         return None
 
@@ -54,8 +70,8 @@ def _view(ctx: typer.Context) -> GraphView | None:
 def _fields(ctx: typer.Context, topic: str) -> Iterator[str]:
     try:
         name = f"nep-complete-{os.getpid()}"
-        with Node(name, master=ctx.params.get("master"), wait_s=_ASK_S) as node:
-            known = node.graph(_ASK_S).topics.get(topic)
+        with Node(name, master=_master(ctx), wait_s=_ANSWER_S) as node:
+            known = node.graph(_ANSWER_S).topics.get(topic)
             if known is None or known.codec == "image":
                 return
             with node.new_sub(topic, known.msg_type) as subscriber:

@@ -1,37 +1,45 @@
-"""`nep topic echo`: the messages of a topic as they come."""
+"""`nep topic echo`: the messages of topics as they come."""
 
 from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from datetime import datetime, timezone
 from functools import partial
 from typing import Annotated
 
-import orjson
 import typer
 
-from nep.cli.complete import complete_field, complete_topic
-from nep.cli.graphs import node_for
+from nep.cli.complete import complete_more, complete_topic
+from nep.cli.graphs import Waiting, node_for
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, console, json_painter, say, show_json, size
+from nep.cli.screen import UNKNOWN, console, json_painter, say, show_json, size, write
 from nep.cli.table_file import Fields, Table
-from nep.errors import DecodeError, WaitTimeoutError, did_you_mean
+from nep.cli.values import cleaned, json_of, presented
+from nep.errors import DecodeError, WaitTimeoutError
 from nep.message import Message
-from nep.nodes import Node
 from nep.pubsub import Subscriber
+from nep.text import escaped, shortened
+from nep.views import GraphView
 
 _SHOWN_BYTES = 64
+_SHOWN_LETTERS = 2_000
+_COLOURED = 100_000
+"""Letters; a longer message is not coloured, which takes a second for each megabyte."""
+_SLICE_S = 0.02
+"""How long one topic is waited for while others may have something."""
 
 
-_FieldsArgument = Annotated[
+_MoreArgument = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="FIELD",
-        help="Show these fields only, such as pose.x or joints\\[3].",
+        metavar="TOPIC|FIELD",
+        help="More topics; or show these fields only, such as pose.x or joints\\[3].",
         show_default=False,
-        autocompletion=complete_field,
+        autocompletion=complete_more,
     ),
 ]
 
@@ -41,7 +49,7 @@ def echo(
         str,
         typer.Argument(help="The topic to look into.", show_default=False, autocompletion=complete_topic),
     ],
-    fields: _FieldsArgument = None,
+    more: _MoreArgument = None,
     count: Annotated[
         int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N messages; 0 goes on.")
     ] = 0,
@@ -56,50 +64,81 @@ def echo(
     as_csv: Annotated[
         bool, typer.Option("--csv", help="Write the fields as comma-separated values, with their time.")
     ] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="Show long lists and texts whole, on a terminal too.")
+    ] = False,
 ) -> None:
-    """Show the messages of a topic as they come. Ctrl+C ends it.
+    """Show the messages of topics as they come. Ctrl+C ends it.
 
-    Pictures are shown by their size, and what cannot be read as its bytes.
+    Pictures are shown by their size, and what cannot be read as its bytes. A terminal shows the beginning of
+    long lists and texts; files and other programs get all of them.
     """
-    if as_csv and not fields:
-        raise typer.BadParameter(f"name the fields: nep topic echo {topic} pose.x pose.y --csv")
     if as_csv and as_json:
         raise typer.BadParameter("--csv and --json are two ways to write; choose one")
-    picked = Fields(fields or ())
-    with node_for("echo", master) as node:
-        known = node.graph().topics.get(topic)
-        if known is None or not known.publishers:
-            say(f"nobody publishes '{topic}' yet; {_near(node, topic)}waiting, Ctrl+C ends it")
-        show = Table(picked) if as_csv else partial(show_record, fields=picked) if as_json else Lines(picked)
-        with node.new_sub(topic, known.msg_type if known else "json") as subscriber:
-            try:
-                _follow(subscriber, show, count, timeout_s)
-            finally:
-                picked.say_missing()
+    with ExitStack() as opened, node_for("echo", master) as node:
+        graph = node.graph()
+        topics, fields = sorted_out(topic, more or (), graph)
+        if as_csv and not fields:
+            raise typer.BadParameter(f"name the fields: nep topic echo {topic} pose.x pose.y --csv")
+        picked = Fields(fields)
+        waiting = Waiting(node, topics)
+        waiting.look(graph)
+        is_one = len(topics) == 1
+        if as_csv:
+            show: Callable[[Message], object] = Table(picked, names_topic=not is_one)
+        elif as_json:
+            show = partial(show_record, fields=picked)
+        else:
+            show = Lines(picked, names_topic=not is_one, whole=full)
+        subscribers = [opened.enter_context(node.new_sub(each, waiting.msg_type(each))) for each in topics]
+        try:
+            for message in itertools.islice(_coming(subscribers, timeout_s, waiting), count or None):
+                show(message)
+        finally:
+            picked.say_missing()
 
 
-def _follow(
-    subscriber: Subscriber, show: Callable[[Message], object], count: int, timeout_s: float | None
-) -> None:
-    """Show message after message, until ``count`` when that is not 0. Raises `WaitTimeoutError`."""
-    for number in itertools.count(1):
-        show(_next(subscriber, timeout_s))
-        if number == count:
-            return
+def sorted_out(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
+    """The topics and the fields that the words mean: what is a topic now, or begins with "/", is a topic."""
+    topics, fields = [topic], []
+    for word in more:
+        if word in graph.topics or word.startswith("/"):
+            topics.append(word)
+        else:
+            fields.append(word)
+    both = [word for word in more if word in graph.topics and not word.startswith("/")]
+    for word in both:
+        say(f"'{word}' is a topic; write .{word} for a field of that name")
+    return list(dict.fromkeys(topics)), fields
 
 
-def _near(node: Node, topic: str) -> str:
-    """Whether another topic was meant."""
-    near = did_you_mean(topic, [name for name in node.graph().topics if name != topic])
-    return f"{near} " if near.startswith("did") else ""
-
-
-def _next(subscriber: Subscriber, timeout_s: float | None) -> Message:
-    """The next message. Raises `WaitTimeoutError` after `timeout_s`; waits for ever when that is None."""
-    message = subscriber.receive(timeout_s)
-    if message is None:
-        raise WaitTimeoutError(f"a message on '{subscriber.topic}'", timeout_s or 0.0)
-    return message
+def _coming(
+    subscribers: Sequence[Subscriber], timeout_s: float | None, waiting: Waiting
+) -> Iterator[Message]:
+    """Their messages as they come; what was lost between them is said. Raises `WaitTimeoutError`."""
+    lost = dict.fromkeys((each.topic for each in subscribers), 0)
+    last = time.monotonic()
+    while True:
+        came = [message for each in subscribers if (message := each.receive(0.0)) is not None]
+        if not came:
+            message = subscribers[0].receive(_SLICE_S if len(subscribers) > 1 else waiting.slice_s(timeout_s))
+            came = [] if message is None else [message]
+        now = time.monotonic()
+        if came:
+            last = now
+            for each in subscribers:
+                missing = (each.lost or 0) - lost[each.topic]
+                if missing > 0:
+                    lost[each.topic] += missing
+                    said = "1 message" if missing == 1 else f"{missing} messages"
+                    say(f"{said} of '{each.topic}' did not arrive here")
+            yield from came
+            waiting.heard({message.topic for message in came})
+        elif timeout_s is not None and now - last >= timeout_s:
+            names = " or ".join(f"'{each.topic}'" for each in subscribers)
+            raise WaitTimeoutError(f"a message on {names}", timeout_s)
+        else:
+            waiting.look_again()
 
 
 def show_record(message: Message, fields: Fields | None = None) -> None:
@@ -110,7 +149,7 @@ def show_record(message: Message, fields: Fields | None = None) -> None:
         "codec": message.codec,
         "stamp_ns": message.stamp_ns,
         "seq": message.seq,
-        "publisher": message.publisher,
+        "publisher": None if message.publisher is None else str(message.publisher),
         "size_bytes": message.size_bytes,
     }
     if fields is not None and fields.names:
@@ -132,23 +171,31 @@ def show_record(message: Message, fields: Fields | None = None) -> None:
 class Lines:
     """Messages for people: when, which, how big, and what, coloured on a terminal."""
 
-    def __init__(self, fields: Fields | None = None) -> None:
+    def __init__(
+        self, fields: Fields | None = None, *, names_topic: bool = False, whole: bool = False
+    ) -> None:
+        """`names_topic`: several topics come; `whole`: nothing is shortened, as in a file."""
         self._fields = fields
+        self._names_topic = names_topic
         self._console = console()
         self._paint = json_painter() if self._console.is_terminal else None
+        self._whole = whole or self._paint is None
 
     def __call__(self, message: Message) -> None:
         """Show one message."""
         head = _head(message)
+        if self._names_topic:
+            head += f"  {escaped(message.topic)}"
+        room = self._console.width - len(head) - 2
         if self._fields is not None and self._fields.names:
             values = self._fields.of(message)
             if values is None:
                 return
-            body = _dump(self._fields.plain(values))
+            body = presented(self._fields.plain(values), whole=self._whole)
         else:
-            body = _body(message, self._console.width - len(head) - 2)
-        if self._paint is None:
-            print(f"{head}  {body}", flush=True)
+            body = _body(message, room, whole=self._whole)
+        if self._paint is None or len(body) > _COLOURED:
+            write(f"{head}  {body}\n")
         else:
             self._console.print(self._paint(head, body))
 
@@ -165,22 +212,36 @@ def _head(message: Message) -> str:
     return f"{stamp}{seq}"
 
 
-def _body(message: Message, room: int) -> str:
+def _body(message: Message, room: int, *, whole: bool) -> str:
     """What a message says: on one line if `room` letters are enough or nothing can be laid out."""
     if message.codec == "image":
         return _picture(message)
     try:
         payload = message.payload
     except DecodeError as error:
-        return (
+        said = (
             f"{size(message.size_bytes)}, no {message.codec}: {_hexadecimal(message.data)} ({error.reason})"
         )
+        return cleaned(said)
     if isinstance(payload, str):
-        return payload
+        return cleaned(payload if whole else shortened(payload, _SHOWN_LETTERS))
     if isinstance(payload, bytes):
         return f"{size(len(payload))}: {_hexadecimal(payload)}"
-    line = _dump(payload)
-    return line if len(line) <= room else "\n" + textwrap.indent(_dump(payload, indent=True), "  ")
+    # decoded JSON is written again in a hundredth of the time that looking at each value takes
+    is_exact = whole and message.codec == "json" and not _has_nan(message.data)
+    line = json_of(payload).decode() if is_exact else presented(payload, whole=whole)
+    if len(line) <= room:
+        return line
+    laid_out = (
+        json_of(payload, indent=True).decode() if is_exact else presented(payload, whole=whole, indent=True)
+    )
+    return "\n" + textwrap.indent(laid_out, "  ")
+
+
+def _has_nan(data: memoryview) -> bool:
+    """Whether JSON may hold NaN or infinity, as some programs of the original NEP send them."""
+    raw = bytes(data)
+    return b"NaN" in raw or b"Infinity" in raw
 
 
 def _hexadecimal(data: bytes | memoryview) -> str:
@@ -188,12 +249,12 @@ def _hexadecimal(data: bytes | memoryview) -> str:
 
 
 def _picture(message: Message) -> str:
-    shape, encoding = message.extension.get("shape"), message.extension.get("encoding", "picture")
-    if isinstance(shape, (list, tuple)) and len(shape) >= 2:
+    shape, told = message.extension.get("shape"), message.extension.get("encoding", "picture")
+    encoding = escaped(shortened(str(told), 40))
+    if (
+        isinstance(shape, (list, tuple))
+        and len(shape) >= 2
+        and all(isinstance(side, int) for side in shape[:2])
+    ):
         return f"{encoding} {shape[1]} x {shape[0]}, {size(message.size_bytes)}"
     return f"{encoding}, {size(message.size_bytes)}"
-
-
-def _dump(payload: object, *, indent: bool = False) -> str:
-    option = orjson.OPT_NON_STR_KEYS | (orjson.OPT_INDENT_2 if indent else 0)
-    return orjson.dumps(payload, default=str, option=option).decode()

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import time
+from collections.abc import Collection, Sequence
+from contextlib import suppress
 
+from nep.cli.screen import say
 from nep.errors import NepError, did_you_mean
 from nep.graph import GraphView
 from nep.nodes import Node
 from nep.wire import check_topic
+
+_AGAIN_S = 1.0
+_SLICE_S = 0.1
+_PATIENCE_S = 0.3
+"""A master that is away must not keep messages waiting, which do not need it."""
 
 
 def node_for(command: str, master: str | None) -> Node:
@@ -22,21 +30,63 @@ def look(master: str | None, timeout_s: float = 2.0) -> GraphView:
         return node.graph(timeout_s)
 
 
-def known_topics(node: Node, topics: Sequence[str]) -> dict[str, str]:
-    """The types of topics that are there. Raises `NepError` for one that is not, with the nearest name."""
-    known = node.graph().topics
-    for topic in topics:
-        if topic not in known:
-            check_topic(topic)
-            raise NepError(f"no topic '{topic}'; {nearest(topic, list(known))}")
-    return {topic: known[topic].msg_type for topic in topics}
+class Waiting:
+    """Topics that a command waits for: says which of them nobody publishes, when that is so and not again.
+
+    The graph is asked again only while no message comes.
+    """
+
+    def __init__(self, node: Node, topics: Sequence[str]) -> None:
+        """Raises `BadTopicError` for what is no topic."""
+        self._node = node
+        self._types = {check_topic(topic): "json" for topic in topics}
+        self._silent: set[str] = set()
+        self._had: set[str] = set()
+        self._look_at = 0.0
+
+    def msg_type(self, topic: str) -> str:
+        """The type that it has, "json" while nobody publishes it."""
+        return self._types[topic]
+
+    @property
+    def silent(self) -> frozenset[str]:
+        """Those that nobody publishes."""
+        return frozenset(self._silent)
+
+    def look(self, graph: GraphView) -> None:
+        """Say which of them nobody publishes, or publishes any more, with the name that may be meant."""
+        for topic in self._types:
+            known = graph.topics.get(topic)
+            if known is not None and known.publishers:
+                self._types[topic] = known.msg_type
+                self._had.add(topic)
+                self._silent.discard(topic)
+            elif topic not in self._silent:
+                self._silent.add(topic)
+                since = "any more" if topic in self._had else "yet"
+                others = [name for name, other in graph.topics.items() if name != topic and other.publishers]
+                say(f"nobody publishes '{topic}' {since}; {_meant(topic, others)}waiting, Ctrl+C ends it")
+        self._look_at = time.monotonic() + _AGAIN_S
+
+    def heard(self, topics: Collection[str]) -> None:
+        """Messages came: those are published."""
+        self._had.update(topics)
+        self._silent.difference_update(topics)
+        self._look_at = time.monotonic() + _AGAIN_S
+
+    def slice_s(self, timeout_s: float | None) -> float:
+        """How long to wait for a message until it is time to look again, or to give up."""
+        return _SLICE_S if timeout_s is None else min(_SLICE_S, max(0.0, timeout_s))
+
+    def look_again(self) -> None:
+        """Ask for the graph, if no message came for a while. A master that is away is waited for, too."""
+        if time.monotonic() >= self._look_at:
+            self._look_at = time.monotonic() + _AGAIN_S
+            with suppress(NepError):
+                self.look(self._node.graph(_PATIENCE_S))
 
 
-def nearest(topic: str, known: Sequence[str]) -> str:
-    """What to do about a topic that is not there."""
-    if not known:
-        return "nobody publishes anything yet, see 'nep topic list'"
-    if len(known) > 12:
-        near = did_you_mean(topic, known)
-        return near if near.startswith("did") else "see 'nep topic list'"
-    return did_you_mean(topic, known)
+def _meant(topic: str, names: Sequence[str]) -> str:
+    """Whether another topic was meant."""
+    near = did_you_mean(topic, names)
+    return f"{near} " if near.startswith("did") else ""

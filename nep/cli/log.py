@@ -11,10 +11,12 @@ import typer
 from nep.cli.complete import complete_node
 from nep.cli.graphs import node_for
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import console, say, show_json
+from nep.cli.screen import console, say, show_json, write
+from nep.cli.values import cleaned
 from nep.errors import DecodeError, did_you_mean
-from nep.logs import LEVELS, LOG_TOPIC, LOG_TYPE, LogRecord, level_of
+from nep.logs import LEVELS, LOG_TOPIC, LOG_TYPE, TEXT_LIMIT, LogRecord, level_of
 from nep.pubsub import Subscriber
+from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -80,9 +82,9 @@ def _show(record: LogRecord) -> None:
     out = console()
     moment = datetime.fromtimestamp(record.stamp_ns / 1e9, tz=timezone.utc).astimezone()
     stamp = moment.strftime("%H:%M:%S.%f")[:-3]
-    logger = f" [{record.name}]" if record.name and record.name != record.node else ""
+    logger = f" [{escaped(record.name)}]" if record.name and record.name != record.node else ""
     if not out.is_terminal:
-        print(f"{stamp}  {record.level:<8}  {record.node}{logger}  {record.text}", flush=True)
+        write(f"{stamp}  {record.level:<8}  {escaped(record.node)}{logger}  {cleaned(record.text)}\n")
         return
     out.print(_painted(stamp, record, logger))
 
@@ -90,8 +92,8 @@ def _show(record: LogRecord) -> None:
 def _painted(stamp: str, record: LogRecord, logger: str) -> Text:
     from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
-    style = _STYLES.get(record.level, "")
+    style, text = _STYLES.get(record.level, ""), cleaned(shortened(record.text, TEXT_LIMIT))
     return Text.assemble(
-        (stamp, "dim"), "  ", (f"{record.level:<8}", style), "  ", (record.node, "bold"), (logger, "dim"),
-        "  ", (record.text, style),
+        (stamp, "dim"), "  ", (f"{record.level:<8}", style), "  ", (escaped(record.node), "bold"),
+        (logger, "dim"), "  ", (text, style),
     )  # fmt: skip

@@ -13,6 +13,7 @@ import typer
 
 from nep.addresses import host_of, is_loopback, master_address
 from nep.cli.alert_printer import AlertLog, AlertPrinter
+from nep.cli.options import MasterOption
 from nep.cli.screen import console, say
 from nep.errors import AddressInUseError, NepError
 from nep.later import later
@@ -48,10 +49,14 @@ _OwnerOption = Annotated[
 
 
 def master(
+    master: MasterOption = None,
     port: Annotated[
         int | None,
         typer.Option(
-            min=1, max=65535, help="The port; else that of NEP_MASTER, else 7780.", show_default=False
+            min=1,
+            max=65535,
+            help="The port; else that of --master or NEP_MASTER, else 7780.",
+            show_default=False,
         ),
     ] = None,
     listen: _ListenOption = None,
@@ -67,7 +72,7 @@ def master(
 
     Messages never pass through it; while it is away, programs that have found each other go on.
     """
-    address = _address(port)
+    address = _address(master, port)
     logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
     running = _started(address, owner_pid, joins_originals=gateway)
     try:
@@ -101,8 +106,8 @@ def _started(address: str, owner_pid: int | None, *, joins_originals: bool) -> M
         raise NepError(hindered.as_error) from error
 
 
-def _address(port: int | None) -> str:
-    address = master_address()
+def _address(master: str | None, port: int | None) -> str:
+    address = master_address(master)
     if port is not None:
         address = f"{host_of(address)}:{port}"
     if not is_loopback(address):

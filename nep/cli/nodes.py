@@ -11,6 +11,7 @@ from nep.cli.graphs import look
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import UNKNOWN, Column, duration, say, show_alerts, show_json, show_table
 from nep.graph import GraphView, NodeInfo
+from nep.text import escaped
 
 app = typer.Typer(no_args_is_help=True, help="The programs that are there.")
 _COLUMNS = (
@@ -50,14 +51,14 @@ def list_nodes(master: MasterOption = None, as_json: JsonOption = False) -> None
 def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
     topics = _topics_of(graph, node)
     return (
-        node.name,
-        node.language or UNKNOWN,
-        _WIRES.get(node.generation, node.generation),
+        escaped(node.name),
+        escaped(node.language) or UNKNOWN,
+        escaped(_WIRES.get(node.generation, node.generation)),
         str(node.pid) if node.pid is not None else UNKNOWN,
         duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
         UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",
-        "\n".join(topics["publishes"]) or UNKNOWN,
-        "\n".join(topics["subscribes"]) or UNKNOWN,
+        "\n".join(map(escaped, topics["publishes"])) or UNKNOWN,
+        "\n".join(map(escaped, topics["subscribes"])) or UNKNOWN,
     )
 
 

@@ -6,6 +6,8 @@ import itertools
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
@@ -16,8 +18,10 @@ from nep.cli.complete import complete_topic
 from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say
+from nep.codecs import CODECS, codec_for
 from nep.errors import EncodeError, NepError
 from nep.pubsub import Publisher
+from nep.views import TopicInfo
 
 _SHOWN = 40
 _TEXT_TYPES = frozenset({"string"})
@@ -76,6 +80,7 @@ def publish(
     with node_for("pub", master) as node:
         known = node.graph().topics.get(topic)
         kind = msg_type or (known.msg_type if known else "json")
+        _warn_of_type(topic, kind, known)
         value = None if payload == "-" else value_of(payload, kind)
         with node.new_pub(topic, kind, latched=latched) as publisher:
             if payload == "-":
@@ -88,13 +93,26 @@ def publish(
                 _wait_for_ever()
 
 
+def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
+    """Say that others publish the topic with another type, or that a type is nearly the name of a codec."""
+    if known is not None and known.publishers and known.msg_type != kind:
+        say(f"'{topic}' is published with the type '{known.msg_type}'; yours is '{kind}'")
+    elif (
+        codec_for(kind).name == "json" and (near := get_close_matches(kind, CODECS, n=1)) and near[0] != kind
+    ):
+        say(f"the type '{kind}' is sent as JSON; did you mean '{near[0]}'?")
+
+
 def value_of(text: str, msg_type: str) -> object:
     """The payload that `text` stands for. Raises `NepError` with a sentence."""
     if text.startswith("@"):
         data = _read(Path(text[1:]), msg_type)
         if msg_type in _BYTE_TYPES:
             return data
-        text = data.decode("utf-8", "replace")
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise NepError(f"byte {error.start + 1} of '{text[1:]}' is no UTF-8; save it as UTF-8") from error
     if msg_type in _TEXT_TYPES:
         return text
     if msg_type == "bytes":
@@ -114,12 +132,29 @@ def _read(file: Path, msg_type: str) -> bytes:
         return file.read_bytes()
     except OSError as error:
         raise EncodeError(msg_type, "file", f"'{file}' cannot be read: {error.strerror}") from error
+    except ValueError as error:  # letters that no file's name has here
+        raise EncodeError(msg_type, "file", f"'{file}' is no name of a file here") from error
 
 
 def _publish_lines(publisher: Publisher, msg_type: str) -> None:
-    """Publish each line of the standard input."""
-    for line in sys.stdin:
-        publisher.publish(value_of(line.rstrip("\r\n"), msg_type))
+    """Publish each line of the standard input, which is UTF-8 or, on a terminal, what that has."""
+    for number, line in enumerate(_lines(), 1):
+        data = line.rstrip(b"\r\n")
+        if msg_type == "bytes":
+            publisher.publish(data)
+            continue
+        try:
+            text = data.decode()
+        except UnicodeDecodeError as error:
+            where = f"byte {error.start + 1} of line {number}"
+            raise NepError(f"{where} is no UTF-8; save the text as UTF-8, or use --type bytes") from error
+        publisher.publish(value_of(text, msg_type))
+
+
+def _lines() -> Iterator[bytes]:
+    if sys.stdin.isatty():  # the console of Windows has letters, not bytes
+        return (line.encode("utf-8", "surrogateescape") for line in sys.stdin)
+    return iter(sys.stdin.buffer)
 
 
 def _repeat(publisher: Publisher, value: object, rate_hz: float, count: int) -> None:

@@ -13,10 +13,11 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_topic
-from nep.cli.graphs import known_topics, node_for
+from nep.cli.graphs import Waiting, node_for
 from nep.cli.measure import Frequency, Traffic, Window
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, rate, say, show_json, size
+from nep.cli.screen import UNKNOWN, rate, say, show_json, size, write
+from nep.errors import WaitTimeoutError
 from nep.message import Message
 from nep.nodes import Node
 from nep.pubsub import Subscriber
@@ -43,6 +44,12 @@ WindowOption = Annotated[
 CountOption = Annotated[
     int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N reports; 0 goes on.")
 ]
+TimeoutOption = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout", metavar="SECONDS", help="End when no message came for so long.", show_default=False
+    ),
+]
 Figures = Mapping[str, object]
 
 
@@ -52,6 +59,7 @@ def hz(
     count: CountOption = 0,
     master: MasterOption = None,
     as_json: JsonOption = False,
+    timeout_s: TimeoutOption = None,
 ) -> None:
     """Show how often topics are published: rate, and the gaps between messages. Ctrl+C ends it.
 
@@ -59,7 +67,7 @@ def hz(
     original NEP, which send no time, by when their messages arrive here.
     """
     heads = ("rate", "shortest", "longest", "std dev", "messages", "lost")
-    _Report(topics, window_s, heads, _frequency_cells).run(count, master, as_json=as_json)
+    _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, as_json=as_json)
 
 
 def bw(
@@ -68,10 +76,11 @@ def bw(
     count: CountOption = 0,
     master: MasterOption = None,
     as_json: JsonOption = False,
+    timeout_s: TimeoutOption = None,
 ) -> None:
     """Show how much topics carry: bytes a second, and how large their messages are. Ctrl+C ends it."""
     heads = ("bandwidth", "mean", "smallest", "largest", "messages", "lost")
-    _Report(topics, window_s, heads, _traffic_cells).run(count, master, as_json=as_json)
+    _Report(topics, window_s, heads, _traffic_cells).run(count, timeout_s, master, as_json=as_json)
 
 
 class _Report:
@@ -88,17 +97,21 @@ class _Report:
         self._heads = heads
         self._figures = figures
         self._subscribers: dict[str, Subscriber] = {}
+        self._totals: dict[str, int] = {}
+        self._heard_at = time.monotonic()
         self._width = max(_NARROWEST, *(len(topic) for topic in topics))
 
-    def run(self, count: int, master: str | None, *, as_json: bool) -> None:
-        """Report until Ctrl+C, or `count` times. Raises `NepError` for a topic that is not there."""
+    def run(self, count: int, timeout_s: float | None, master: str | None, *, as_json: bool) -> None:
+        """Report until Ctrl+C, or `count` times. Raises `BadTopicError`, `WaitTimeoutError`."""
         with ExitStack() as opened, node_for("measure", master) as node:
-            types = known_topics(node, list(self._windows))
-            for topic, msg_type in types.items():
-                self._subscribers[topic] = opened.enter_context(self._listen(node, topic, msg_type))
+            waiting = Waiting(node, list(self._windows))
+            waiting.look(node.graph())
+            for topic in self._windows:
+                heard = self._listen(node, topic, waiting.msg_type(topic))
+                self._subscribers[topic] = opened.enter_context(heard)
             if not as_json:
                 say("measuring; Ctrl+C ends it")
-                print(self._line("topic", self._heads), flush=True)
+                write(f"{self._line('topic', self._heads)}\n")
             never, started = threading.Event(), time.monotonic()
             for number in itertools.count(1):
                 while (left := started + number * _EVERY_S - time.monotonic()) > 0:
@@ -107,6 +120,20 @@ class _Report:
                     (self._show_json if as_json else self._show)(topic)
                 if number == count:
                     return
+                self._judge(waiting, timeout_s)
+
+    def _judge(self, waiting: Waiting, timeout_s: float | None) -> None:
+        """Say what is published no more; raises `WaitTimeoutError` when nothing came for so long."""
+        totals = {topic: window.total for topic, window in self._windows.items()}
+        came = {topic for topic, total in totals.items() if total != self._totals.get(topic, 0)}
+        now = time.monotonic()
+        if came:
+            self._totals, self._heard_at = totals, now
+            waiting.heard(came)
+        if timeout_s is not None and now - self._heard_at >= timeout_s:
+            raise WaitTimeoutError(f"a message on {' or '.join(map(repr, totals))}", timeout_s)
+        if len(came) < len(totals):
+            waiting.look_again()
 
     def _listen(self, node: Node, topic: str, msg_type: str) -> Subscriber:
         window = self._windows[topic]
@@ -123,7 +150,7 @@ class _Report:
         found, cells = self._figures(self._windows[topic], time.monotonic())
         lost = self._subscribers[topic].lost
         known = str(found.messages) if found else "0"
-        print(self._line(topic, (*cells, known, UNKNOWN if lost is None else str(lost))), flush=True)
+        write(f"{self._line(topic, (*cells, known, UNKNOWN if lost is None else str(lost)))}\n")
 
     def _show_json(self, topic: str) -> None:
         found, _ = self._figures(self._windows[topic], time.monotonic())

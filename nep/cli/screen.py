@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-import orjson
+from nep.cli.values import json_of
+from nep.streams import tell
+from nep.text import escaped
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,7 +44,13 @@ def console(*, stderr: bool = False) -> Console:
     """A console for coloured text; rich is loaded when the first one is made."""
     from rich.console import Console  # noqa: PLC0415 - 40 ms that `--json` and `--help` need not wait for
 
-    return Console(stderr=stderr, highlight=False, soft_wrap=True)
+    class Ours(Console):
+        """Tells of a reader that has left as every stream does."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError(errno.EPIPE, "nobody reads the output any more")
+
+    return Ours(stderr=stderr, highlight=False, soft_wrap=True)
 
 
 def json_painter() -> Callable[[str, str], Text]:
@@ -62,7 +72,7 @@ def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None
     """A table on the standard output."""
     is_terminal = sys.stdout.isatty()  # else a file or a program: nothing to fold for
     room = shutil.get_terminal_size().columns if is_terminal else _ENDLESS
-    lines = list(rows)
+    lines = [[escaped(cell, lines=True) for cell in row] for row in rows]
     widths = _widths(columns, lines, room)
     if len(lines) > _LONG and _fit(lines, widths):
         sys.stdout.write("".join(f"{line}\n" for line in _laid_out(columns, lines, widths)))
@@ -130,30 +140,35 @@ def show_alerts(alerts: Iterable[Alert]) -> None:
     from rich.text import Text  # noqa: PLC0415 - see `console`
 
     for alert in alerts:
-        text = Text.assemble(("! ", "yellow bold"), (alert.sentence, "yellow"))
+        text = Text.assemble(("! ", "yellow bold"), (escaped(alert.sentence), "yellow"))
         if alert.hint:
-            text.append(f"\n  {alert.hint}", style="dim")
-        console(stderr=True).print(text)
+            text.append(f"\n  {escaped(alert.hint)}", style="dim")
+        with suppress(OSError):  # nobody reads it
+            console(stderr=True).print(text)
 
 
 def say(sentence: str) -> None:
     """A sentence beside the results, on the standard error stream."""
-    console(stderr=True).print(sentence, style="dim", markup=False)
+    with suppress(OSError):  # nobody reads it
+        console(stderr=True).print(escaped(sentence), style="dim", markup=False)
 
 
 def say_error(sentence: str) -> None:
     """What went wrong, on the standard error stream."""
-    print(
-        f"nep: {sentence}", file=sys.stderr
-    )  # no rich: an error is shown at once and can be read by programs
+    tell(f"nep: {escaped(sentence, lines=True)}")  # no rich: it is shown at once and programs can read it
+
+
+def write(text: str) -> None:
+    """Text on the standard output, at once."""
+    sys.stdout.write(text)
+    sys.stdout.flush()
 
 
 def show_json(value: object) -> None:
-    """One JSON text on one line, at once."""
-    sys.stdout.buffer.write(
-        orjson.dumps(value, default=_plain, option=orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
-        + b"\n"
-    )
+    """One JSON text on one line, at once: UTF-8, whatever the terminal has."""
+    data = json_of(value) + b"\n"
+    sys.stdout.flush()
+    sys.stdout.buffer.write(data)
     sys.stdout.buffer.flush()
 
 
@@ -185,8 +200,3 @@ def duration(seconds: float) -> str:
     if seconds < 86400:
         return f"{seconds / 3600:.1f} h"
     return f"{seconds / 86400:.1f} d"
-
-
-def _plain(value: object) -> object:
-    """What orjson does not know: bytes as their hexadecimal digits, everything else as text."""
-    return value.hex() if isinstance(value, (bytes, bytearray, memoryview)) else str(value)

@@ -8,12 +8,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-import orjson
-
 from nep.cli.fields import MISSING, Path, parse_path, pick
 from nep.cli.screen import say
+from nep.cli.values import json_of
 from nep.errors import DecodeError
 from nep.message import Message
+from nep.text import escaped
 
 __all__ = ["Fields", "Table"]
 
@@ -70,18 +70,25 @@ class Fields:
 class Table:
     """Rows of comma-separated values: when each message was published (s since 1970), then its fields."""
 
-    def __init__(self, fields: Fields, out: Writes | None = None) -> None:
+    def __init__(self, fields: Fields, out: Writes | None = None, *, names_topic: bool = False) -> None:
+        """`names_topic`: several topics come, and a column tells which."""
         self._fields = fields
+        self._names_topic = names_topic
+        # a file is for programs, which get what was sent; a terminal obeys some letters
+        self._clean = escaped if out is None and sys.stdout.isatty() else str
         self._out = out or _unchanged_stdout()
         self._write = csv.writer(self._out, lineterminator="\r\n").writerow
-        self._write([STAMP, *fields.names])
+        self._write([STAMP, *(["topic"] if names_topic else []), *fields.names])
         self._out.flush()
 
     def __call__(self, message: Message) -> None:
         """Write one message."""
         values = self._fields.of(message)
         if values is not None:
-            self._write([_stamp(message.stamp_ns), *map(_cell, values)])
+            topic = [message.topic] if self._names_topic else []
+            self._write(
+                [self._clean(each) for each in (_stamp(message.stamp_ns), *topic, *map(_cell, values))]
+            )
             self._out.flush()
 
 
@@ -89,7 +96,7 @@ def _unchanged_stdout() -> Writes:
     """The standard output without translation of line ends, which Windows would double."""
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure is not None:
-        reconfigure(newline="", encoding="utf-8")
+        reconfigure(newline="", encoding="utf-8", errors="backslashreplace")
     return sys.stdout
 
 
@@ -103,7 +110,7 @@ def _cell(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (Mapping, list, tuple)):
-        return orjson.dumps(value, default=str, option=orjson.OPT_NON_STR_KEYS).decode()
+        return json_of(value).decode()
     if isinstance(value, (bytes, bytearray, memoryview)):
         return bytes(value).hex()
     return str(value)

@@ -12,7 +12,9 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
 from nep.cli.rates import bw, hz
 from nep.cli.screen import UNKNOWN, Column, rate, say, show_alerts, show_json, show_table, size
+from nep.cli.values import ids_as_text
 from nep.graph import GraphView, TopicInfo
+from nep.text import escaped
 
 app = typer.Typer(no_args_is_help=True, help="What is published: list it, look into it, measure it, publish.")
 app.command("echo")(echo)
@@ -36,7 +38,7 @@ def list_topics(master: MasterOption = None, as_json: JsonOption = False) -> Non
     graph = look(master)
     topics = [graph.topics[name] for name in sorted(graph.topics)]
     if as_json:
-        show_json([asdict(topic) for topic in topics])
+        show_json(ids_as_text([asdict(topic) for topic in topics]))
         return
     if topics:
         show_table(_COLUMNS, [_row(graph, topic) for topic in topics])
@@ -47,8 +49,8 @@ def list_topics(master: MasterOption = None, as_json: JsonOption = False) -> Non
 
 def _row(graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
     return (
-        topic.name,
-        topic.msg_type,
+        escaped(topic.name),
+        escaped(topic.msg_type),
         _names(graph, [each.node_id for each in topic.publishers]),
         _names(graph, [each.node_id for each in topic.subscribers]),
         rate(topic.rate_hz),
@@ -61,4 +63,4 @@ def _names(graph: GraphView, node_ids: list[str]) -> str:
     nodes = [graph.nodes[each] for each in node_ids if each in graph.nodes]
     originals = any(node.generation not in {"native", "gateway"} for node in nodes)
     named = [node.name for node in nodes if not (originals and node.generation == "gateway")]
-    return "\n".join(dict.fromkeys(named)) or UNKNOWN
+    return "\n".join(dict.fromkeys(map(escaped, named))) or UNKNOWN

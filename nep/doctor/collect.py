@@ -23,6 +23,7 @@ from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
 from nep.later import later
 from nep.nodes import Node
+from nep.version import __version__
 from nep.views import GraphView
 
 if TYPE_CHECKING:
@@ -139,12 +140,8 @@ def loopback_problem() -> str:
 
 
 def _versions() -> dict[str, str]:
-    try:
-        own = metadata.version("nep-studio")
-    except metadata.PackageNotFoundError:
-        own = "(not installed)"
     return {
-        "NEP Studio": own,
+        "NEP Studio": __version__,
         "Python": platform.python_version(),
         "pyzmq": zmq.pyzmq_version(),
         "libzmq": zmq.zmq_version(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -251,3 +252,58 @@ def test_the_program_text_runs_as_a_file(master, pepper, tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
     assert pepper.commands[-1]["op"] == "stop"
+
+
+class Lost(io.StringIO):
+    """An output that takes nothing any more after some lines."""
+
+    def __init__(self, number: int, lines: int) -> None:
+        super().__init__()
+        self._number, self._lines = number, lines
+
+    def write(self, text: str) -> int:
+        if self.getvalue().count("\n") >= self._lines:
+            raise OSError(self._number, os.strerror(self._number))
+        return super().write(text)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.EPIPE, ""),
+        (errno.ENOSPC, "the output cannot be written: no space left on device; the behaviour was stopped.\n"),
+    ],
+)
+def test_an_output_that_is_gone_stops_the_behaviour_and_its_robots(pepper, saved, capsys, number, said):
+    path = saved(workspace(started(say("Hi"), write(text("one")), write(text("two")), say("never"))))
+    assert run_file(path, out=Lost(number, 1)) == FAILED
+    assert capsys.readouterr().err == said
+    assert pepper.commands[-1]["op"] == "stop"
+    assert "never" not in [each.get("input") for each in pepper.commands]
+
+
+def test_what_a_behaviour_writes_cannot_steer_the_terminal(pepper, saved):
+    code, out = run(saved(workspace(started(write(text("a\x1b[2Jb"))))))
+    assert code == OK
+    assert "a\\x1b[2Jb" in out.splitlines()
+
+
+@pytest.mark.parametrize("page", ["cp437", "ascii"])
+def test_it_says_everything_in_every_code_page(master, saved, page):
+    path = saved(workspace(started(write(text("\u2013 “😀”")))))
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "run", str(path)],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": page, "PYTHONUTF8": "0"},
+        timeout=30,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (OK, b"")
+    assert b'- "?"' in done.stdout
+    assert b'"Test" runs' in done.stdout
+
+
+def test_a_master_whose_name_nobody_knows(saved):
+    code, out = run(saved(workspace(started(say("Hi")))), master="nosuchhost.invalid:7781")
+    assert code == UNUSABLE
+    assert out.startswith("no computer is called 'nosuchhost.invalid' here; ")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -105,6 +106,56 @@ def test_help_is_in_plain_words_and_names_all_commands():
     assert all(word in run("topic", "--help").stdout for word in ("list", "echo", "pub"))
 
 
+def test_the_version_is_that_of_the_package():
+    assert run("--version").stdout == f"nep {nep.__version__}\n"
+    told = re.search(r'^__version__ = "(.+)"$', (REPOSITORY / "nep" / "version.py").read_text(), re.MULTILINE)
+    assert told is not None
+    assert nep.__version__ == told[1]
+
+
+def test_the_master_can_be_named_before_and_behind_the_command(running_master, monkeypatch):
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
+    for words in (
+        ("--master", running_master.address, "topic", "list"),
+        ("topic", "list", "--master", running_master.address),
+    ):
+        assert run(*words).returncode == 0
+    assert run("master", "--master", running_master.address).stderr.startswith(
+        "nep: a master already runs at"
+    )
+
+
+def test_a_name_that_no_computer_has_is_the_right_sentence():
+    done = run("--master", "nosuchhost.invalid:7781", "topic", "list")
+    assert done.returncode == 1
+    assert done.stderr.startswith("nep: no computer is called 'nosuchhost.invalid' here; ")
+    assert run("--master", "not an address", "topic", "list").stderr.startswith(
+        "nep: 'not an address:7780' is no"
+    )
+
+
+def test_a_type_that_is_wrong_is_warned_of(running_master):
+    with nep.node("talker") as node:
+        node.new_pub("/odom")
+        done = run("topic", "pub", "/odom", "text", "--type", "string")
+        assert done.returncode == 0
+        assert "'/odom' is published with the type 'json'; yours is 'string'" in done.stderr
+    assert "did you mean 'string'?" in run("topic", "pub", "new", "1", "--type", "strng").stderr
+
+
+def test_lines_that_are_no_utf8_are_a_sentence(running_master):
+    done = subprocess.run(
+        [sys.executable, "-m", "nep", "topic", "pub", "t", "-"],
+        input=b'{"n": 1}\n\xff\xfe\n',
+        capture_output=True,
+        timeout=LONG_S,
+        env=environment(),
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith(b"nep: byte 1 of line 2 is no UTF-8; ")
+
+
 def test_a_wrong_command_is_a_sentence_and_code_2():
     done = run("topic", "frobnicate")
     assert done.returncode == 2
@@ -133,6 +184,7 @@ def test_lists_are_tables_for_people_and_json_for_programs(running_master):
             assert "Pepper" in run("node", "list").stdout
         assert pub.topic in shown
         assert [topic["name"] for topic in topics] == ["/Pepper/battery"]
+        assert topics[0]["publishers"][0]["id"] == str(pub.id), "readers with floats alone would lose digits"
         assert {(each["name"], *each["publishes"], *each["subscribes"]) for each in nodes} == {
             ("Pepper", "/Pepper/battery"),
             ("page", "/Pepper/battery"),

@@ -10,7 +10,7 @@ import pytest
 import nep
 from nep.cli.measure import MOST, Window
 from nep.cli.rates import bw, gap, hz
-from nep.errors import BadTopicError, NepError
+from nep.errors import BadTopicError, WaitTimeoutError
 
 
 def test_gaps_are_those_of_the_publishers_clock():
@@ -106,13 +106,30 @@ def test_bw_reports_sizes_to_people(published, capsys):
     assert "Ctrl+C" in shown.err
 
 
-def test_a_topic_that_is_not_there_is_a_sentence_with_the_nearest(published):
-    with pytest.raises(NepError, match=r"no topic '/odm'; did you mean '/odom'\?"):
-        hz(["/odm"], 10.0, 1, published)
+def test_a_topic_that_is_not_there_is_waited_for_with_the_nearest_name(published, capsys):
+    with pytest.raises(WaitTimeoutError, match=r"'/odm' did not come within 0\.5 s"):
+        hz(["/odm"], 10.0, 0, published, timeout_s=0.5)
+    assert "nobody publishes '/odm' yet; did you mean '/odom'? waiting" in capsys.readouterr().err
     with pytest.raises(BadTopicError):
         bw(["bad topic"], 10.0, 1, published)
 
 
-def test_with_no_topics_at_all_it_says_so(master):
-    with pytest.raises(NepError, match="nobody publishes anything yet"):
-        hz(["/odom"], 10.0, 1, master.address)
+def test_what_comes_later_is_measured(master, capsys):
+    ended = threading.Event()
+
+    def publish_late(node):
+        pub = node.new_pub("/odom")
+        while not ended.wait(0.02):
+            pub.publish({"x": 1})
+
+    with nep.node("talker") as node:
+        talking = threading.Thread(target=publish_late, args=(node,))
+        seen = threading.Timer(0.2, talking.start)
+        seen.start()
+        hz(["/odom"], 10.0, 2, master.address)
+        ended.set()
+        seen.join()
+        talking.join()
+    shown = capsys.readouterr()
+    assert int(shown.out.splitlines()[-1].split()[-2]) > 1
+    assert "nobody publishes '/odom' yet; waiting" in shown.err

@@ -26,7 +26,7 @@ def test_a_record_has_all_that_a_message_has(capfdbinary):
         "codec": "json",
         "stamp_ns": 1_700_000_000_123_000_000,
         "seq": 7,
-        "publisher": 9,
+        "publisher": "9",
         "size_bytes": 15,
         "payload": {"a": "Grüße"},
     }

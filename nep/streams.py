@@ -1,0 +1,89 @@
+"""The standard streams of a command: every letter can be written, and an output that is gone is no crash.
+
+A pipe of Windows is cp1252 or cp437, one of a bare server ASCII: none of them has all the letters that
+programs and people use. A reader may leave (`| head -1`), a disk may be full, a stream may be closed before
+the program starts.
+"""
+
+from __future__ import annotations
+
+import codecs
+import errno
+import os
+import sys
+from contextlib import suppress
+from io import TextIOWrapper
+
+__all__ = ["close_streams", "output_problem", "prepare_streams", "tell", "words_given"]
+
+_PLAIN = {
+    **dict.fromkeys("\u2010\u2011\u2013\u2014\u2212─━·", "-"),  # dashes, minus, lines
+    **dict.fromkeys("\u2018\u2019", "'"), **dict.fromkeys("“”„", '"'), **dict.fromkeys("\u00a0\u202f", " "),
+    **dict.fromkeys("●•", "*"), "│": "|", "…": "...", "→": "->", "←": "<-", "↔": "<->", "✗": "x", "✓": "+",
+    "≤": "<=", "≥": ">=", "\u00d7": "x", "°": " deg",
+}  # fmt: skip
+_HANDLER = "nep.plain"
+_GONE = frozenset({errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])})
+"""What writing into a pipe gives that nobody reads any more; Windows calls it an invalid argument."""
+
+
+def prepare_streams() -> None:
+    """Let the standard streams take every letter; what their encoding does not have becomes a plainer one.
+
+    A stream that was closed before the program started becomes the null device: its descriptor must not be
+    given to a socket, which would then be written to.
+    """
+    codecs.register_error(_HANDLER, _plainer)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - lives on
+        elif mode == "w" and isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors=_HANDLER)
+
+
+def words_given() -> list[str]:
+    """The words of the command line, as UTF-8 also where the system is set to ASCII ("C")."""
+    if os.name != "posix":
+        return sys.argv[1:]
+    escape = "surrogateescape"
+    return [word.encode("utf-8", escape).decode("utf-8", escape) for word in sys.argv[1:]]
+
+
+def _plainer(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    letters = error.object[error.start : error.end]
+    return "".join(_PLAIN.get(letter, "?") for letter in letters), error.end
+
+
+def tell(text: str) -> None:
+    """Write a line beside the results, on the error stream; without one that takes it, nothing happens."""
+    with suppress(OSError, ValueError):
+        print(text, file=sys.stderr, flush=True)  # noqa: T201 - it is a command's
+
+
+def output_problem() -> str | None:
+    """Why the standard output takes nothing more; "" when its reader has left, None when it does take it.
+
+    Asked after an OSError: what could not be written is still there, so that writing it fails again.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        return "" if error.errno in _GONE else (error.strerror or str(error)).lower()
+    except ValueError:  # it was closed
+        return ""
+    return None
+
+
+def close_streams() -> None:
+    """Write what is left, or drop it where that fails: the interpreter would complain at its end."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with suppress(OSError, ValueError):
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, stream.fileno())
+                os.close(nowhere)

@@ -1,0 +1,197 @@
+"""What commands show of payloads: whole for programs, and for people what fits; nothing ends them."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import re
+import threading
+
+import orjson
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nep
+from nep.cli.echo import Lines, echo, show_record, sorted_out
+from nep.cli.values import ids_as_text, json_of, presented
+from nep.errors import WaitTimeoutError
+from nep.message import Message
+from nep.packing import pack
+
+DEEP = b"[" * 900 + b"]" * 900
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=6) | st.binary(max_size=6),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(st.text(max_size=4) | st.integers() | st.binary(max_size=3), inner, max_size=3)
+    ),
+    max_leaves=12,
+)
+
+
+@given(ANYTHING)
+def test_whatever_was_decoded_becomes_json_that_can_be_read(value):
+    json.loads(json_of(value))
+    assert "\n" not in json_of(value).decode()
+    assert presented(value, whole=True) is not None
+    assert presented(value, whole=False, indent=True) is not None
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        ([math.nan, math.inf, -math.inf, 1.5], "[nan,inf,-inf,1.5]"),
+        (list(range(1000)), "[0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,… 980 more]"),
+        ({"picture": "x" * 5000}, '{"picture":"' + "x" * 500 + '… (5000 characters)"}'),
+        (b"\x00\xff", '"00ff"'),
+        (2**70, f'"{2**70}"'),
+        ({b"\x01": 1}, '{"01":1}'),
+    ],
+)
+def test_what_a_terminal_shows(value, shown):
+    assert presented(value, whole=False) == shown
+
+
+def test_many_fields_are_counted_and_all_of_them_are_there_when_asked_for():
+    many = {f"field{number}": number for number in range(10_000)}
+    shown = presented(many, whole=False)
+    assert shown.endswith('"field99":99,"…":"9900 more"}')
+    assert json.loads(presented(many, whole=True)) == many
+
+
+def test_letters_that_a_terminal_obeys_are_json_all_the_same():
+    value = {"a\x9b": "\x7f\u202e\u2028"}
+    data = json_of(value)
+    assert data.isascii()
+    assert json.loads(data) == value
+
+
+def test_ids_are_texts_wherever_they_are():
+    assert ids_as_text({"id": 2**60, "publishers": ({"id": 7, "count": 7},), "name": "x"}) == {
+        "id": str(2**60), "publishers": [{"id": "7", "count": 7}], "name": "x",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Message("t", DEEP, "json", "json"),
+        Message("t", b'{"a": NaN, "b": 123456789012345678901234567890}', "json", "json"),
+        Message("t", b'["\\ud800"]', "json", "json"),
+        Message("t", b"\xff\xfe{", "json", "json"),
+        Message("t", b"\xff\xfe", "string", "string"),
+        Message("t", pack({1: b"\x00", b"k": [2**64 - 1]}), "msgpack", "msgpack"),
+        Message("t", b"x", "image", "image", extension={"shape": ["\x1b[2J", 2], "encoding": "\x1b[2J" * 99}),
+        Message("t", b"x", "none such", "json"),
+        Message("t", b"1", "json", "json", stamp_ns=2**64 - 1, seq=2**64 - 1),
+    ],
+)
+def test_no_message_ends_a_command(message, capsys):
+    show_record(message)
+    Lines()(message)
+    out = capsys.readouterr().out
+    assert json.loads(out.splitlines()[0])["topic"] == "t"
+    assert "\x1b" not in out
+
+
+def test_a_text_of_lines_cannot_look_like_another_message(capsys):
+    Lines()(Message("t", b"one\n12:00:00.000  #9  forged\x1b[2J", "string", "string"))
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "    12:00:00.000  #9  forged\\x1b[2J"
+
+
+class Terminal(io.StringIO):
+    """A standard output that is a terminal."""
+
+    encoding = "utf-8"
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("more", [{}, {"NO_COLOR": "1"}, {"TERM": "dumb"}, {"COLUMNS": "20"}])
+def test_a_terminal_gets_what_fits_and_all_of_it_with_full(monkeypatch, more):
+    for name, value in {"TERM": "xterm", "COLUMNS": "100", **more}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("sys.stdout", screen := Terminal())
+    long = Message("t", orjson.dumps({"joints": list(range(5000)), "note": "\x1b[2J"}), "json", "json", seq=1)
+    Lines()(long)
+    short = screen.getvalue()
+    assert "\x1b[2J" not in short
+    assert "… 4980 more" in re.sub(r"\x1b\[[0-9;]*m", "", short)
+    assert bool(re.search(r"\x1b\[(\d;)?3\dm", short)) == (not more.keys() & {"NO_COLOR", "TERM"})
+    assert more.get("TERM") != "dumb" or "\x1b" not in short
+    Lines(whole=True)(long)
+    assert "4999" in screen.getvalue()
+
+
+@pytest.fixture
+def robots(master):
+    with nep.node("robots") as node:
+        for name, value in (("/a", {"x": 1}), ("/b", {"x": 2}), ("battery", {"x": 3, "battery": 7})):
+            node.new_pub(name, latched=True).publish(value)
+        yield node, master.address
+
+
+def test_two_topics_are_shown_together_by_name(robots, capsys):
+    _, address = robots
+    echo("/a", ["/b"], 2, 5.0, address)
+    lines = sorted(line.split("  ", 1)[1] for line in capsys.readouterr().out.splitlines())
+    assert lines == ['#1  /a  {"x":1}', '#1  /b  {"x":2}']
+    echo("/a", ["/b", "x"], 2, 5.0, address, as_csv=True)
+    head, *rows = capsys.readouterr().out.splitlines()
+    assert head == "stamp_s,topic,x"
+    assert sorted(row.split(",", 1)[1] for row in rows) == ["/a,1", "/b,2"]
+
+
+def test_which_words_are_topics_and_which_are_fields(robots, capsys):
+    node, _ = robots
+    graph = node.graph()
+    assert sorted_out("/a", ["x", "/b", "joints[0]", "/later"], graph) == (
+        ["/a", "/b", "/later"],
+        ["x", "joints[0]"],
+    )
+    assert sorted_out("/a", ["battery"], graph) == (["/a", "battery"], [])
+    assert "write .battery for a field" in capsys.readouterr().err
+    assert sorted_out("/a", [".battery"], graph) == (["/a"], [".battery"])
+
+
+def test_what_was_lost_between_is_said(master, capsys):
+    with nep.node("talker") as node:
+        pub = node.new_pub("t")
+        running = threading.Thread(target=echo, args=("t", None, 2, 10.0, master.address))
+        running.start()
+        while not pub.subscribers:
+            threading.Event().wait(0.01)
+        pub.publish(1)
+        outlet = pub._outlet
+        for _ in range(3):
+            outlet.skip()
+        pub.publish(2)
+        running.join()
+    assert "3 messages of 't' did not arrive here" in capsys.readouterr().err
+
+
+def test_a_topic_that_goes_away_or_has_another_name_now_is_said(master, capsys):
+    with nep.node("talker") as node:
+        pub = node.new_pub("/odom", latched=True)
+        pub.publish(1)
+        ended = []
+
+        def follow():
+            try:
+                echo("/odom", None, 0, 3.0, master.address)
+            except WaitTimeoutError as error:
+                ended.append(error)
+
+        running = threading.Thread(target=follow)
+        running.start()
+        while not pub.subscribers:
+            threading.Event().wait(0.01)
+        pub.close()
+        node.new_pub("/odom2")
+        running.join()
+    assert len(ended) == 1
+    assert "nobody publishes '/odom' any more; did you mean '/odom2'? waiting" in capsys.readouterr().err
