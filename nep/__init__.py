@@ -20,6 +20,7 @@ from nep.errors import (
     MasterUnreachable,
     NepError,
     RequestRefusedError,
+    TooManyFilesError,
     UnknownBackendError,
     WaitTimeoutError,
 )
@@ -56,6 +57,7 @@ __all__ = [
     "RequestRefusedError",
     "Subscriber",
     "SubscriberInfo",
+    "TooManyFilesError",
     "TopicInfo",
     "UnknownBackendError",
     "WaitTimeoutError",

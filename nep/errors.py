@@ -11,6 +11,7 @@
     ├── MasterUnreachable       no master answers
     ├── RequestRefusedError     the master answered with an error
     ├── AddressInUseError       another program holds the address
+    ├── TooManyFilesError       this process may not open more files
     ├── EncodeError             a payload cannot become bytes
     ├── DecodeError             bytes cannot become a payload
     │   └── WireError               parts that are no message of the native wire
@@ -39,6 +40,7 @@ __all__ = [
     "PluginsMissingError",
     "RecordingError",
     "RequestRefusedError",
+    "TooManyFilesError",
     "UnknownBackendError",
     "WaitTimeoutError",
     "WireError",
@@ -71,11 +73,21 @@ class WaitTimeoutError(NepError):
 
 
 class ClosedError(NepError):
-    """The object `what` (such as "subscriber 'example'") was closed before."""
+    """The object `what` (such as "subscriber 'example'") was closed before.
 
-    def __init__(self, what: str) -> None:
+    `is_forked`: it belongs to the process that forked this one.
+    """
+
+    def __init__(self, what: str, *, is_forked: bool = False) -> None:
         self.what = what
-        super().__init__(f"{what} is closed; make a new one")
+        self.is_forked = is_forked
+        if is_forked:
+            super().__init__(
+                f"{what} stayed with the program when it was forked, and is closed here; "
+                "make a new node in the child"
+            )
+        else:
+            super().__init__(f"{what} is closed; make a new one")
 
 
 class BadTopicError(NepError, ValueError):
@@ -154,6 +166,21 @@ class AddressInUseError(NepError):
             super().__init__(f"no port of '{address[:-2]}' is free; end programs that have many connections")
             return
         super().__init__(f"'{address}' is in use by another program; close it or choose another port")
+
+
+class TooManyFilesError(NepError):
+    """There is no room for `what`: this process has `opened` of `limit` files open (None: not known)."""
+
+    def __init__(self, what: str, opened: int | None, limit: int | None) -> None:
+        self.what = what
+        self.opened = opened
+        self.limit = limit
+        known = opened is not None and limit is not None
+        has = f"{opened} of {limit}" if known else "as many files as it may"
+        super().__init__(
+            f"no room for {what}: this program has {has}{' files' * known} open; "
+            f"close what it no longer needs, or start it after 'ulimit -n {max(8192, 2 * (limit or 0))}'"
+        )
 
 
 class EncodeError(NepError, ValueError):

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Protocol
 
 from nep.errors import ClosedError, NepError
+from nep.forks import watch
 
 __all__ = ["BURST", "LEVELS", "LOG_TOPIC", "LOG_TYPE", "RATE_HZ", "LogHandler", "LogRecord", "level_of"]
 
@@ -144,6 +145,7 @@ class LogHandler(logging.Handler):
         self._has_work = threading.Condition()
         self._thread: threading.Thread | None = None
         self._is_closed = False
+        watch(self)
 
     @property
     def left_out(self) -> int:
@@ -170,8 +172,12 @@ class LogHandler(logging.Handler):
             if len(self._waiting) >= _WAITING:
                 self._left_out += 1
                 return
+            try:
+                self._begin()
+            except RuntimeError:  # the interpreter is ending (from 3.12 on), or no thread can be had
+                self._left_out += 1
+                return
             self._waiting.append(plain)
-            self._begin()
             self._has_work.notify()
 
     def close(self, timeout_s: float = _FLUSH_S) -> None:
@@ -183,6 +189,14 @@ class LogHandler(logging.Handler):
         if thread is not None and thread is not threading.current_thread():
             thread.join(max(0.0, timeout_s))
         super().close()
+
+    def forked(self) -> None:
+        """In a child that was forked: its node is closed there. See `nep.forks`."""
+        self._is_closed = True
+        self._has_work = threading.Condition()
+        self._thread = None
+        self._waiting.clear()
+        self._left_out = 0
 
     # ---- inside
 
@@ -215,8 +229,9 @@ class LogHandler(logging.Handler):
 
     def _begin(self) -> None:
         if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name=f"{self._node} log", daemon=True)
-            self._thread.start()
+            thread = threading.Thread(target=self._run, name=f"{self._node} log", daemon=True)
+            thread.start()
+            self._thread = thread
 
     def _run(self) -> None:
         publisher = self._opened()

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from nep.addresses import master_address
 from nep.errors import ClosedError, RequestRefusedError
+from nep.forks import watch
 from nep.graph import LEASE_S, Graph, GraphView
 from nep.masterloop import MasterLoop
 from nep.requests import Listen, Look, Refused, Reply, Request, Seen
@@ -63,6 +64,8 @@ class Master:
         self._owner = None if owner_pid is None else Owner(owner_pid)
         self._loop: MasterLoop | None = None
         self._lock = threading.Lock()
+        self._is_forked = False
+        watch(self)
 
     def start(self) -> Self:
         """Bind, start what is attached, answer. Returns itself."""
@@ -96,6 +99,12 @@ class Master:
             attachment.close()
         loop.close()
 
+    def forked(self) -> None:
+        """In a child that was forked: the master stays with the parent. See `nep.forks`."""
+        self._loop = None
+        self._lock = threading.Lock()
+        self._is_forked = True
+
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until the master has ended, by itself (`owner_pid`) or by `close`; True when it has."""
         loop = self._loop
@@ -114,7 +123,7 @@ class Master:
         """
         loop = self._loop
         if loop is None or loop.ended.is_set():
-            raise ClosedError(f"the master at '{self.address}'")
+            raise ClosedError(f"the master at '{self.address}'", is_forked=self._is_forked)
         return loop.submit(request, timeout_s)
 
     def listen(self, hosts: Sequence[str]) -> None:

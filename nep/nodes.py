@@ -10,11 +10,12 @@ import platform
 import secrets
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
 
+from nep import forks
 from nep.addresses import master_address
 from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
 from nep.backends.choosing import backend_named
@@ -39,6 +40,8 @@ FLUSH_S = 2.0
 
 _alive: set[Node] = set()
 """Nodes live until they are closed or the interpreter ends: a publisher may outlive its node's variable."""
+_inherited: list[Node] = []
+"""Nodes of the process that forked this one: closed, and kept, because nothing of them may be touched."""
 
 
 class Node:
@@ -47,7 +50,8 @@ class Node:
     `transport` names a back end: "zeromq" (also "ZMQ"), "memory" (nodes of this process only). `master` is
     the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`: how long `new_pub` and
     `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for ever. Raises
-    `UnknownBackendError` and `BadNameError`.
+    `UnknownBackendError`, `BadNameError`, `TooManyFilesError`. In a child that is forked it is closed, with
+    all that was made on it; a new node works there.
     """
 
     def __init__(
@@ -72,8 +76,10 @@ class Node:
         self._lock = threading.RLock()
         self._stop_spin = threading.Event()
         self._callbacks: tuple[tuple[Subscriber, Inlet, Callable[[Any], object]], ...] = ()
-        self._publishers: list[Publisher] = []
+        self._publishers: set[Publisher] = set()
+        self._subscribers: set[Subscriber] = set()
         self._is_closed = False
+        self._is_forked = False
         self._log_handler: LogHandler | None = None
         record = NodeRecord(
             self.id,
@@ -86,6 +92,7 @@ class Node:
         )
         self._carrier: Carrier = self._backend.open(record)
         _alive.add(self)
+        forks.watch(self)
 
     # ---- how to connect
 
@@ -132,7 +139,7 @@ class Node:
         """A publisher. The first message reaches every subscriber that was there before this returned.
 
         `latched`: whoever subscribes later gets the last message at once. Raises `MasterUnreachable`,
-        `BadTopicError`, `AddressInUseError`, `ClosedError`.
+        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`.
         """
         number = next(self._numbers)
         spec = PublisherSpec(
@@ -145,9 +152,11 @@ class Node:
             self._wait_s,
             number,
         )
-        publisher = Publisher(self._open_carrier().publisher(spec), spec)
+        publisher = Publisher(self._open_carrier().publisher(spec), spec, self._publishers.discard)
         with self._lock:
-            self._publishers.append(publisher)
+            self._publishers.add(publisher)
+            if self._is_closed:
+                publisher.node_closes()
         return publisher
 
     def new_sub(
@@ -164,7 +173,7 @@ class Node:
 
         `keep="latest"`: only the newest message is kept for `listen`; "all": up to `max_messages` (and
         256 MB), then the oldest are dropped and counted. `sink`: takes the messages in batches, 200 times a
-        second at most, in the node's own thread, instead of `listen`. Raises as `new_pub` does.
+        second at most, in a thread of the node's own, instead of `listen`. Raises as `new_pub` does.
         """
         number = next(self._numbers)
         spec = SubscriberSpec(
@@ -178,8 +187,7 @@ class Node:
             sink=sink,
             number=number,
         )
-        carrier = self._open_carrier()
-        return Subscriber(carrier.subscriber(spec), spec)
+        return self._subscribed(self._open_carrier().subscriber(spec), spec)
 
     def new_callback(
         self,
@@ -200,17 +208,31 @@ class Node:
             number=number,
         )
         inlet = carrier.subscriber(spec)
-        subscriber = Subscriber(inlet, spec)
+        subscriber = self._subscribed(inlet, spec)
         with self._lock:
-            self._callbacks = (*self._callbacks, (subscriber, inlet, callback))
+            if not inlet.is_closed:
+                self._callbacks = (*self._callbacks, (subscriber, inlet, callback))
         return subscriber
+
+    def _subscribed(self, inlet: Inlet, spec: SubscriberSpec) -> Subscriber:
+        subscriber = Subscriber(inlet, spec, self._forget)
+        with self._lock:
+            self._subscribers.add(subscriber)
+        return subscriber
+
+    def _forget(self, subscriber: Subscriber) -> None:
+        """It is closed."""
+        with self._lock:
+            self._subscribers.discard(subscriber)
+            self._callbacks = tuple(each for each in self._callbacks if each[0] is not subscriber)
 
     # ---- spinning
 
     def spin(self, timeout_s: float | None = None) -> None:
         """Run callbacks in this thread until `stop_spin`, `close`, or for `timeout_s` seconds.
 
-        What a callback raises comes out here. A `stop_spin` that came before ends the next spin at once.
+        What a callback raises comes out here. A `stop_spin` that came before ends the next spin at once. In a
+        child that is forked, also by a callback, it raises `ClosedError`.
         """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         try:
@@ -219,14 +241,18 @@ class Node:
                 if left <= 0.0:
                     return
                 if not self._run_callbacks():
-                    self._carrier.wait([inlet for _sub, inlet, _call in self._callbacks], left)
+                    waited = [inlet for _sub, inlet, _call in self._callbacks if not inlet.is_closed]
+                    self._carrier.wait(waited, left)
+            if self._is_forked:
+                raise self._closed_error()
         finally:
             self._stop_spin.clear()
 
     def stop_spin(self) -> None:
         """End `spin`, from any thread or from a callback."""
-        self._stop_spin.set()
-        self._carrier.wake()
+        if not self._is_forked:
+            self._stop_spin.set()
+            self._carrier.wake()
 
     def _run_callbacks(self) -> bool:
         """One message for each callback that has one; whether there was any."""
@@ -245,7 +271,7 @@ class Node:
             except DecodeError:
                 continue  # it is logged and an alert
             callback(payload)
-            if self._stop_spin.is_set():
+            if self._stop_spin.is_set() or self._is_closed:
                 break
         return worked
 
@@ -272,23 +298,55 @@ class Node:
 
         What could not be delivered is logged as a warning. Happens by itself when the interpreter ends.
         """
+        _close((self,), timeout_s)
+
+    def _end_log(self, timeout_s: float) -> None:
+        """Publish what was logged, and no more."""
         if self._log_handler is not None:
-            self._log_handler.close(timeout_s / 4)
-            timeout_s *= 3 / 4
+            self._log_handler.close(timeout_s)
+
+    def _begin_close(self) -> bool:
+        """Say that all ends here, and wait for nothing; whether it was open. `_finish_close` follows."""
         with self._lock:
             if self._is_closed:
-                return
+                return False
             self._is_closed = True
+            publishers = tuple(self._publishers)
         _alive.discard(self)
         self._stop_spin.set()
-        for publisher in self._publishers:
-            publisher._is_closed = True  # noqa: SLF001 - they belong together; the carrier closes all at once
+        for publisher in publishers:
+            publisher.node_closes()
+        self._carrier.begin_close()
+        with self._lock:
+            self._publishers.clear()
+            self._subscribers.clear()
+            self._callbacks = ()
+        return True
+
+    def _finish_close(self, timeout_s: float) -> None:
+        """Deliver what was published, within `timeout_s`, and give everything back."""
         self._carrier.close(timeout_s)
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.forks`."""
+        self._is_closed = self._is_forked = True
+        self._lock = threading.RLock()
+        self._stop_spin = threading.Event()
+        for publisher in self._publishers:
+            publisher.forked()
+        for subscriber in self._subscribers:
+            subscriber.forked()
+        self._callbacks = ()
+        _alive.discard(self)
+        _inherited.append(self)
 
     def _open_carrier(self) -> Carrier:
         if self._is_closed:
-            raise ClosedError(f"node '{self.name}'")
+            raise self._closed_error()
         return self._carrier
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(f"node '{self.name}'", is_forked=self._is_forked)
 
     def __enter__(self) -> Self:
         return self
@@ -300,10 +358,19 @@ class Node:
         return f"Node({self.name!r}, {self._backend.name!r}, master={self._master!r})"
 
 
+def _close(nodes: Sequence[Node], timeout_s: float) -> None:
+    """Close all of them within `timeout_s`: no node's subscribers wait for those of another node."""
+    started = time.monotonic()
+    for each in nodes:
+        each._end_log(0.0)  # noqa: SLF001 - they are one with the node
+    for each in nodes:  # what they publish goes out like anything else
+        each._end_log(max(0.0, started + timeout_s / 4 - time.monotonic()))  # noqa: SLF001
+    for each in [each for each in nodes if each._begin_close()]:  # noqa: SLF001
+        each._finish_close(max(0.0, started + timeout_s - time.monotonic()))  # noqa: SLF001
+
+
 def _close_all() -> None:
-    deadline = time.monotonic() + FLUSH_S
-    for each in tuple(_alive):
-        each.close(max(0.0, deadline - time.monotonic()))
+    _close(tuple(_alive), FLUSH_S)
 
 
 atexit.register(_close_all)

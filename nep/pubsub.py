@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
@@ -27,7 +27,14 @@ _logger = logging.getLogger("nep")
 class Publisher:
     """Publishes on one topic. Use it from any thread; a context manager."""
 
-    def __init__(self, outlet: Outlet, spec: PublisherSpec) -> None:
+    def __init__(
+        self,
+        outlet: Outlet,
+        spec: PublisherSpec,
+        on_close: Callable[[Publisher], object] | None = None,
+    ) -> None:
+        self._on_close = on_close
+        self._is_forked = False
         self._outlet = outlet
         self._spec = spec
         self._encode = spec.codec.encode
@@ -52,12 +59,12 @@ class Publisher:
     @property
     def subscribers(self) -> int:
         """How many subscribers are connected now. Costs nothing."""
-        return self._outlet.subscribers
+        return 0 if self._is_forked else self._outlet.subscribers
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of nodes that subscribe and have not connected: hung, or just being connected."""
-        return self._outlet.missing
+        return () if self._is_forked else self._outlet.missing
 
     @property
     def count(self) -> int:
@@ -85,14 +92,26 @@ class Publisher:
     def _skip(self) -> None:
         """Count a message that nobody wants."""
         if self._is_closed:
-            raise ClosedError(f"publisher '{self.topic}'")
+            raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         self._outlet.skip()
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
         if not self._is_closed:
             self._is_closed = True
-            self._outlet.close(timeout_s)
+            try:
+                self._outlet.close(timeout_s)
+            finally:
+                if self._on_close is not None:
+                    self._on_close(self)
+
+    def node_closes(self) -> None:
+        """Its node closes it, with all others."""
+        self._is_closed = True
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.forks`."""
+        self._is_closed = self._is_forked = True
 
     def __enter__(self) -> Self:
         return self
@@ -107,7 +126,14 @@ class Publisher:
 class Subscriber:
     """Receives from one topic, in order. Iterating yields `Message`s until it is closed."""
 
-    def __init__(self, inlet: Inlet, spec: SubscriberSpec) -> None:
+    def __init__(
+        self,
+        inlet: Inlet,
+        spec: SubscriberSpec,
+        on_close: Callable[[Subscriber], object] | None = None,
+    ) -> None:
+        self._on_close = on_close
+        self._is_forked = False
         self._inlet = inlet
         self._spec = spec
         self._ready = inlet.ready
@@ -198,7 +224,7 @@ class Subscriber:
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             if self._inlet.is_closed:
-                raise ClosedError(f"subscriber '{self.topic}'")
+                raise self._closed()
             left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 return None
@@ -208,8 +234,11 @@ class Subscriber:
 
     def _poll(self) -> Message | None:
         if self._inlet.is_closed:
-            raise ClosedError(f"subscriber '{self.topic}'")
+            raise self._closed()
         return self._inlet.poll()
+
+    def _closed(self) -> ClosedError:
+        return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
 
     def decoded(self, message: Message) -> object:
         """The payload of a message that this subscriber got; a problem is logged once and shown in the graph.
@@ -235,7 +264,15 @@ class Subscriber:
 
     def close(self) -> None:
         """Unregister; what was not read is forgotten. May be called twice."""
-        self._inlet.close()
+        if not self._is_forked:
+            self._inlet.close()
+            if self._on_close is not None:
+                self._on_close(self)
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.forks`."""
+        self._is_forked = True
+        self._inlet.forked()
 
     def __iter__(self) -> Iterator[Message]:
         while True:

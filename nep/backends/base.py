@@ -135,6 +135,9 @@ class Inlet(Protocol):
     def close(self) -> None:
         """Unregister and forget what was not read."""
 
+    def forked(self) -> None:
+        """In a child that was forked: be closed and empty, without taking a lock or touching a socket."""
+
 
 class Carrier(Protocol):
     """One node's way to the others."""
@@ -156,6 +159,9 @@ class Carrier(Protocol):
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Who is there. Raises `MasterUnreachable`."""
+
+    def begin_close(self) -> None:
+        """Nothing is sent any more; say so, and wait for nothing. `close` follows, at once or later."""
 
     def close(self, timeout_s: float) -> None:
         """Close all outlets and inlets, unregister, end the thread."""

@@ -11,7 +11,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from nep import requests
+from nep import forks, requests
 from nep.backends.base import Backend, Inlet, PublisherSpec, SubscriberSpec
 from nep.configuration import Configuration, Hybrid
 from nep.encoded import Encoded
@@ -62,6 +62,16 @@ class _Hub:
 
 _hubs: dict[str, _Hub] = {}
 _hubs_lock = threading.Lock()
+
+
+def _forked() -> None:
+    """In a child: the hubs' locks may be held by threads that are not there."""
+    global _hubs_lock  # noqa: PLW0603 - there is one a process
+    _hubs_lock = threading.Lock()
+    _hubs.clear()
+
+
+forks.in_child(_forked)
 
 
 def _hub(configuration: Configuration) -> _Hub:
@@ -121,7 +131,11 @@ class MemoryOutlet:
         with self.hub.lock:
             if not self.is_closed:
                 self.is_closed = True
-                self.hub.outlets[self.spec.topic].remove(self)
+                left = [each for each in self.hub.outlets[self.spec.topic] if each is not self]
+                self.hub.outlets[self.spec.topic] = left
+                if not left:
+                    del self.hub.outlets[self.spec.topic]
+                self._carrier.forget(self)
                 self.hub.ask(requests.RemovePublisher(self._carrier.node.id, self.spec.id, self.count))
 
 
@@ -165,6 +179,10 @@ class MemoryInlet:
         """Shown as an alert in the graph."""
         self.problem = problem
 
+    def forked(self) -> None:
+        """In a child. See `Inlet.forked`."""
+        self.is_closed = True
+
     def close(self) -> None:
         """Unregister and forget what was not read."""
         with self.hub.lock:
@@ -173,6 +191,9 @@ class MemoryInlet:
             self.is_closed = True
             others = tuple(each for each in self.hub.inlets[self.spec.topic] if each is not self)
             self.hub.inlets[self.spec.topic] = others
+            if not others:
+                del self.hub.inlets[self.spec.topic]
+            self._carrier.forget(self)
             self.hub.ask(requests.RemoveSubscriber(self._carrier.node.id, self.spec.id))
         self._carrier.wake()
 
@@ -186,8 +207,8 @@ class MemoryCarrier:
         self._wakes = 0
         self._load = CpuLoad()
         self._hubs: set[_Hub] = set()
-        self._outlets: list[MemoryOutlet] = []
-        self._inlets: list[MemoryInlet] = []
+        self._outlets: tuple[MemoryOutlet, ...] = ()
+        self._inlets: tuple[MemoryInlet, ...] = ()
         self._sinks: list[MemoryInlet] = []
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
@@ -202,7 +223,7 @@ class MemoryCarrier:
             hub.ask(requests.AddPublisher(self.node, record))
             outlet = MemoryOutlet(self, hub, spec)
             hub.outlets.setdefault(spec.topic, []).append(outlet)
-            self._outlets.append(outlet)
+            self._outlets = (*self._outlets, outlet)
         return outlet
 
     def subscriber(self, spec: SubscriberSpec) -> MemoryInlet:
@@ -215,10 +236,17 @@ class MemoryCarrier:
                 if outlet.latched is not None:
                     inlet.put(outlet.latched)
             hub.inlets[spec.topic] = (*hub.inlets.get(spec.topic, ()), inlet)
-            self._inlets.append(inlet)
+            self._inlets = (*self._inlets, inlet)
         if spec.sink is not None:
             self._pour(inlet)
         return inlet
+
+    def forget(self, closed: MemoryOutlet | MemoryInlet) -> None:
+        """It was closed; called under its hub's lock."""
+        self._outlets = tuple(each for each in self._outlets if each is not closed)
+        self._inlets = tuple(each for each in self._inlets if each is not closed)
+        with self.changed:
+            self._sinks = [each for each in self._sinks if each is not closed]
 
     def wait(self, inlets: Sequence[Inlet], timeout_s: float) -> None:
         """Wait for a message in one of `inlets`, or for `wake`."""
@@ -251,6 +279,9 @@ class MemoryCarrier:
             tuple(SubscriberCount(i.spec.id, i.received, i.lost, i.problem) for i in ins),
             self._load.ratio(),
         )
+
+    def begin_close(self) -> None:
+        """Everything was delivered when it was sent."""
 
     def close(self, timeout_s: float) -> None:
         """Unregister all and end the thread."""

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 import zmq
 
 from nep.backends.base import HANDSHAKE_S, Backend, Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.backends.native.context import SharedContext, join
 from nep.backends.native.direct import OriginalInlet, OriginalOutlet, OriginalSub, attach
 from nep.backends.native.inlet import NativeInlet
 from nep.backends.native.io import IoThread
@@ -19,7 +20,8 @@ from nep.backends.native.reading import SocketInlet
 from nep.backends.native.sockets import Socket
 from nep.backends.native.subsocket import SubSocket
 from nep.configuration import Configuration, Direct
-from nep.errors import NepError
+from nep.descriptors import check_room
+from nep.errors import ClosedError, NepError
 from nep.records import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.views import GraphView
 from nep.waker import Waker
@@ -30,27 +32,31 @@ __all__ = ["BACKEND", "ZeromqCarrier"]
 DIRECT_WAIT_S = 0.3
 """Without a master nobody knows whether there is another side: it gets so long to connect."""
 _LEAVE_S = 0.3
+_THREAD_FILES = 4
 
 _Outlet = NativeOutlet | OriginalOutlet
 _Inlet = NativeInlet | OriginalInlet
 
 
 class ZeromqCarrier:
-    """One node's context, thread, links and sockets."""
+    """One node's links and sockets, in the context and the thread of its process.
+
+    Sinks are called in a thread of the node's own, so that they hold up nobody else, and may ask the master
+    and make publishers and subscribers.
+    """
 
     def __init__(self, node: NodeRecord) -> None:
         self._node = node
-        self._context: zmq.Context[Socket] = zmq.Context()
-        self._context.set(zmq.MAX_SOCKETS, 16_384)
-        self._io = IoThread(f"nep-io-{node.name}")
-        self._io.start()
+        self._shared: SharedContext = join()
+        self._io = self._shared.io
+        self._sinks: IoThread | None = None
         self._lock = threading.Lock()
         self._links: dict[str, MasterLink] = {}
         self._outlets: dict[int, _Outlet] = {}
         self._inlets: dict[int, _Inlet] = {}
-        self._idle_wakers: list[Waker] = []
         self._busy_wakers: list[Waker] = []
         self._is_closed = False
+        self._is_over = False
 
     # ---- publishers
 
@@ -59,13 +65,13 @@ class ZeromqCarrier:
         if isinstance(spec.configuration, Direct):
             return self._direct_publisher(spec, spec.configuration)
         link = self._link(spec.configuration.master)
-        socket = self._xpub()
+        socket = self._xpub(spec)
         # Made before the socket is bound: what it sets applies to connections of later binds only.
         closer = self._outlet_closer(lambda: link.remove_publisher(spec.id, outlet.count))
         outlet = NativeOutlet(socket, spec, closer, self._io.serve_soon)
-        with _closed_on_error(socket):
+        with _closed_on_error(outlet.release):
             endpoints = outlet.move(link.hosts)
-        self._hold(outlet)
+            self._hold(outlet)
         record = PublisherRecord(
             spec.id,
             spec.topic,
@@ -91,25 +97,26 @@ class ZeromqCarrier:
         closer = self._outlet_closer(lambda: None)
         outlet: _Outlet
         if direct.wire == "native":
-            socket = self._xpub()
+            socket = self._xpub(spec)
             outlet = NativeOutlet(socket, spec, closer, self._io.serve_soon)
         else:
-            socket = self._socket(zmq.XPUB)
+            socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
             outlet = OriginalOutlet(socket, spec, direct, closer)
-        with _closed_on_error(socket):
+        with _closed_on_error(outlet.release):
             attach(socket, direct, is_publisher=True)
-        self._hold(outlet)
+            self._hold(outlet)
         outlet.wait_for_any(DIRECT_WAIT_S)
         return outlet
 
-    def _xpub(self) -> Socket:
-        socket = self._socket(zmq.XPUB)
+    def _xpub(self, spec: PublisherSpec) -> Socket:
+        socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
         socket.setsockopt(zmq.XPUB_VERBOSE, 1)  # a hello may come twice when a subscriber reconnects
         socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # of what it receives
         return socket
 
     def _hold(self, outlet: _Outlet) -> None:
         with self._lock:
+            self._check_open()
             self._outlets[outlet.spec.id] = outlet
         self._io.add(outlet)
 
@@ -137,41 +144,65 @@ class ZeromqCarrier:
             self._forget_inlet(subscriber)
             link.remove_subscriber(subscriber)
 
-        inlet = NativeInlet(SubSocket(self._sub(), spec), self._io, spec, forget)
-        with self._lock:
-            self._inlets[spec.id] = inlet
+        io = self._io_for(spec)
+        socket = self._sub(spec)
+        inlet = NativeInlet(SubSocket(socket, spec), io, spec, forget)
+        with _closed_on_error(socket.close):
+            self._keep(inlet)
         try:
             reply = link.add_subscriber(
                 SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number), inlet, spec.wait_s
             )
+            inlet.connect(reply.publishers)
+            io.add(inlet)
+            with self._waker() as waker:
+                inlet.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)
         except BaseException:
             inlet.close()
             raise
-        inlet.connect(reply.publishers)
-        self._io.add(inlet)
-        with self._waker() as waker:
-            inlet.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)
         return inlet
 
     def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> Inlet:
-        socket = self._sub()
+        io = self._io_for(spec)
+        socket = self._sub(spec)
         inlet: _Inlet
         if direct.wire == "native":
-            inlet = NativeInlet(SubSocket(socket, spec), self._io, spec, self._forget_inlet)
+            inlet = NativeInlet(SubSocket(socket, spec), io, spec, self._forget_inlet)
         else:
-            inlet = SocketInlet(OriginalSub(socket, spec), self._io, spec, self._forget_inlet)
-        with _closed_on_error(socket):
+            inlet = SocketInlet(OriginalSub(socket, spec), io, spec, self._forget_inlet)
+        with _closed_on_error(socket.close):
             attach(socket, direct, is_publisher=False)
-        with self._lock:
-            self._inlets[spec.id] = inlet
-        self._io.add(inlet)
+            self._keep(inlet)
+        io.add(inlet)
         if isinstance(inlet, NativeInlet):
             with self._waker() as waker:
                 inlet.wait_for_any(DIRECT_WAIT_S, waker)
         return inlet
 
-    def _sub(self) -> Socket:
-        socket = self._socket(zmq.SUB)
+    def _io_for(self, spec: SubscriberSpec) -> IoThread:
+        """The thread that serves a subscriber."""
+        if spec.sink is None:
+            return self._io
+        with self._lock:
+            self._check_open()
+            if self._sinks is None:
+                check_room(_THREAD_FILES, f"a subscriber of '{spec.topic}'")
+                self._sinks = IoThread(f"nep-sinks-{self._node.name}")
+                self._sinks.start()
+            return self._sinks
+
+    def _keep(self, inlet: _Inlet) -> None:
+        with self._lock:
+            self._check_open()
+            self._inlets[inlet.spec.id] = inlet
+
+    def _check_open(self) -> None:
+        """With the lock held. Raises `ClosedError`."""
+        if self._is_closed:
+            raise ClosedError(f"node '{self._node.name}'")
+
+    def _sub(self, spec: SubscriberSpec) -> Socket:
+        socket = self._shared.socket(zmq.SUB, f"a subscriber of '{spec.topic}'")
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
         socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
         return socket
@@ -206,20 +237,16 @@ class ZeromqCarrier:
 
     @contextmanager
     def _waker(self) -> Iterator[Waker]:
-        """A waker of its own for each thread that waits; they are kept for the next."""
+        """A waker of its own for each thread that waits."""
+        waker = self._shared.take_waker()
         with self._lock:
-            waker = self._idle_wakers.pop() if self._idle_wakers else Waker()
             self._busy_wakers.append(waker)
         try:
             yield waker
         finally:
-            waker.clear()
             with self._lock:
                 self._busy_wakers.remove(waker)
-                if self._is_closed:
-                    waker.close()
-                else:
-                    self._idle_wakers.append(waker)
+            self._shared.give_waker(waker)
 
     # ---- the master, and the end
 
@@ -229,20 +256,37 @@ class ZeromqCarrier:
             raise NepError("a direct connection has no master; ask with a hybrid one")
         return self._link(configuration.master).look(timeout_s)
 
-    def close(self, timeout_s: float) -> None:
-        """Close all. See `Carrier.close`."""
-        deadline = time.monotonic() + timeout_s
+    def begin_close(self) -> None:
+        """Say that all ends here, and wait for nothing. See `Carrier.begin_close`."""
         with self._lock:
             if self._is_closed:
                 return
             self._is_closed = True
             links = list(self._links.values())
             outlets = list(self._outlets.values())
-            inlets = list(self._inlets.values())
         for link in links:
-            link.leave(_LEAVE_S)
+            link.begin_leave()
         for outlet in outlets:
             outlet.say_bye()
+
+    def close(self, timeout_s: float) -> None:
+        """Close all. See `Carrier.close`."""
+        deadline = time.monotonic() + timeout_s
+        self.begin_close()
+        with self._lock:
+            if self._is_over:
+                return
+            self._is_over = True
+            links = list(self._links.values())
+            outlets = list(self._outlets.values())
+            inlets = list(self._inlets.values())
+            sinks = self._sinks
+        for outlet in outlets:
+            if isinstance(outlet, OriginalOutlet):  # they flush while the others wait for their subscribers
+                self._io.remove(outlet)
+                outlet.flush(deadline)
+        for link in links:
+            link.leave(min(_LEAVE_S, timeout_s))
         for inlet in inlets:
             inlet.close()
         for outlet in outlets:
@@ -251,33 +295,30 @@ class ZeromqCarrier:
             outlet.release()
         for link in links:
             link.close()
-        self._io.close()
-        self._context.term()
-        with self._lock:
-            for waker in self._idle_wakers:
-                waker.close()
+        if sinks is not None:
+            sinks.close(max(_LEAVE_S, deadline - time.monotonic()))
+        self._shared.leave()
 
     def _link(self, address: str) -> MasterLink:
         with self._lock:
+            self._check_open()
             link = self._links.get(address)
             if link is None:
-                link = MasterLink(self._socket(zmq.DEALER), self._io, self._node, address)
+                socket = self._shared.socket(zmq.DEALER, f"a connection to the master at '{address}'")
+                with _closed_on_error(socket.close):
+                    link = MasterLink(socket, self._io, self._node, address)
                 self._links[address] = link
                 self._io.add(link)
             return link
 
-    def _socket(self, kind: int) -> Socket:
-        socket = self._context.socket(kind)
-        socket.setsockopt(zmq.LINGER, 0)
-        return socket
-
 
 @contextmanager
-def _closed_on_error(socket: Socket) -> Iterator[None]:
+def _closed_on_error(close: Callable[[], object]) -> Iterator[None]:
+    """A socket that is left open would hold up the end of the program."""
     try:
         yield
-    except NepError:
-        socket.close(0)
+    except BaseException:
+        close()
         raise
 
 

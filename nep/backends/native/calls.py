@@ -19,18 +19,21 @@ from nep.bodies import decode_answer, encode_request
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.requests import Push, Refused, Reply, Request
 
-__all__ = ["Answer", "Calls", "Then"]
+__all__ = ["Answer", "Asking", "Calls", "Then"]
 
 _logger = logging.getLogger("nep")
 
 _AGAIN_S = 0.5
 """A request without an answer is sent again after this: it may have gone to a master that ended just then."""
+_MOST_CALLS = 256
 
 Then = Callable[[Reply], None]
 
 
 @dataclass
-class _Call:
+class Asking:
+    """A request that is under way."""
+
     body: bytes
     is_waited: bool
     then: Then | None = None
@@ -52,7 +55,7 @@ class Calls:
         self.address = address
         self._socket = socket
         self._after_use = after_use
-        self._calls: dict[int, _Call] = {}
+        self._calls: dict[int, Asking] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
         self.refusals = Refusals()
@@ -74,7 +77,14 @@ class Calls:
 
         Raises `MasterUnreachable` in the end, `RequestRefusedError`, and `ClosedError` when closed meanwhile.
         """
-        call = self._send(request, is_waited=True, then=None)
+        return self.wait(self.begin(request), timeout_s)
+
+    def begin(self, request: Request) -> Asking:
+        """Send a request whose answer will be waited for."""
+        return self._send(request, is_waited=True, then=None)
+
+    def wait(self, call: Asking, timeout_s: float | None) -> Reply:
+        """The reply. Raises as `ask` does."""
         started = time.monotonic()
         with self._changed:
             while not wait_until(
@@ -125,18 +135,26 @@ class Calls:
             self._is_closed = True
             self._socket.close(0)
 
-    def _send(self, request: Request, *, is_waited: bool, then: Then | None) -> _Call:
+    def _send(self, request: Request, *, is_waited: bool, then: Then | None) -> Asking:
         with self._changed:
             number = next(self._numbers)
-            call = _Call(encode_request(request, number), is_waited, then)
+            call = Asking(encode_request(request, number), is_waited, then)
             if self._is_closed:
                 return call
             self._calls[number] = call
+            if len(self._calls) > _MOST_CALLS:
+                self._drop_oldest()
             self._flush()
             is_input = self._events() & zmq.POLLIN
         if is_input:
             self._after_use()
         return call
+
+    def _drop_oldest(self) -> None:
+        """With the lock held: a master that hangs answers nothing, and nobody waits for most of it."""
+        oldest = next((number for number, call in self._calls.items() if not call.is_waited), None)
+        if oldest is not None:
+            del self._calls[oldest]
 
     def _flush(self) -> bool:
         """With the lock held: send what is not sent; what nobody waits for is not kept for later.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -35,6 +36,9 @@ _MARKS = {"image": 64, "bytes": 1000}
 _MARK = 10_000
 """How many messages libzmq queues for each connection. For what is small these are fewer bytes than it may
 hold for all of them together, so that one subscriber that reads nothing takes nothing from the others."""
+_logger = logging.getLogger("nep")
+_TOLD_MS = 100
+"""How soon after its linger libzmq says that a socket is closed."""
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
@@ -65,13 +69,19 @@ class OriginalOutlet:
         self._generation = direct.generation
         self._filters = 0
         self._is_closed = False
-        self._linger_ms = 0
         self._backlog = Backlog()
         self._untracked_bytes = 0
         socket.setsockopt(zmq.SNDHWM, _MARKS.get(spec.codec.name, _MARK))
+        self._deadline = 0.0
         self._changed = threading.Condition(threading.Lock())
         socket.setsockopt(zmq.XPUB_VERBOSER, 1)  # so that filters can be counted: one a subscriber
         self.fd = int(socket.getsockopt(zmq.FD))
+        # libzmq tells there when it has sent everything and has let go of the socket.
+        place = f"inproc://ended-{spec.id:x}"
+        socket.monitor(place, zmq.EVENT_MONITOR_STOPPED)
+        self._end: Socket = socket.context.socket(zmq.PAIR)
+        self._end.setsockopt(zmq.LINGER, 0)
+        self._end.connect(place)
 
     @property
     def is_heard(self) -> bool:
@@ -133,13 +143,34 @@ class OriginalOutlet:
 
     def finish(self, deadline: float) -> None:
         """The original wire has no way to ask: closing lingers until `deadline`, see `release`."""
-        self._linger_ms = max(0, int((deadline - time.monotonic()) * 1000))
+        self._deadline = deadline
 
-    def release(self) -> None:
-        """Close the socket; libzmq goes on sending while the context is closed."""
+    def flush(self, deadline: float) -> None:
+        """Close the socket; libzmq goes on sending until `deadline`. The node's thread has let go of it."""
         with self._changed:
             self._is_closed = True
-            self._socket.close(self._linger_ms)
+            self._deadline = deadline
+            self._socket.close(self._left_ms())
+
+    def release(self) -> None:
+        """Close the socket and wait until libzmq has sent everything; log it when it could not in time."""
+        if not self._socket.closed:
+            self.flush(self._deadline)
+        with self._changed:
+            if self._end.closed:
+                return
+            self._end.poll(self._left_ms() + _TOLD_MS)
+            if self.count and self._filters and not self._left_ms():
+                _logger.warning(
+                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    self.spec.topic,
+                    self._filters,
+                    self.count,
+                )
+            self._end.close(0)
+
+    def _left_ms(self) -> int:
+        return max(0, int((self._deadline - time.monotonic()) * 1000))
 
     def _read_filters(self) -> None:
         while not self._socket.closed and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:

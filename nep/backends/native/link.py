@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Iterable
 from dataclasses import replace
 
 from nep.addresses import is_loopback
-from nep.backends.native.calls import Calls
+from nep.backends.native.calls import Asking, Calls
 from nep.backends.native.inlet import NativeInlet
 from nep.backends.native.io import IoThread, Rest
 from nep.backends.native.local import in_reach
@@ -70,6 +71,8 @@ class MasterLink:
         self._follow_at = 0.0
         self._was_connected = False
         self._is_closed = False
+        self._leaving: Asking | None = None
+        self._left_at = 0.0
         self._is_near = is_loopback(address)
         self._served: tuple[str, ...] = ()
         self._own_host = LOOPBACK if self._is_near else host_towards(address) or LOOPBACK
@@ -149,19 +152,28 @@ class MasterLink:
             raise RequestRefusedError(f"the master at '{self.address}' shows no graph")
         return reply.view
 
-    def leave(self, timeout_s: float) -> None:
-        """Unregister the node with all that it has, if there is a master."""
+    def begin_leave(self) -> None:
+        """Unregister the node with all that it has, if there is a master. Does not wait."""
         with self._lock:
+            if self._is_closed:
+                return
             self._publishers.clear()
             self._subscribers.clear()
             self._confirmed.clear()
-            is_known = self._epoch != 0
             self._is_closed = True
-        if is_known and self._calls.is_connected:
-            try:
-                self._calls.ask(Leave(self._node.id), timeout_s)
-            except (MasterUnreachable, RequestRefusedError, ClosedError):
-                _logger.debug("the master at '%s' did not hear that a node leaves", self.address)
+        if self._epoch != 0 and self._calls.is_connected:
+            self._leaving = self._calls.begin(Leave(self._node.id))
+            self._left_at = time.monotonic()
+
+    def leave(self, timeout_s: float) -> None:
+        """Wait until the master has heard it: `timeout_s` at most since the node began to leave."""
+        if self._leaving is None:
+            return
+        left = timeout_s + self._left_at - time.monotonic()
+        try:
+            self._calls.wait(self._leaving, max(0.0, left))
+        except (MasterUnreachable, RequestRefusedError, ClosedError):
+            _logger.debug("the master at '%s' did not hear that a node leaves", self.address)
 
     def close(self) -> None:
         """Close the connection."""

@@ -218,6 +218,11 @@ class SocketInlet(Reporting[R]):
                 self._waker.close()
                 self._waker = None
 
+    def forked(self) -> None:
+        """In a child. See `Inlet.forked`."""
+        self.is_closed = True
+        self.ready.clear()
+
     @contextmanager
     def _turn(self) -> Iterator[None]:
         """The lock, for everybody but a reader: while somebody wants it, no reader waits with it."""

@@ -1,0 +1,236 @@
+"""Forks: a child has closed nodes, makes new ones, ends at once, and disturbs its parent in nothing.
+
+The programs fork for real. A child that hangs ends by an alarm after 20 s, which its parent then tells.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from nep.masters import Master
+from tests.nep.programs import running
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
+
+CHILD = """
+import logging, os, signal, sys, threading, time, traceback
+import nep
+
+def child(do):
+    '''Run `do` in a child that ends as a program ends; how it ended: 0, or its signal or error.'''
+    pid = os.fork()
+    if not pid:
+        signal.alarm(20)
+        threading.excepthook = sys.excepthook
+        do()
+        sys.exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+def closed(do):
+    try:
+        do()
+    except nep.ClosedError as error:
+        assert error.is_forked
+        return str(error)
+    raise AssertionError("not closed")
+"""
+
+
+@pytest.mark.parametrize("transport", ["zeromq", "memory"])
+def test_all_that_a_child_inherits_is_closed_and_a_new_node_works(master: Master, transport: str) -> None:
+    code = (
+        CHILD
+        + """
+node = nep.node("parent", sys.argv[1])
+pub, sub = node.new_pub("topic"), node.new_sub("topic")
+pub.publish(0)
+node.new_callback("topic", "json", print)
+node.new_sub("topic", sink=len)
+waiting = node.new_sub("topic")
+pub.publish("read ahead"); pub.publish("not read")
+assert waiting.listen(timeout_s=5.0) == (True, "read ahead")
+node.log.warning("hello")
+
+def use():
+    sentences = [closed(lambda: pub.publish(1)), closed(lambda: pub.publish_bytes(b"1")), closed(sub.listen),
+        closed(waiting.listen), closed(lambda: sub.listen(True)), closed(lambda: sub.receive(1.0)),
+        closed(node.spin), closed(lambda: node.spin(1.0)), closed(lambda: node.new_pub("x")),
+        closed(lambda: node.new_sub("x")), closed(lambda: node.new_callback("x", "json", print)),
+        closed(node.graph)]
+    print(sentences[0])
+    print(sentences[-1])
+    assert list(sub) == []
+    assert (pub.subscribers, pub.missing, sub.is_closed) == (0, (), True)
+    node.log.warning("nobody hears this")
+    node.stop_spin()
+    for each in (pub, sub, waiting, node, node):
+        each.close()
+    with nep.node("child", sys.argv[1]) as mine:
+        own, heard = mine.new_pub("own"), mine.new_sub("own")
+        for payload in (1, "x" * 200_000):
+            own.publish(payload)
+            assert heard.listen(timeout_s=5.0) == (True, payload)
+        mine.log.warning("the child is heard")
+    left = nep.node("left open", sys.argv[1])
+    left.new_pub("left").publish("x" * 200_000)
+
+print(child(use))
+pub.publish("after")
+while sub.listen(timeout_s=5.0) != (True, "after"):
+    pass
+print(len(node.graph().nodes))
+"""
+    )
+    with running(code, transport) as program:
+        assert program.line() == (
+            "publisher 'topic' stayed with the program when it was forked, and is closed here; "
+            "make a new node in the child"
+        )
+        assert program.line().startswith("node 'parent' stayed with the program when it was forked")
+        assert program.line() == "0"
+        assert program.line() == "1"
+        assert program.end()[1] == ""
+
+
+def test_a_child_may_end_in_every_way(master: Master) -> None:
+    code = (
+        CHILD
+        + """
+import gc, multiprocessing
+node = nep.node("parent")
+pub, sub = node.new_pub("topic"), node.new_sub("topic")
+
+def collect():
+    global node, pub, sub
+    del node, pub, sub
+    gc.collect()
+
+def in_a_node():
+    with node, pub, sub:
+        sys.exit(0)
+
+def target():
+    try:
+        pub.publish(1)
+    except nep.ClosedError:
+        with nep.node("worker") as worker:
+            worker.new_pub("topic").publish("from the worker")
+
+print(child(lambda: None), child(lambda: sys.exit(0)), child(collect), child(in_a_node))
+print(child(lambda: print(child(target))))
+context = multiprocessing.get_context("fork")
+process = context.Process(target=target)
+process.start()
+process.join(20)
+print(process.exitcode)
+print([sub.listen(timeout_s=5.0)[1] for _ in range(2)])
+pub.publish("still here")
+print(sub.listen(timeout_s=5.0)[1], sub.lost)
+"""
+    )
+    with running(code) as program:
+        assert [program.line() for _ in range(5)] == [
+            "0 0 0 0",
+            "0",
+            "0",
+            "0",
+            "['from the worker', 'from the worker']",
+        ]
+        assert program.line() == "still here 0"
+        assert program.end()[1] == ""
+
+
+def test_a_fork_in_the_middle_of_all_that_threads_do(master: Master) -> None:
+    """Thirty forks while threads publish, listen, spin, log and make nodes: whatever lock is held then."""
+    code = (
+        CHILD
+        + """
+node = nep.node("parent")
+stop = threading.Event()
+pub, sub = node.new_pub("topic"), node.new_sub("topic", max_messages=100)
+node.new_callback("topic", "json", lambda _payload: None)
+
+def forever(do):
+    def run():
+        while not stop.is_set():
+            do()
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread
+
+def come_and_go():
+    with nep.node("guest") as guest:
+        guest.new_pub("topic").publish("guest")
+
+logging.getLogger().addHandler(node.log_handler)
+logging.getLogger().addHandler(logging.NullHandler())
+logging.getLogger().setLevel(logging.INFO)
+threads = [forever(do) for do in (lambda: pub.publish("x" * 100_000), lambda: pub.publish(1),
+    lambda: sub.listen(timeout_s=0.1), lambda: node.spin(0.1), lambda: node.log.info("x"), come_and_go)]
+
+def use():
+    logging.info("not heard")
+    closed(lambda: pub.publish(1))
+    closed(sub.listen)
+    closed(lambda: node.spin(1.0))
+    assert pub.missing == ()
+    with nep.node("child") as mine:
+        mine.new_pub("own").publish("x" * 100_000)
+
+print([child(use) for _ in range(30)])
+stop.set()
+for thread in threads:
+    thread.join()
+print(len(node.graph().nodes))
+"""
+    )
+    with running(code) as program:
+        assert program.line() == str([0] * 30)
+        assert program.line() == "1"
+        assert program.end(20.0)[1] == ""
+
+
+def test_callbacks_and_sinks_may_fork(master: Master) -> None:
+    code = (
+        CHILD
+        + """
+node = nep.node("parent")
+ended = threading.Event()
+codes = []
+
+def callback(payload):
+    codes.append(child(lambda: None))
+    pid = os.fork()
+    if not pid:
+        signal.alarm(20)
+        return  # and goes on spinning
+    codes.append(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+    node.stop_spin()
+
+def sink(messages):
+    pid = os.fork()
+    if not pid:
+        signal.alarm(20)
+        return  # the only thread ends, and the child with it
+    codes.append(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+    ended.set()
+
+node.new_callback("topic", "json", callback)
+pub = node.new_pub("topic")
+pub.publish(1)
+try:
+    node.spin()
+except nep.ClosedError as error:
+    assert error.is_forked
+    sys.exit(7)
+sub = node.new_sub("topic", sink=sink)
+pub.publish(2)
+assert ended.wait(20)
+print(codes)
+"""
+    )
+    with running(code) as program:
+        assert program.line() == "[0, 7, 0]"
+        assert program.end()[1] == ""
