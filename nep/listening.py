@@ -53,6 +53,11 @@ class Listening:
         self._here = here
         self._bound: set[str] = set()
 
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where the router is bound besides its own address."""
+        return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound)
+
     def serve(self, hosts: Iterable[str]) -> None:
         """Serve at these and no others.
 

@@ -13,10 +13,12 @@ from dataclasses import replace
 
 import zmq
 
+from nep.addresses import endpoint_of
 from nep.badrequests import BadRequests, who_sends
 from nep.bodies import Asked, decode_request, encode_answer
 from nep.collecting import collecting_later
 from nep.errors import ClosedError, NepError, WaitTimeoutError
+from nep.forks import watch
 from nep.graph import Graph, GraphView
 from nep.listening import Listening
 from nep.masterport import MasterPort
@@ -67,13 +69,14 @@ class MasterLoop:
         self._renewals: list[tuple[bytes, bytes]] = []
         self._tell_at = 0.0
         self._is_open = False
-        self._closing = False
+        self._closing = self._is_forked = False
         self._told_revision = graph.revision
         self.ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
         self._listening = Listening(self._port.socket, int(self.address.rpartition(":")[2]))
         self._follow_at = 0.0
         self._failures = 0
+        watch(self)
 
     # ---- from other threads
 
@@ -92,6 +95,15 @@ class MasterLoop:
         self._waker.wake()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(5.0)
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it is bound."""
+        return (endpoint_of(self.address), *self._listening.endpoints)
+
+    def forked(self) -> None:
+        """In a child: if this is its thread, it ends and touches nothing. See `nep.forks`."""
+        self._closing = self._is_forked = True
 
     def submit(self, request: Request, timeout_s: float) -> Reply:
         """Carry out a request of this process. See `Master.submit`."""
@@ -126,10 +138,11 @@ class MasterLoop:
                 except Exception as error:  # noqa: BLE001 - logged; one program must not end the others
                     self._failed(error, "something in its turn")
         finally:
-            self.ended.set()
-            self._release()
-            for submission in (*self._submitted, *self._pending.values()):
-                submission.done.set()
+            if not self._is_forked:
+                self.ended.set()
+                self._release()
+                for submission in (*self._submitted, *self._pending.values()):
+                    submission.done.set()
 
     def _turn(self, waker: tuple[int, int], *, is_due: bool) -> None:
         """Serve all that came, then what time brings."""

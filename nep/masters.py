@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from nep.addresses import master_address
 from nep.errors import ClosedError, RequestRefusedError
-from nep.forks import watch
+from nep.forks import give_up, watch
 from nep.graph import LEASE_S, Graph, GraphView
 from nep.masterloop import MasterLoop
 from nep.requests import Listen, Look, Refused, Reply, Request, Seen
@@ -101,6 +101,8 @@ class Master:
 
     def forked(self) -> None:
         """In a child that was forked: the master stays with the parent. See `nep.forks`."""
+        if self._loop is not None:
+            give_up(*self._loop.endpoints)
         self._loop = None
         self._lock = threading.Lock()
         self._is_forked = True

@@ -22,6 +22,7 @@ from nep.backends.native.subsocket import SubSocket
 from nep.configuration import Configuration, Direct
 from nep.descriptors import check_room
 from nep.errors import ClosedError, NepError
+from nep.forks import give_up, watch
 from nep.records import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.views import GraphView
 from nep.waker import Waker
@@ -57,6 +58,9 @@ class ZeromqCarrier:
         self._busy_wakers: list[Waker] = []
         self._is_closed = False
         self._is_over = False
+        self._attached: dict[int, str] = {}
+        """The endpoints of direct connections, by the id of their publisher or subscriber."""
+        watch(self)
 
     # ---- publishers
 
@@ -103,7 +107,7 @@ class ZeromqCarrier:
             socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
             outlet = OriginalOutlet(socket, spec, direct, closer)
         with _closed_on_error(outlet.release):
-            attach(socket, direct, is_publisher=True)
+            self._attached[spec.id] = attach(socket, direct, is_publisher=True)
             self._hold(outlet)
         outlet.wait_for_any(DIRECT_WAIT_S)
         return outlet
@@ -124,6 +128,7 @@ class ZeromqCarrier:
         def close(outlet: _Outlet, timeout_s: float) -> None:
             with self._lock:
                 self._outlets.pop(outlet.spec.id, None)
+                self._attached.pop(outlet.spec.id, None)
             unregister()
             outlet.say_bye()
             outlet.finish(time.monotonic() + timeout_s)
@@ -171,7 +176,7 @@ class ZeromqCarrier:
         else:
             inlet = SocketInlet(OriginalSub(socket, spec), io, spec, self._forget_inlet)
         with _closed_on_error(socket.close):
-            attach(socket, direct, is_publisher=False)
+            self._attached[spec.id] = attach(socket, direct, is_publisher=False)
             self._keep(inlet)
         io.add(inlet)
         if isinstance(inlet, NativeInlet):
@@ -210,6 +215,7 @@ class ZeromqCarrier:
     def _forget_inlet(self, subscriber: int) -> None:
         with self._lock:
             self._inlets.pop(subscriber, None)
+            self._attached.pop(subscriber, None)
 
     # ---- waiting
 
@@ -298,6 +304,15 @@ class ZeromqCarrier:
         if sinks is not None:
             sinks.close(max(_LEAVE_S, deadline - time.monotonic()))
         self._shared.leave()
+
+    def forked(self) -> None:
+        """In a child: its ports and connections are the parent's. See `nep.forks`."""
+        give_up(*self._attached.values())
+        for link in self._links.values():
+            give_up(link.endpoint)
+        for each in (*self._outlets.values(), *self._inlets.values()):
+            if isinstance(each, NativeOutlet | NativeInlet):
+                give_up(*each.endpoints)
 
     def _link(self, address: str) -> MasterLink:
         with self._lock:

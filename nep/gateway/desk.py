@@ -55,6 +55,12 @@ class Desk:
         self._counters: dict[int, zmq.Socket[bytes]] = {}
         self._board: zmq.Socket[bytes] | None = None
 
+    @property
+    def ports(self) -> tuple[int, ...]:
+        """Those that are to be bound."""
+        wanted = (self._ports.requests_a, self._ports.requests_b, self._ports.broadcast)
+        return tuple(port for port in wanted if port)
+
     def open(self) -> bool:
         """Bind what is not bound yet; whether anything was."""
         before = len(self._counters)

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import zmq
 
+from nep.forks import give_up, watch
 from nep.gateway.census import Census, Program
 from nep.gateway.desk import Desk, Ports
 from nep.gateway.inbox import Inbox
@@ -17,7 +18,7 @@ from nep.gateway.pair import Pair, is_free, port_to_tell
 from nep.gateway.portmap import Line, PortMap, Registration
 from nep.gateway.processes import Processes
 from nep.gateway.relay import Alerts, NativeSide, Relay
-from nep.gateway.requests import Request, RequestError, Role
+from nep.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.message import Message
 
 _LOOK_S = 1.0
@@ -79,6 +80,14 @@ class Gateway:
         self._look_at = 0.0
         self._shown_unserved: dict[Line, dict[Role, str]] = {}
         self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
+        watch(self)
+
+    def forked(self) -> None:
+        """In a child: the originals' ports are the parent's. See `nep.forks`."""
+        for port in self._desk.ports:
+            give_up(f"tcp://{LOOPBACK}:{port}")
+        for pair in tuple(self._relay.pairs):
+            give_up(*(f"tcp://{LOOPBACK}:{end.port}" for end in pair.ends))
 
     def start(self, timeout_s: float = 5.0) -> bool:
         """Start the thread; whether originals are answered within `timeout_s`."""

@@ -5,12 +5,14 @@ The programs fork for real. A child that hangs ends by an alarm after 20 s, whic
 
 from __future__ import annotations
 
+import socket
 import sys
 
 import pytest
 
+import nep
 from nep.masters import Master
-from tests.nep.programs import running
+from tests.nep.programs import eventually, running
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
 
@@ -233,4 +235,57 @@ print(codes)
     )
     with running(code) as program:
         assert program.line() == "[0, 7, 0]"
+        assert program.end()[1] == ""
+
+
+def test_a_child_that_lives_on_holds_no_port_and_no_connection_of_its_parent(master: Master) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    code = (
+        CHILD
+        + """
+node, own = nep.node("parent"), nep.master("127.0.0.1:0", learn_s=0.0).start()
+pub, sub = node.new_pub("here"), node.new_sub("there")
+direct = node.new_pub("direct", "json", node.direct(port=sys.argv[1], mode="one2many"))
+print("ready")
+sys.stdin.readline()
+waits, ends = os.pipe()
+pid = os.fork()
+if not pid:
+    signal.alarm(20)
+    os.close(ends)
+    closed(own.view)
+    with own:
+        pass
+    print("child")
+    os.read(waits, 1)  # until the parent ends it
+    os._exit(0)
+sys.stdin.readline()
+sub.close()
+own.close()
+direct.close()
+nep.master(own.address, learn_s=0.0).start().close()
+node.new_pub("direct", "json", node.direct(port=sys.argv[1], mode="one2many"))
+print("bound again")
+sys.stdin.readline()
+os.close(ends)
+print(os.waitpid(pid, 0)[1])
+"""
+    )
+    with (
+        nep.node("peer") as node,
+        node.new_pub("there") as pub,
+        node.new_sub("here"),
+        running(code, str(port)) as program,
+    ):
+        assert program.line() == "ready"
+        eventually(lambda: pub.subscribers == 1)
+        program.say("fork")
+        assert program.line() == "child"
+        assert pub.subscribers == 1
+        program.say("close")
+        assert program.line() == "bound again"
+        eventually(lambda: pub.subscribers == 0)  # its connection ended with the parent's
+        program.say("end")
+        assert program.line() == "0"
         assert program.end()[1] == ""

@@ -69,7 +69,8 @@ class Calls:
         if not is_loopback(address):  # a computer that vanishes does not close its connections
             socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
             socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
-        socket.connect(endpoint_of(address))
+        self.endpoint = endpoint_of(address)
+        socket.connect(self.endpoint)
         self.fd = int(socket.getsockopt(zmq.FD))
 
     def ask(self, request: Request, timeout_s: float | None) -> Reply:

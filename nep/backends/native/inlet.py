@@ -33,6 +33,11 @@ class NativeInlet(SocketInlet[SubSocket]):
             lambda: any(source.has_echoed for _each, source in sources.items()), timeout_s, waker
         )
 
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it is connected."""
+        return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
+
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to these publishers; twice is once."""
         with self._turn():

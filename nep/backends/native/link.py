@@ -81,6 +81,11 @@ class MasterLink:
         self.fd = self._calls.fd
 
     @property
+    def endpoint(self) -> str:
+        """Where it is connected."""
+        return self._calls.endpoint
+
+    @property
     def hosts(self) -> tuple[str, ...]:
         """The addresses of this computer at which publishers are to be reached.
 

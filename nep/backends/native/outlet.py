@@ -149,6 +149,11 @@ class NativeOutlet:
         return self._audience.refusals
 
     @property
+    def endpoints(self) -> tuple[str, ...]:
+        """All that its socket is bound to by `move`."""
+        return self._places.endpoints
+
+    @property
     def is_local(self) -> bool:
         """Whether programs of this computer reach it without TCP: see `local`."""
         return self._places.is_local

@@ -34,6 +34,11 @@ class Places:
         """Whether it is also bound to the name beside its loopback endpoint."""
         return bool(self._local)
 
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """All that it is bound to."""
+        return (*self._bound.values(), *self._local.values())
+
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Bind at these hosts and no others, each with a port of its own; the endpoints, in their order.
 
