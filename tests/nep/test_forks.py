@@ -255,8 +255,7 @@ if not pid:
     signal.alarm(20)
     os.close(ends)
     closed(own.view)
-    with own:
-        pass
+    own.close()
     print("child")
     os.read(waits, 1)  # until the parent ends it
     os._exit(0)
