@@ -8,7 +8,9 @@
     ├── RunnerError          a program that can't be started or reached
     ├── SettingsError        settings that can't be kept
     ├── DescriptionError     a robot's description that can't be understood
+    │   └── DeclarationError one that a driver's Python declares
     ├── RobotInputError      an action's input that the robot would refuse
+    ├── RobotValueError      what a driver tells is not of the type that it declared
     └── RobotUnknownError    a robot that isn't there
 
 The attributes come first, the sentence is made from them: lower case, no full stop, values in quotes, the
@@ -76,6 +78,18 @@ class DescriptionError(AppError):
         )
 
 
+class DeclarationError(DescriptionError):
+    """A driver declares something that can't be described: ``declared`` names it, ``where`` its line."""
+
+    def __init__(self, declared: str, problem: str, where: str = "") -> None:
+        """Make the sentence from the line, the name and the problem."""
+        super().__init__(declared, (problem,))
+        self.declared = declared
+        self.where = where
+        self.sentence = ": ".join(part for part in (where, declared, problem) if part)
+        self.args = (self.sentence,)
+
+
 class RobotInputError(AppError):
     """An action's input that the robot would refuse; ``sentences`` has one for each wrong value."""
 
@@ -83,6 +97,15 @@ class RobotInputError(AppError):
         """Make the sentence from all of them."""
         self.sentences = sentences
         super().__init__("; ".join(sentences))
+
+
+class RobotValueError(AppError, ValueError):
+    """What a driver tells is not of the type that it declared; ``reason`` says what it must be instead."""
+
+    def __init__(self, reason: str) -> None:
+        """Make the sentence from the reason."""
+        self.reason = reason
+        super().__init__(reason)
 
 
 class RobotUnknownError(AppError):

@@ -44,6 +44,12 @@ class ByFile(LoadScopeScheduling):
         return "ports" if nodeid.startswith(WITH_FIXED_PORTS) else nodeid.partition("::")[0]
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--driver FILE``: hold the contract of robots against the drivers of this file."""
+    told = "a driver of yours to hold tests/robots/test_contract.py against (may be given again)"
+    parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
+
+
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:
     """How pytest-xdist gives tests to its processes."""
     return ByFile(config, log)

@@ -14,6 +14,7 @@ from app.blocks.link import Call, Link
 from app.blocks.saying import Saying
 from app.blocks.scheduler import Scheduler
 from app.robots.description import Action, Parameter, Robot
+from app.robots.inputs import from_words
 
 FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0
@@ -227,8 +228,8 @@ def _as_kind(parameter: Parameter, value: object) -> object:
         return values.text(value)
     if parameter.kind == "integer" and isinstance(value, float) and value.is_integer():
         return int(value)
-    if parameter.kind == "list" and isinstance(value, str):
-        return [word.strip() for word in value.split(",") if word.strip()]
+    if parameter.kind in ("list", "object") and isinstance(value, str):
+        return from_words(parameter, value)
     return value
 
 

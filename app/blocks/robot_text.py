@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from app.blocks.fields import Argument, ChoiceField, ColourField, Field, NumberField, TextField, ValueInput
 from app.robots.description import Parameter
-from app.robots.inputs import pretty_number, pretty_unit
+from app.robots.inputs import pretty_number, pretty_unit, to_words
 
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 _RESERVED = ("ROBOT", "LIVE", "FIELD", "SENSOR", "SIDE", "LIMIT", "X_NAME", "X_INPUT", "X_FIELD", "ICON")
@@ -60,8 +60,8 @@ def input_of(parameter: Parameter, name: str) -> Argument:
         return ValueInput(name, "Number", number, unit=parameter.unit or "")
     if parameter.kind in ("choice", "boolean", "colour"):
         return field_of(parameter, name)
-    if isinstance(default, (list, tuple)):
-        return ValueInput(name, None, ", ".join(str(item) for item in default))
+    if isinstance(default, (list, tuple, Mapping)):
+        return ValueInput(name, None, to_words(default))
     text = default if isinstance(default, str) else ""
     # Whatever is put in becomes text: a number, the newest value of a topic.
     return ValueInput(name, None, text)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Protocol
 
 
@@ -38,6 +39,17 @@ class Failed(Exception):  # noqa: N818 - the word of the answer's state
     """The action can't be done; its sentence is shown to people: ``Failed("no ball in sight")``."""
 
 
+def _in_event_loop() -> bool:
+    asyncio = sys.modules.get("asyncio")  # who has not imported it runs no loop
+    if asyncio is None:
+        return False
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
+
+
 class Link(Protocol):
     """How a robot tells what it senses and what happens to it; works in any thread."""
 
@@ -58,6 +70,9 @@ class Link(Protocol):
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
         """Let people act on a virtual robot's world; `changed` is called with each message."""
 
+    def run(self, work: Awaitable[object]) -> object:
+        """Run a coroutine in the robot's event loop, where its ``async def`` actions run, and wait for it."""
+
 
 class Call:
     """One run of an action. Everything here may be used from the function's thread."""
@@ -67,6 +82,8 @@ class Call:
         self.clock = clock
         self._report = report
         self._ended = threading.Event()
+        self._lock = threading.Lock()
+        self._on_cancel: list[Callable[[], object]] = []
 
     @property
     def canceled(self) -> bool:
@@ -75,10 +92,30 @@ class Call:
 
     def cancel(self) -> None:
         """End the action: the function's next wait raises Canceled."""
-        self._ended.set()
+        with self._lock:
+            self._ended.set()
+            told, self._on_cancel = self._on_cancel, []
+        for tell in told:
+            tell()
+
+    def on_cancel(self, tell: Callable[[], object]) -> None:
+        """Call `tell` once, in another thread, as soon as the action is to end; at once when it is already.
+
+        For what waits in its own way, such as a library's own blocking call that has an abort.
+        """
+        with self._lock:
+            if not self._ended.is_set():
+                self._on_cancel.append(tell)
+                return
+        tell()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass; raises Canceled as soon as the action is to end."""
+        """Let time pass; raises Canceled as soon as the action is to end.
+
+        Not in an ``async def``, which it would hold up with all others: RuntimeError says what to use there.
+        """
+        if _in_event_loop():
+            raise RuntimeError("call.wait holds an async function up; use `await asyncio.sleep` there")
         if self.clock.wait(self._ended, seconds):
             raise Canceled
 

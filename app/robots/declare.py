@@ -8,17 +8,22 @@ class attributes; exactly one method is marked with :func:`safe_stop`.
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal, TypeAlias, TypeVar
 
-from app.errors import DescriptionError
+from app.errors import DeclarationError, DescriptionError
 from app.robots.calls import Link
 from app.robots.profile import validate
+from app.robots.source_lines import Line, line_of, lines_of
 from app.robots.tasks import BEAT_S
-from app.robots.typed import Schema, fields_schema, input_schema, schema_of
+from app.robots.typed import Schema, fields_schema, input_schema, input_types, returned_type, schema_of
+from app.robots.typed_values import check_finite, plain, told, told_fields
 
 Function = TypeVar("Function", bound=Callable[..., object])
+Described = TypeVar("Described")
 Busy: TypeAlias = Literal["queue", "replace", "reject"]
 Risk: TypeAlias = Literal["moves", "locomotes"]
 FromRize: TypeAlias = Callable[[str, Mapping[str, object]], Mapping[str, object]]
@@ -55,18 +60,28 @@ class action:  # noqa: N801 - used as a decorator
     from_rize: FromRize | None = None
 
     def __call__(self, function: Function) -> Function:
-        """Mark the function and check its types at once."""
-        setattr(function, _MARK, ActionSpec(self._part(function), self.rize, self.from_rize))
+        """Mark the function and check its types at once; DeclarationError says what is wrong, and where."""
+        try:
+            _check_function(function)
+            returns = Returned(self.output, returned_type(function))
+            spec = ActionSpec(
+                self._part(function, returns), self.rize, self.from_rize, input_types(function), returns
+            )
+        except (TypeError, NameError) as error:
+            where = line_of(function)
+            raise DeclarationError(function.__name__, str(error), str(where or "")) from error
+        setattr(function, _MARK, spec)
         return function
 
-    def _part(self, function: Callable[..., object]) -> Schema:
+    def _part(self, function: Callable[..., object], returns: Returned) -> Schema:
         part: Schema = {
             "title": self.title or function.__name__.replace("_", " "),
             "synchronous": not self.cancellable,
             **_given({"description": inspect.getdoc(function), "input": input_schema(function)}),
         }
-        if self.output:
-            part["output"] = fields_schema(self.output)
+        output = returns.schema()
+        if output is not None:
+            part["output"] = output
         if self.feedback:
             part["rb:feedback"] = fields_schema(self.feedback)
         part |= {"rb:cancel": self.cancellable, "rb:uses": list(self.uses), "rb:onBusy": self.on_busy}
@@ -77,12 +92,52 @@ class action:  # noqa: N801 - used as a decorator
 
 
 @dataclass(frozen=True)
+class Returned:
+    """What an action answers with: the fields of ``output=``, else what its function returns."""
+
+    fields: Mapping[str, object] | None = None
+    kind: object = None
+
+    def schema(self) -> Schema | None:
+        """Of the answer's output, which is an object: one value is its field ``value``."""
+        if self.fields:
+            return fields_schema(self.fields)
+        if self.kind is None:
+            return None
+        schema = schema_of(self.kind)
+        if schema.get("type") == "object":
+            return schema
+        return {"type": "object", "properties": {"value": {"title": "value", **schema}}}
+
+    def told(self, value: object) -> Mapping[str, object]:
+        """The answer's output for what the function returned; RobotValueError when it is of another type."""
+        made = self._told(value)
+        check_finite(made)
+        return made
+
+    def _told(self, value: object) -> Mapping[str, object]:
+        if self.fields:
+            if value is None:
+                return {}
+            only = list(self.fields) if len(self.fields) == 1 else []
+            if only and not isinstance(value, Mapping):
+                value = {only[0]: value}
+            return told_fields(self.fields, value)
+        found = plain(value) if self.kind is None else told(self.kind, value)
+        if isinstance(found, dict):
+            return found
+        return {} if found is None else {"value": found}
+
+
+@dataclass(frozen=True)
 class ActionSpec:
     """What the decorator :class:`action` was told."""
 
     part: Schema
     primitive: str | None
     from_rize: FromRize | None
+    inputs: Mapping[str, object] = field(default_factory=dict)
+    returns: Returned = field(default_factory=Returned)
 
 
 @dataclass(frozen=True)
@@ -100,6 +155,15 @@ class SensorSpec:
     part: Schema
     is_image: bool = False
     is_object: bool = False
+    kind: object = None
+
+    def told(self, value: object) -> object:
+        """What is published of a value; RobotValueError when it is not of the sensor's type."""
+        if self.is_image:
+            return value
+        if isinstance(self.kind, Mapping):
+            return told_fields(self.kind, value)
+        return told(self.kind, value) if self.is_object else {"value": told(self.kind, value)}
 
 
 @dataclass(frozen=True)
@@ -108,6 +172,7 @@ class EventSpec:
 
     part: Schema
     to_rize: ToRize | None = None
+    fields: Mapping[str, object] = field(default_factory=dict)
 
 
 def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Function], Function]:
@@ -124,12 +189,12 @@ def sensor(
     kind: object, *, title: str, text: str = "", icon: str = "activity", rate_hz: float | None = None
 ) -> SensorSpec:
     """A sensor of a type, or of an object when `kind` is a mapping of named types; `text` is its block."""
-    is_object = isinstance(kind, Mapping)
-    schema = fields_schema(kind) if isinstance(kind, Mapping) else schema_of(kind)
+    schema = _described(fields_schema, kind) if isinstance(kind, Mapping) else _described(schema_of, kind)
+    is_object = schema.get("type") == "object"
     part: Schema = {**schema, "title": title, "readOnly": True, "observable": True}
     part |= _given({"rb:rate": rate_hz})
     part["rb:block"] = {"category": "Sensors", "icon": icon} | ({"text": {"en": text}} if text else {})
-    return SensorSpec(part, is_object=is_object)
+    return SensorSpec(part, is_object=is_object, kind=kind)
 
 
 def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: float) -> SensorSpec:
@@ -143,11 +208,12 @@ def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: fl
 
 def detections(*, title: str, camera: str, icon: str, rate_hz: float | None = None) -> SensorSpec:
     """Boxes with names in the pixels of a camera's picture."""
-    part: Schema = {**fields_schema({"count": int, "name": str}), "title": title}
+    kind = {"count": int, "name": str}
+    part: Schema = {**fields_schema(kind), "title": title}
     part |= {"readOnly": True, "observable": True, "rb:widget": "detections", "rb:camera": camera}
     part |= _given({"rb:rate": rate_hz})
     part["rb:block"] = {"category": "Sensors", "icon": icon}
-    return SensorSpec(part, is_object=True)
+    return SensorSpec(part, is_object=True, kind=kind)
 
 
 def event(
@@ -163,11 +229,11 @@ def event(
     block: Schema = {"category": "Events", "icon": icon, "text": {"en": text}}
     part: Schema = {
         "title": title,
-        "data": fields_schema(fields),
+        "data": _described(fields_schema, fields),
         "rb:filter": list(choose),
         "rb:block": block,
     }
-    return EventSpec(part, rize)
+    return EventSpec(part, rize, fields)
 
 
 @dataclass(frozen=True)
@@ -184,8 +250,9 @@ class Kind:
     thing_model: Mapping[str, object] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        lines = lines_of(self.body) if isinstance(self.body, type) else {}
         made = self._thing_model()
-        problems = validate(made)
+        problems = (*self._twice(lines), *(_with_line(each, lines) for each in validate(made)))
         if problems:
             raise DescriptionError(self.model, problems)
         object.__setattr__(self, "thing_model", made)
@@ -212,6 +279,14 @@ class Kind:
         if len(found) != 1:
             raise DescriptionError(self.model, ("exactly one method must be marked with safe_stop",))
         return found[0]
+
+    def _twice(self, lines: Mapping[str, list[Line]]) -> list[str]:
+        """A sentence for each declared thing whose name the class gives again, which would hide the first."""
+        declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
+        twice = [(name, found) for name, found in lines.items() if len(found) > 1 and name in declared]
+        return [
+            f"{found[-1]}: '{name}' is there twice, first in line {found[0].number}" for name, found in twice
+        ]
 
     def _members(self) -> list[tuple[str, object]]:
         if not isinstance(self.body, type):
@@ -254,9 +329,37 @@ class Kind:
         }
 
 
+def _check_function(function: Callable[..., object]) -> None:
+    """TypeError for a function that could not be called, or that would not run when it is."""
+    if inspect.isgeneratorfunction(function) or inspect.isasyncgenfunction(function):
+        raise TypeError("it has a yield, so a call would run nothing; tell what happens with call.feedback")
+    names = list(inspect.signature(function).parameters)
+    if names[1:2] != ["call"]:
+        raise TypeError("after 'self' an action takes its call; write def NAME(self, call: Call, ...)")
+
+
+def _described(schema: Callable[[Described], Schema], kind: Described) -> Schema:
+    """The schema of a class attribute's type; DeclarationError with the line of the driver."""
+    try:
+        return schema(kind)
+    except TypeError as error:
+        frame = sys._getframe(1)  # noqa: SLF001 - the documented way to who calls
+        while frame.f_back is not None and frame.f_code.co_filename == __file__:
+            frame = frame.f_back
+        where = Line(Path(frame.f_code.co_filename).name, frame.f_lineno)
+        raise DeclarationError("", str(error), str(where)) from error
+
+
 def _listed(value: object) -> list[str]:
     return [str(item) for item in value] if isinstance(value, list) else []
 
 
 def _given(found: Mapping[str, object]) -> Schema:
     return {name: value for name, value in found.items() if value is not None}
+
+
+def _with_line(problem: str, lines: Mapping[str, list[Line]]) -> str:
+    """A problem of the description, which begins with the path of what is wrong, with the line of that."""
+    path = problem.replace(":", ".").split(" ")[0].split(".")
+    found = lines.get(path[1]) if len(path) > 1 and path[0] in {"actions", "properties", "events"} else None
+    return f"{found[-1]}: {problem}" if found else problem

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import inspect
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
-from app.robots.calls import Call
+from app.errors import RobotValueError
+from app.robots.calls import Call, Failed
+from app.robots.declare import ActionSpec
 from app.robots.inputs import near_miss
 from app.robots.members import as_part, text
 from app.robots.parts import Action, Robot
 from app.robots.task import Answer, Program, Task
 from app.robots.tasks import NOTHING_RUNS, Tasks, still_moving
+from app.robots.typed_values import given
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
+Done: TypeAlias = Callable[[object, Call], object]
 _LONGEST_ID = 200
 _ENDED_KEPT = 100
 
@@ -21,8 +26,18 @@ _ENDED_KEPT = 100
 class Desk:
     """Takes the commands for one robot; all methods are for the deciding thread of its tasks."""
 
-    def __init__(self, robot: Robot, body: object, tasks: Tasks, publish: Publish) -> None:
-        self._robot, self._body, self._tasks, self._publish = robot, body, tasks, publish
+    def __init__(
+        self,
+        robot: Robot,
+        body: object,
+        specs: Mapping[str, ActionSpec],
+        tasks: Tasks,
+        publish: Publish,
+        done: Done,
+    ) -> None:
+        """`specs` declare the actions; `done` is given what a function returned, and runs a coroutine."""
+        self._robot, self._body, self._specs = robot, body, specs
+        self._tasks, self._publish, self._done = tasks, publish, done
         self._open: set[str] = set()
         self._ended: deque[str] = deque(maxlen=_ENDED_KEPT)
 
@@ -74,11 +89,16 @@ class Desk:
         publisher: int | None = None,
     ) -> Task:
         """The task that runs an action of the body with an input that has been checked."""
-        typed = {name: _typed(action, name, value) for name, value in action.complete(given).items()}
+        spec = self._specs[action.name]
+        complete = action.complete(given)
         function: Callable[..., object] = getattr(self._body, action.name)
 
-        def run(call: Call) -> object:
-            return function(call, **typed)
+        def run(call: Call) -> Mapping[str, object]:
+            returned = self._done(function(call, **_typed(spec, function, complete)), call)
+            try:
+                return spec.returns.told(returned)
+            except RobotValueError as error:
+                raise Failed(f"{action.name} was done, but its result is wrong: {error}") from error
 
         return Task(
             id=wanted,
@@ -145,11 +165,17 @@ class Desk:
         return answer
 
 
-def _typed(action: Action, name: str, value: object) -> object:
-    """JSON has one kind of number: give the function the one its parameter says."""
-    parameter = action.parameter(name)
-    if parameter is None or isinstance(value, bool) or not isinstance(value, (int, float)):
-        return value
-    if parameter.kind == "integer":
-        return int(value)
-    return float(value) if parameter.kind in {"number", "angle"} else value
+def _typed(
+    spec: ActionSpec, function: Callable[..., object], inputs: Mapping[str, object]
+) -> dict[str, object]:
+    """The values as the function's types have them; Failed when a type of the driver's own refuses one."""
+    typed: dict[str, object] = {}
+    for name, value in inputs.items():
+        try:
+            typed[name] = given(spec.inputs[name], value)
+        except ValueError as error:
+            raise Failed(f"{name}: {error}") from error
+    for name, parameter in inspect.signature(function).parameters.items():
+        if name in spec.inputs and name not in typed and parameter.default is parameter.empty:
+            typed[name] = None  # an Optional that was left out
+    return typed

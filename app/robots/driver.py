@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import nep
-from app.robots.calls import Clock, MonotonicClock
+from app.errors import RobotValueError
+from app.robots.calls import Call, Clock, MonotonicClock
 from app.robots.declare import Kind
 from app.robots.description import parse, td_for, topic_of
 from app.robots.desk import Desk
 from app.robots.dialect import Dialect
+from app.robots.loop import EventLoop
 from app.robots.members import as_part
 from app.robots.tasks import Tasks
+from app.robots.typed_values import told_fields
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -23,6 +27,7 @@ if TYPE_CHECKING:
 RIZE_COMMANDS, RIZE_ANSWERS, RIZE_EVENTS = "robot_action", "action_state", "rize_event"
 BLACKBOARD = "/blackboard"
 _BACKLOG = 2000
+_CLOSE_S = 2.0
 _log = logging.getLogger(__name__)
 
 
@@ -45,6 +50,7 @@ class Driver:
         self._body: object = None
         self._tasks: Tasks | None = None
         self._unread: set[str] = set()
+        self._loop = EventLoop(name)
 
     @property
     def body(self) -> object:
@@ -83,7 +89,7 @@ class Driver:
 
     def _take_commands(self, body: object) -> None:
         stop, timing = self.kind.stop
-        stop_body: Callable[[], None] = getattr(body, stop)
+        stop_function: Callable[[], object] = getattr(body, stop)
         answer = partial(self._publish, self.robot.topics.answer)
 
         def beat(not_ended: tuple[str, ...]) -> None:
@@ -91,13 +97,13 @@ class Driver:
 
         self._tasks = tasks = Tasks(
             self.name,
-            stop_body,
+            lambda: self._done(stop_function()),
             self.clock,
             within_s=timing.within_s,
             watchdog_s=timing.watchdog_s,
             beat=beat,
         )
-        desk = Desk(self.robot, body, tasks, answer)
+        desk = Desk(self.robot, body, self.kind.actions, tasks, answer, self._done)
         dialect = Dialect(self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS))
         tasks.start()
         self._listen(self.robot.topics.command, "robot/command", desk.receive)
@@ -113,7 +119,12 @@ class Driver:
             tasks.close()
         close, self._body = getattr(self._body, "close", None), None
         if callable(close):
-            close()
+            try:
+                self._done(close(), within_s=_CLOSE_S)
+            except Exception:  # noqa: BLE001 - whatever it is: the rest is closed all the same
+                _log.warning("%s: its close broke off", self.name, exc_info=True)
+        self._loop.close()
+        self._loop = EventLoop(self.name)
         with self._lock:
             publishers, self._publishers = list(self._publishers.values()), {}
         for publisher in publishers:
@@ -129,14 +140,28 @@ class Driver:
     # ---- what the robot tells ---------------------------------------------------------------------
 
     def sense(self, sensor: str, value: object) -> None:
-        """Publish a sensor's new value; KeyError when the kind has no such sensor."""
+        """Publish a sensor's new value.
+
+        KeyError when the kind has no such sensor, RobotValueError when the value is not of its type.
+        """
         spec = self.kind.sensors[sensor]
-        plain = spec.is_image or spec.is_object
-        self._publish(topic_of(self.name, sensor), value if plain else {"value": value})
+        try:
+            told = spec.told(value)
+        except RobotValueError as error:
+            what = "" if spec.is_object else "the value "
+            raise RobotValueError(f"{self.name}'s sensor '{sensor}': {what}{error}") from error
+        self._publish(topic_of(self.name, sensor), told)
 
     def happen(self, event: str, **data: object) -> None:
-        """Publish an event, also to RIZE's blackboard if it knows it; KeyError when there is none such."""
+        """Publish an event, also to RIZE's blackboard if it knows it.
+
+        KeyError when there is none such, RobotValueError when a datum is not of its type.
+        """
         spec = self.kind.events[event]
+        try:
+            data = told_fields(spec.fields, data)
+        except RobotValueError as error:
+            raise RobotValueError(f"{self.name}'s event '{event}': {error}") from error
         self._publish(topic_of(self.name, event), data)
         if spec.to_rize is not None:
             primitive, given = spec.to_rize(data)
@@ -154,11 +179,19 @@ class Driver:
         publisher = self._publishers.get(topic_of(self.name, leaf))
         return 0 if publisher is None else publisher.subscribers
 
+    def run(self, work: Awaitable[object]) -> object:
+        """Run a coroutine in the robot's event loop, where its ``async def`` actions run, and wait for it."""
+        return self._loop.run(work)
+
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
         """Call `changed` with every message of ``/<name>/world``, in the network's thread: be quick."""
         self._subscribe(
             topic_of(self.name, "world"), "json", lambda payload, _publisher: changed(as_part(payload))
         )
+
+    def _done(self, result: object, call: Call | None = None, *, within_s: float | None = None) -> object:
+        """What one of the robot's functions returned; that of an ``async def`` is run now, in its loop."""
+        return self._loop.run(result, call, within_s=within_s) if inspect.isawaitable(result) else result
 
     # ---- topics -----------------------------------------------------------------------------------
 

@@ -6,14 +6,17 @@
 from __future__ import annotations
 
 import difflib
+import json
 import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from app.robots.members import as_part, number, text
+from app.robots.members import as_part, names, number, number_of, part, text
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
+_DEEPEST = 40
 _UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
 
 
@@ -29,9 +32,11 @@ class Choice:
 class Parameter:
     """One input of an action, or one datum of an event.
 
-    ``kind`` is text, number, integer, choice, colour, boolean, angle (a number in degrees), image or list.
+    ``kind`` is text, number, integer, choice, colour, boolean, angle (a number in degrees), image, list or
+    object. A list holds ``each`` any number of times, or ``places`` in their order; an object holds
+    ``fields`` and, under any other name, ``each``. ``min_length`` and ``max_length`` also count its values.
     ``step`` is a hint for editors, never a reason to refuse. ``advanced`` ones are folded in forms. ``bare``
-    is for an image that is sent as base64 text without ``data:`` before it.
+    is for an image that is sent as base64 text without ``data:`` before it. ``nullable`` ones may be None.
     """
 
     name: str
@@ -50,6 +55,10 @@ class Parameter:
     max_length: int | None = None
     widget: str | None = None
     bare: bool = False
+    nullable: bool = False
+    each: Parameter | None = None
+    places: tuple[Parameter, ...] = ()
+    fields: tuple[Parameter, ...] = ()
 
 
 def pretty_unit(unit: str | None) -> str | None:
@@ -70,7 +79,10 @@ def near_miss(wrong: str, known: Iterable[str]) -> str:
 
 def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
     """The parameter that a data schema describes."""
-    longest = number(data.get("maxLength"))
+    is_list = data.get("type") == "array"
+    shortest, longest = (number(data.get(rule)) for rule in (_ITEMS if is_list else _LENGTH))
+    held = data.get("items") if is_list else data.get("additionalProperties")
+    places = held if isinstance(held, (list, tuple)) else ()
     return Parameter(
         name=name,
         title=text(data.get("title")) or name.replace("_", " "),
@@ -84,10 +96,23 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
         required=required,
         advanced=data.get("rb:advanced") is True,
         options_from=text(data.get("rb:optionsFrom")),
-        min_length=int(number(data.get("minLength")) or 0),
+        min_length=int(shortest or 0),
         max_length=None if longest is None else int(longest),
         widget=text(data.get("rb:widget")),
         bare=data.get("contentEncoding") == "base64" and "format" not in data,
+        nullable=data.get("rb:nullable") is True,
+        each=parameter_of("value", held) if isinstance(held, Mapping) and held else None,
+        places=tuple(parameter_of(f"value {at}", as_part(each)) for at, each in enumerate(places, 1)),
+        fields=fields_of(data),
+    )
+
+
+def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
+    """The named values of an object that a data schema describes."""
+    required = names(data.get("required"))
+    return tuple(
+        parameter_of(name, as_part(each), required=name in required)
+        for name, each in part(data, "properties").items()
     )
 
 
@@ -121,6 +146,46 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
     )
 
 
+def from_words(parameter: Parameter, words: str) -> object:
+    """The list or object that a person typed: ``1, 2.5`` or JSON; what it can't be stays for the check."""
+    if parameter.kind == "object" or words.lstrip().startswith(("[", "{")):
+        try:
+            found: object = json.loads(words)
+        except (ValueError, RecursionError):
+            return words
+        return found
+    items = [word.strip() for word in words.split(",") if word.strip()]
+    if parameter.places:
+        return [_of_word(each, item) for each, item in zip(parameter.places, items, strict=False)] + items[
+            len(parameter.places) :
+        ]
+    return items if parameter.each is None else [_of_word(parameter.each, item) for item in items]
+
+
+def to_words(value: object) -> str:
+    """A list or object as people type it; :func:`from_words` reads it again."""
+    if isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value):
+        words = [str(item).lower() if isinstance(item, bool) else str(item) for item in value]
+        if not any("," in word or not word.strip() or word.startswith(("[", "{")) for word in words):
+            return ", ".join(words)
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _of_word(parameter: Parameter, word: str) -> object:
+    """One value of a list that a person typed."""
+    known = [choice.value for choice in parameter.choices if word in {str(choice.value), choice.title}]
+    if known:
+        return known[0]
+    if parameter.kind == "boolean":
+        return {"yes": True, "true": True, "no": False, "false": False}.get(word.lower(), word)
+    if parameter.kind not in {"number", "integer", "angle"}:
+        return word
+    found = number_of(word)
+    if found is None:
+        return word
+    return int(found) if found.is_integer() and "." not in word else found
+
+
 def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
     """One sentence for each thing wrong with the input; empty when the robot may be asked."""
     if not isinstance(given, Mapping):
@@ -132,6 +197,8 @@ def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -
             word = str(name)
             sentences.append(f"{action}: there is no “{word}”{near_miss(word, known)}")
     for name, parameter in known.items():
+        if name in given and given[name] is None and parameter.nullable:
+            continue
         if name in given:
             wrong = wrong_value(parameter, given[name])
             if wrong is not None:
@@ -155,9 +222,61 @@ def wrong_value(parameter: Parameter, value: object) -> str | None:
         good = isinstance(value, str) and _COLOUR.fullmatch(value) is not None
         return None if good else "must be a colour like #20c0e0"
     if parameter.kind == "list":
-        good = isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value)
-        return None if good else "must be a list"
+        return _wrong_list(parameter, value)
+    if parameter.kind == "object":
+        return _wrong_object(parameter, value)
     return _wrong_text(parameter, value)
+
+
+def _wrong_list(parameter: Parameter, value: object) -> str | None:
+    if not isinstance(value, (list, tuple)):
+        return "must be a list"
+    least, most = parameter.min_length, parameter.max_length
+    if least == most and len(value) != least:
+        return f"must have {least} values"
+    if len(value) < least:
+        return f"must have at least {least} {'value' if least == 1 else 'values'}"
+    if most is not None and len(value) > most:
+        return f"must have at most {most} {'value' if most == 1 else 'values'}"
+    for place, item in enumerate(value):
+        held = parameter.places[place] if place < len(parameter.places) else parameter.each
+        wrong = None if held is None else wrong_value(held, item)
+        if held is None and not _is_json(item):
+            wrong = "is nothing that a list can hold"
+        if wrong is not None:
+            return f"value {place + 1} {wrong}"
+    return None
+
+
+def _wrong_object(parameter: Parameter, value: object) -> str | None:
+    if not isinstance(value, Mapping):
+        return "must be an object with named values"
+    known = {field.name: field for field in parameter.fields}
+    for name, field in known.items():
+        if name not in value and not field.required:
+            continue
+        if name in value and value[name] is None and field.nullable:
+            continue
+        wrong = wrong_value(field, value[name]) if name in value else "is missing"
+        if wrong is not None:
+            return f"{field.title} {wrong}"
+    for name, item in value.items():
+        if name in known:
+            continue
+        wrong = None if parameter.each is None else wrong_value(parameter.each, item)
+        if known and parameter.each is None:
+            return f"has no “{name}”{near_miss(str(name), known)}"
+        if wrong is not None:
+            return f"“{name}” {wrong}"
+    return None
+
+
+def _is_json(value: object, depth: int = 0) -> bool:
+    if isinstance(value, (list, tuple)):
+        return depth < _DEEPEST and all(_is_json(item, depth + 1) for item in value)
+    if isinstance(value, Mapping):
+        return depth < _DEEPEST and all(_is_json(item, depth + 1) for item in value.values())
+    return value is None or isinstance(value, (str, int, float))
 
 
 def _same(allowed: object, given: object) -> bool:

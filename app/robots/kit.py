@@ -9,8 +9,10 @@ from __future__ import annotations
 from app.robots.calls import Call, Canceled, Clock, Failed, Link, MonotonicClock
 from app.robots.declare import Kind, action, detections, event, picture, safe_stop, sensor
 from app.robots.driver import Driver
-from app.robots.process import main
+from app.robots.process import main, tell_briefly
 from app.robots.typed import Advanced, Colour, Image, Range, Suggested, Text, Title, Words
+
+tell_briefly()
 
 __all__ = [
     "Advanced", "Call", "Canceled", "Clock", "Colour", "Driver", "Failed", "Image", "Kind", "Link",

@@ -10,14 +10,19 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from types import FrameType
+from types import FrameType, TracebackType
+from typing import TextIO
 
 import psutil
 
 import nep
+from app.errors import AppError, DescriptionError
 from app.robots.calls import Failed
 from app.robots.declare import Kind
+from app.robots.description import topic_of
 from app.robots.driver import Driver
+from nep.addresses import master_address
+from nep.text import escaped
 
 _OWNER_CHECK_S = 0.5
 
@@ -25,8 +30,9 @@ _OWNER_CHECK_S = 0.5
 def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     """Run a robot of this kind until it is asked to end (SIGTERM, Ctrl+C) or its owner is gone.
 
-    Without a master it waits for one. 0 on an orderly end, 1 when the robot can't be connected (its class
-    raised Failed), 2 for wrong arguments.
+    It says on its output what it is and where its master is; without a master it says so and waits for one.
+    0 on an orderly end, 1 when the robot can't be connected (its class raised Failed) or described, 2 for
+    wrong arguments.
     """
     parser = argparse.ArgumentParser(description=f"Drive a robot: {kind.title}.")
     parser.add_argument("--name", default=kind.title, help="the robot's name; its topics begin with it")
@@ -38,10 +44,26 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     _on_signals(ended)
     try:
         run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
-    except Failed as error:  # the robot's own __init__: it can't be reached
-        sys.stderr.write(f"{chosen.name}: {error}\n")
+    except (Failed, AppError, nep.NepError) as error:  # Failed: its own __init__, it can't be reached
+        _say(f"{chosen.name}: {error}", sys.stderr)
         return 1
     return 0
+
+
+def tell_briefly() -> None:
+    """From now on a wrong description ends the program with one sentence, not with a traceback.
+
+    A class is described while Python reads it, before its driver's first line can catch anything.
+    """
+    before = sys.excepthook
+
+    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if isinstance(error, DescriptionError):
+            _say(str(error), sys.stderr)
+        else:
+            before(kind, error, trace)
+
+    sys.excepthook = hook
 
 
 def run(
@@ -51,16 +73,36 @@ def run(
     owner = _process(owner_pid)
     if owner_pid is not None and owner is None:
         return
+    address = master_address(master)
     with nep.node(name, master=master) as node, _published(node):
         driver = Driver(kind, name, node)
+        model = f"virtual {kind.model}" if kind.virtual else kind.model
+        _say(f"{name}: a robot, model {model}; its topics are {topic_of(name, '...')}", sys.stdout)
+        has_waited = False
         try:
             while not _started(driver):
+                if not has_waited:
+                    start = "start Studio or `nep master`"
+                    _say(f"{name}: no master answers at {address}; waiting for one, {start}", sys.stdout)
+                has_waited = True
                 if _over(ended, owner):
                     return
+            found = "found the master" if has_waited else "the master is"
+            _say(f"{name}: {found} at {address}; the robot is ready, Ctrl+C ends it", sys.stdout)
             while not _over(ended, owner):
                 ended.wait(_OWNER_CHECK_S)
         finally:
             driver.close()
+
+
+def _say(words: str, stream: TextIO | None) -> None:
+    """A line for the person who started it; a closed, full or missing output is no reason to end."""
+    try:
+        print(escaped(words), file=stream, flush=True)
+    except UnicodeEncodeError:
+        print(ascii(words)[1:-1], file=stream, flush=True)
+    except (OSError, ValueError):
+        return
 
 
 @contextmanager

@@ -35,7 +35,7 @@ class Tasks:
     def __init__(
         self,
         name: str,
-        stop: Callable[[], None],
+        stop: Callable[[], object],
         clock: Clock,
         *,
         within_s: float,

@@ -1,17 +1,31 @@
 """From the types of a Python function to the data schemas of its description.
 
-A parameter is ``float``, ``int``, ``bool``, ``str``, ``list[str]``, a ``Literal`` or :data:`Colour`; what the
-type can't say is annotated: ``Annotated[float, Range(-2, 2, step=0.05, unit="m")]``.
+A value is ``float``, ``int``, ``bool``, ``str``, :data:`Colour`, ``list``, ``tuple``, ``dict``, ``Optional``,
+a ``Literal`` or Enum, a dataclass or TypedDict; what the type can't say is annotated:
+``Annotated[float, Range(-2, 2, step=0.05, unit="m")]``.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NoReturn, TypeAlias, get_args, get_origin, get_type_hints
+
+from app.errors import RobotValueError
+from app.robots.members import as_part
+from app.robots.typed_values import bare, choices_in, fields_of, shown, told, without_none
 
 Schema: TypeAlias = dict[str, object]
+_LONGEST_UNIT = 16
+_UNIT_WORDS = {
+    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "centimeter": "cm", "centimeters": "cm",
+    "millimeter": "mm", "millimeters": "mm", "degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad",
+    "radians": "rad", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "minute": "min",
+    "minutes": "min", "hour": "h", "hours": "h", "percent": "%", "percentage": "%", "°c": "Cel",
+    "celsius": "Cel", "meters/second": "m/s", "m/sec": "m/s", "mps": "m/s", "degrees/second": "deg/s",
+    "°/s": "deg/s", "hertz": "Hz", "volt": "V", "volts": "V", "kilogram": "kg", "kilograms": "kg",
+}  # fmt: skip
 _TYPES: Mapping[object, str] = {float: "number", int: "integer", bool: "boolean", str: "string"}
 
 
@@ -77,39 +91,88 @@ Image: TypeAlias = Annotated[str, _PictureText()]
 
 def schema_of(annotation: object) -> Schema:
     """The data schema of a type; TypeError names what can't be described."""
-    notes: tuple[object, ...] = ()
-    if get_origin(annotation) is Annotated:
-        annotation, *rest = get_args(annotation)
-        notes = tuple(rest)
-    schema = _plain(annotation)
+    return _schema_of(annotation, ())
+
+
+def _schema_of(annotation: object, inside: tuple[object, ...]) -> Schema:
+    annotation, notes = bare(annotation)
+    optional, may_be_none = without_none(annotation)
+    schema = _plain(annotation, inside) if optional is annotation else _schema_of(optional, inside)
+    if may_be_none:
+        schema["rb:nullable"] = True
     for note in notes:
         schema.update(_noted(note, schema))
     return schema
 
 
-def _plain(annotation: object) -> Schema:
-    if annotation in _TYPES:
+def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
+    if isinstance(annotation, type) and annotation in _TYPES:
         return {"type": _TYPES[annotation]}
+    choices = choices_in(annotation)
+    if choices is not None:
+        return _choice(annotation, choices)
     origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Literal:
-        kind = "string" if all(isinstance(value, str) for value in arguments) else "number"
-        return {"type": kind, "enum": list(arguments)}
-    if origin is list and len(arguments) == 1:
-        return {"type": "array", "items": schema_of(arguments[0])}
+    if origin in {list, Sequence} and len(arguments) == 1:
+        return {"type": "array", "items": _held(arguments[0], inside)}
+    if origin is tuple and len(arguments) == 2 and arguments[1] is Ellipsis:
+        return {"type": "array", "items": _held(arguments[0], inside)}
+    if origin is tuple and arguments:
+        places = [_held(each, inside) for each in arguments]
+        return {"type": "array", "items": places, "minItems": len(places), "maxItems": len(places)}
+    if origin in {dict, Mapping} and len(arguments) == 2 and arguments[0] is str:
+        free = arguments[1] in (Any, object)
+        return {"type": "object"} | ({} if free else {"additionalProperties": _held(arguments[1], inside)})
+    if annotation in inside:
+        raise TypeError(f"a robot's value can't hold itself: {shown(annotation)}")
+    fields = fields_of(annotation)
+    if fields is not None:
+        return _object(fields, (*inside, annotation))
     raise TypeError(
-        f"a robot's value can't be {annotation!r}; use float, int, bool, str, list[...] or Literal"
+        f"a robot's value can't be {shown(annotation)}; use float, int, bool, str, list[...], tuple[...], "
+        "dict[str, ...], Literal, Optional, an Enum, a dataclass or a TypedDict"
     )
+
+
+def _held(annotation: object, inside: tuple[object, ...]) -> Schema:
+    """What a list or the like holds: always a value, never None."""
+    if without_none(bare(annotation)[0])[1]:
+        raise TypeError(f"a robot's list can't hold None: {shown(annotation)}; leave the value out")
+    return _schema_of(annotation, inside)
+
+
+def _choice(annotation: object, choices: tuple[tuple[object, object, str | None], ...]) -> Schema:
+    values = [value for value, _, _ in choices]
+    if not all(isinstance(value, (str, int, float)) and not isinstance(value, bool) for value in values):
+        raise TypeError(f"a robot's choice is between texts or numbers, not {shown(annotation)}; use bool")
+    texts = [isinstance(value, str) for value in values]
+    schema: Schema = {} if any(texts) and not all(texts) else {"type": "string" if all(texts) else "number"}
+    if any(word is not None for _, _, word in choices):
+        return schema | {"oneOf": [{"const": value, "title": word} for value, _, word in choices]}
+    return schema | {"enum": values}
+
+
+def _object(fields: Mapping[str, tuple[object, bool]], inside: tuple[object, ...]) -> Schema:
+    properties = {
+        name: {"title": name.replace("_", " "), **_schema_of(kind, inside)}
+        for name, (kind, _) in fields.items()
+    }
+    required = [name for name, (kind, must) in fields.items() if must and not without_none(bare(kind)[0])[1]]
+    return _given({"type": "object", "required": required or None, "properties": properties})
 
 
 def _noted(note: object, schema: Schema) -> Schema:
     if isinstance(note, Range):
+        _check_unit(note.unit)
         step = "multipleOf" if schema.get("type") == "integer" else "rb:step"
         found = {"minimum": note.minimum, "maximum": note.maximum, step: note.step, "unit": note.unit}
         return _given(found | {"rb:widget": note.widget})
     if isinstance(note, Text):
         return _given({"minLength": note.min_length or None, "maxLength": note.max_length})
     if isinstance(note, Words):
-        values = schema.pop("enum", [])
+        values = schema.pop("enum", None)
+        if values is None:
+            named = schema.get("oneOf")
+            values = [as_part(each).get("const") for each in named] if isinstance(named, list) else []
         names = values if isinstance(values, list) else []
         return {"oneOf": [{"const": value, "title": note.shown.get(value, str(value))} for value in names]}
     if isinstance(note, Title):
@@ -129,26 +192,76 @@ def _given(found: Mapping[str, object]) -> Schema:
     return {name: value for name, value in found.items() if value is not None}
 
 
-def input_schema(function: Callable[..., object]) -> Schema | None:
-    """The schema of an action's input: the parameters but ``self`` and ``call``; None without any."""
+def _check_unit(unit: object) -> None:
+    """TypeError for what is no unit, or a word where UCUM has a sign: people see "°" for "deg"."""
+    if unit is None:
+        return
+    if not isinstance(unit, str):
+        raise TypeError(f"a unit is a text like 'm', not {unit!r}; write Range(0, 1, unit='m')")
+    sign = _UNIT_WORDS.get(unit.lower())
+    if sign is not None:
+        raise TypeError(f"there is no unit {unit!r}; write {sign!r}")
+    if not unit or len(unit) > _LONGEST_UNIT or not unit.isprintable() or " " in unit:
+        raise TypeError(f"there is no unit {unit!r}; write it as UCUM does: 'm', 'deg', 's', 'm/s', '%'")
+
+
+def input_types(function: Callable[..., object]) -> dict[str, object]:
+    """The types of an action's parameters but ``self`` and ``call``; TypeError when one has none."""
     hints: dict[str, Any] = get_type_hints(function, include_extras=True)
-    properties: dict[str, Schema] = {}
-    required = []
-    for name, parameter in inspect.signature(function).parameters.items():
+    found: dict[str, object] = {}
+    parameters = list(inspect.signature(function).parameters.values())
+    for place, parameter in enumerate(parameters):
+        name = parameter.name
         if name in {"self", "call"}:
             continue
+        if parameter.kind is parameter.VAR_POSITIONAL or parameter.kind is parameter.VAR_KEYWORD:
+            raise TypeError(f"'{name}' can't stand for any number of values; name each, or take a list")
+        if parameter.kind is parameter.POSITIONAL_ONLY:
+            raise TypeError(f"'{name}' must be given by its name; leave out the '/'")
         if name not in hints:
-            raise TypeError(f"{function.__qualname__}: '{name}' has no type; robots need to know it")
-        schema = schema_of(hints[name])
+            where = f"{function.__qualname__}: '{name}' has no type"
+            if place < 2 and "call" not in {each.name for each in parameters}:
+                raise TypeError(f"{where}; after 'self' an action takes 'call: Call'")
+            raise TypeError(f"{where}; robots need to know it")
+        found[name] = hints[name]
+    return found
+
+
+def returned_type(function: Callable[..., object]) -> object:
+    """The type that a function says it returns; None when it says nothing, None, or any object."""
+    kind = get_type_hints(function, include_extras=True).get("return")
+    if get_origin(kind) in {Awaitable, Coroutine}:
+        kind = get_args(kind)[-1]
+    plain, _ = bare(kind)
+    free = plain in (None, type(None), Any, object, dict, Mapping, NoReturn)
+    return None if free or get_args(plain)[1:] in ((object,), (Any,)) else kind
+
+
+def input_schema(function: Callable[..., object]) -> Schema | None:
+    """The schema of an action's input: the parameters but ``self`` and ``call``; None without any."""
+    properties: dict[str, Schema] = {}
+    required = []
+    parameters = inspect.signature(function).parameters
+    for name, kind in input_types(function).items():
+        schema = schema_of(kind)
         schema.setdefault("title", name.replace("_", " "))
-        if parameter.default is inspect.Parameter.empty:
-            required.append(name)
-        else:
-            schema["default"] = parameter.default
+        default = parameters[name].default
+        if default is inspect.Parameter.empty:
+            if not without_none(bare(kind)[0])[1]:
+                required.append(name)
+        elif default is not None:
+            schema["default"] = _default(kind, default, name)
         properties[name] = schema
     if not properties:
         return None
     return _given({"type": "object", "required": required or None, "properties": properties})
+
+
+def _default(kind: object, default: object, name: str) -> object:
+    try:
+        return told(kind, default)
+    except RobotValueError as error:
+        raise TypeError(f"the default of '{name}' {error}") from error
 
 
 def fields_schema(fields: Mapping[str, object]) -> Schema:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from app.robots.description import Parameter
+from app.robots.inputs import from_words, to_words
 from app.ui.control import Control, connect, line_field
 from app.ui.long_text import LongText
 from app.ui.theme import Theme
@@ -12,8 +15,11 @@ LONG_FROM = 200
 
 
 def text_control(theme: Theme, parameter: Parameter) -> Control:
-    """One line, or several for a text that may be long; a list is words with commas between them."""
-    if parameter.kind == "list":
+    """One line, or several for a text that may be long; a list is words with commas between them.
+
+    An object, and a list of lists or objects, is written as JSON.
+    """
+    if parameter.kind in ("list", "object"):
         return _list(theme, parameter)
     if (parameter.max_length or 0) >= LONG_FROM or parameter.widget == "multiline":
         return _long(theme, parameter)
@@ -44,10 +50,13 @@ def _long(theme: Theme, parameter: Parameter) -> Control:
 
 def _list(theme: Theme, parameter: Parameter) -> Control:
     field = line_field(theme, parameter)
-    field.setPlaceholderText("Words with commas between them")
+    field.setPlaceholderText(_hint(parameter))
 
     def value() -> object:
-        return [part.strip() for part in field.text().split(",") if part.strip()]
+        words = field.text().strip()
+        if not words and not parameter.required and (parameter.nullable or parameter.kind == "object"):
+            return None
+        return from_words(parameter, words)
 
     made = Control(
         field,
@@ -65,7 +74,20 @@ def _given(parameter: Parameter, text: str) -> str | None:
     return text if text or parameter.required else None
 
 
+def _hint(parameter: Parameter) -> str:
+    if parameter.kind == "object":
+        names = ", ".join(f'"{field.name}": …' for field in parameter.fields) or '"name": …'
+        return f"{{{names}}}"
+    held = [parameter.each] if parameter.each is not None else list(parameter.places)
+    if any(each.kind in ("list", "object") for each in held):
+        return "[…, …]"
+    if parameter.places:
+        return ", ".join(each.kind for each in parameter.places)
+    is_number = parameter.each is not None and parameter.each.kind in ("number", "integer", "angle")
+    return "Numbers with commas between them" if is_number else "Words with commas between them"
+
+
 def _words(given: object) -> str:
-    if isinstance(given, (list, tuple)):
-        return ", ".join(str(part) for part in given)
+    if isinstance(given, (list, tuple, Mapping)):
+        return to_words(given)
     return "" if given is None else str(given)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.robots.description import Action, Parameter
+from app.robots.inputs import to_words
 from app.ui.controls import NUMBERS
 
 UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
@@ -32,6 +33,7 @@ def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
     if parameter.kind == "text" and isinstance(value, str) and value:
         text = " ".join(value.split())
         return f"“{text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + '…'}”"
-    if parameter.kind == "list" and isinstance(value, list):
-        return ", ".join(str(item) for item in value)
+    if parameter.kind in ("list", "object") and value:
+        words = to_words(value)
+        return words if len(words) <= LONGEST_TEXT else f"{words[: LONGEST_TEXT - 1]}…"
     return str(value) if parameter.kind == "colour" and value else ""

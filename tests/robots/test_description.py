@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from app import resources
 from app.errors import DescriptionError
-from app.robots.description import parse, td_for, topic_of, validate
+from app.robots.description import Parameter, parse, td_for, topic_of, validate
+from app.robots.inputs import check_input, from_words, parameter_of, to_words
 
 MODELS = sorted(resources.path("robots").glob("*.tm.jsonld"))
 
@@ -212,3 +213,63 @@ def test_any_json_is_no_crash(value):
 def test_any_input_gets_sentences(value):
     for action in parse(model("pepper")).actions:
         assert all(sentence.startswith(action.name) for sentence in action.check(value))
+
+
+# ---- lists and objects as people type them ---------------------------------------------------------
+
+
+def parameter(**data: object) -> Parameter:
+    return parameter_of("values", data)
+
+
+NUMBERS = {"type": "array", "items": {"type": "number"}}
+
+
+@pytest.mark.parametrize(
+    ("described", "words", "value"),
+    [
+        (NUMBERS, "1, 2.5, 0.0, 0", [1, 2.5, 0.0, 0]),
+        (NUMBERS, "1, far", [1, "far"]),
+        (NUMBERS, "", []),
+        (NUMBERS, "[1, 2]", [1, 2]),
+        ({"type": "array"}, "a, b", ["a", "b"]),
+        ({"type": "array", "items": {"type": "boolean"}}, "yes, false, x", [True, False, "x"]),
+        ({"type": "array", "items": {"oneOf": [{"const": 1, "title": "low"}]}}, "low, 1", [1, 1]),
+        ({"type": "array", "items": [{"type": "number"}, {"type": "string"}]}, "1, 2, 3", [1, "2", "3"]),
+        ({"type": "array", "items": NUMBERS}, "[[1], [2, 3]]", [[1], [2, 3]]),
+        ({"type": "object"}, '{"x": 1}', {"x": 1}),
+        ({"type": "object"}, "{x", "{x"),
+        ({"type": "object"}, "[" * 100_000, "[" * 100_000),
+    ],
+)
+def test_words_of_a_person_become_a_list_or_an_object(described, words, value):
+    made = from_words(parameter(**described), words)
+    assert made == value
+    assert repr(made) == repr(value)  # 1 is not 1.0, and not True
+
+
+@pytest.mark.parametrize("value", [["a", "b"], [1, 2.5], [["x"], []], {"a": {"b": 1}}, ["a, b"], [" "]])
+def test_what_is_shown_of_it_is_read_again(value):
+    strings = isinstance(value, list) and all(isinstance(item, str) for item in value)
+    described = {"type": "object" if isinstance(value, dict) else "array"}
+    if isinstance(value, list) and not strings:
+        described = NUMBERS if not isinstance(value[0], list) else {"type": "array", "items": NUMBERS}
+    assert from_words(parameter(**described), to_words(value)) == value
+
+
+@pytest.mark.parametrize(
+    ("described", "value", "wrong"),
+    [
+        (NUMBERS, [1, "a"], "value 2 must be a number"),
+        ({**NUMBERS, "minItems": 2}, [1], "must have at least 2 values"),
+        ({**NUMBERS, "maxItems": 1}, [1, 2], "must have at most 1 value"),
+        ({"type": "array"}, [object()], "value 1 is nothing that a list can hold"),
+        ({"type": "array", "items": NUMBERS}, [[1], ["b"]], "value 2 value 1 must be a number"),
+        ({"type": "object", "additionalProperties": {"type": "integer"}}, {"a": 1.5},
+         "“a” must be a whole number"),
+        ({"type": "number", "rb:nullable": True}, None, None),
+    ],
+)  # fmt: skip
+def test_what_is_inside_a_list_or_an_object_is_checked(described, value, wrong):
+    sentences = check_input("go", (parameter(**described),), {"values": value})
+    assert sentences == (() if wrong is None else (f"go: values {wrong}",))

@@ -100,12 +100,45 @@ def test_it_does_not_begin_without_its_owner(network):
     )
 
 
-def test_it_waits_for_a_master_and_can_be_ended_meanwhile():
+def test_it_says_what_it_is_that_it_waits_and_when_the_master_is_there():
+    with nep.Master("127.0.0.1:0") as gone:
+        address = gone.address
+    process = start("examples/thirty_line_driver.py", "--name", "Table", network=address)
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "Table: a robot, model turntable; its topics are /Table/...\n"
+        assert process.stdout.readline() == (
+            f"Table: no master answers at {address}; waiting for one, start Studio or `nep master`\n"
+        )
+        with nep.Master(address):
+            said = process.stdout.readline()
+            assert said == f"Table: found the master at {address}; the robot is ready, Ctrl+C ends it\n"
+            assert has_robot(address)
+            process.send_signal(signal.SIGTERM)
+            code, errors = ended(process)
+    finally:
+        ended(process)
+    assert (code, errors) == (0, "")
+
+
+def test_it_can_be_ended_while_it_waits_for_a_master():
     process = start("-m", "app.robots.simulated", network="127.0.0.1:1")
-    with pytest.raises(subprocess.TimeoutExpired):
-        process.communicate(timeout=3)
-    process.send_signal(signal.SIGTERM)
-    assert ended(process) == (0, "")
+    assert process.stdout is not None
+    try:
+        said = [process.stdout.readline() for _ in range(2)]
+        assert "waiting for one" in said[1]
+        process.send_signal(signal.SIGTERM)
+    finally:
+        code, errors = ended(process)
+    assert (code, errors) == (0, "")
+
+
+@pytest.mark.parametrize("given", [("--master", "127.0.0.1:x"), ("--name", "x" * 65)], ids=str)
+def test_what_can_not_be_used_is_one_sentence(given, network):
+    code, errors = ended(start("examples/thirty_line_driver.py", *given, network=network), 15)
+    assert code == 1
+    assert "Traceback" not in errors
+    assert errors.count("\n") == 1
 
 
 def test_wrong_arguments_are_told(network):

@@ -1,11 +1,19 @@
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import json
+from dataclasses import dataclass
+from enum import Enum
+from typing import Annotated, Literal, TypedDict
 
+import numpy as np
 import pytest
+from typing_extensions import NotRequired
 
-from app.errors import DescriptionError
-from app.robots.kit import Call, Kind, action, safe_stop
+import nep
+from app.errors import DescriptionError, RobotValueError
+from app.robots.description import parse
+from app.robots.driver import Driver
+from app.robots.kit import Call, Kind, Link, action, event, safe_stop, sensor
 from app.robots.typed import (
     Advanced,
     Colour,
@@ -17,6 +25,8 @@ from app.robots.typed import (
     input_schema,
     schema_of,
 )
+from app.robots.typed_values import given, told
+from tests.robots.conftest import Ears, eventually
 
 
 @pytest.mark.parametrize(
@@ -43,7 +53,21 @@ def test_types_become_schemas(kind, schema):
     assert schema_of(kind) == schema
 
 
-@pytest.mark.parametrize("kind", [dict, complex, float | None, Annotated[float, "metres"]])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        dict,
+        complex,
+        float | str,
+        list[float | None],
+        dict[int, str],
+        tuple,
+        Annotated[float, "metres"],
+        Literal["a", True],
+        Annotated[float, Range(0, 1, unit="degrees")],
+        Annotated[float, Range(0, 1, unit=5)],
+    ],
+)
 def test_what_can_not_be_described_is_refused_at_once(kind):
     with pytest.raises(TypeError):
         schema_of(kind)
@@ -103,3 +127,310 @@ def test_a_block_text_that_names_nothing_is_refused():
 
     with pytest.raises(DescriptionError, match="uses %far"):
         Kind(model="x", title="X", body=Wrong)
+
+
+# ---- values of richer types ------------------------------------------------------------------------
+
+
+class Side(Enum):
+    LEFT = "l"
+    FAR_RIGHT = "r"
+
+
+class Gear(Enum):
+    SLOW = (1, 2)
+    FAST = (3, 4)
+
+
+@dataclass(frozen=True)
+class Pose:
+    x: Annotated[float, Range(-5, 5, unit="m")]
+    y: float = 0.0
+    name: str | None = None
+
+
+class Box(TypedDict):
+    width: int
+    label: NotRequired[str]
+
+
+POSE = {
+    "type": "object", "required": ["x"],
+    "properties": {
+        "x": {"title": "x", "type": "number", "minimum": -5, "maximum": 5, "unit": "m"},
+        "y": {"title": "y", "type": "number"},
+        "name": {"title": "name", "type": "string", "rb:nullable": True},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "schema"),
+    [
+        (float | None, {"type": "number", "rb:nullable": True}),
+        (Annotated[int | None, Range(0)], {"type": "integer", "minimum": 0, "rb:nullable": True}),
+        (Annotated[int, Range(0)] | None, {"type": "integer", "minimum": 0, "rb:nullable": True}),
+        (tuple[float, str],
+         {"type": "array", "items": [{"type": "number"}, {"type": "string"}], "minItems": 2, "maxItems": 2}),
+        (tuple[int, ...], {"type": "array", "items": {"type": "integer"}}),
+        (dict[str, bool], {"type": "object", "additionalProperties": {"type": "boolean"}}),
+        (dict[str, object], {"type": "object"}),
+        (Side, {"type": "string",
+                "oneOf": [{"const": "l", "title": "left"}, {"const": "r", "title": "far right"}]}),
+        (Gear, {"type": "string",
+                "oneOf": [{"const": "SLOW", "title": "slow"}, {"const": "FAST", "title": "fast"}]}),
+        (Pose, POSE),
+        (Box, {"type": "object", "required": ["width"],
+               "properties": {"width": {"title": "width", "type": "integer"},
+                              "label": {"title": "label", "type": "string"}}}),
+        (list[Pose], {"type": "array", "items": POSE}),
+        (Literal["a", 1], {"enum": ["a", 1]}),
+    ],
+)  # fmt: skip
+def test_richer_types_become_schemas(kind, schema):
+    assert schema_of(kind) == schema
+
+
+@pytest.mark.parametrize(
+    ("kind", "json", "python"),
+    [
+        (float, 2, 2.0),
+        (int, 2.0, 2),
+        (Literal[1, 2], 2.0, 2),
+        (Side, "r", Side.FAR_RIGHT),
+        (Gear, "SLOW", Gear.SLOW),
+        (Side | None, None, None),
+        (tuple[float, Side], [1, "l"], (1.0, Side.LEFT)),
+        (tuple[int, ...], [1, 2.0], (1, 2)),
+        (list[list[float]], [[1], []], [[1.0], []]),
+        (dict[str, Side], {"a": "l"}, {"a": Side.LEFT}),
+        (Pose, {"x": 1}, Pose(1.0)),
+        (Pose, {"x": 1, "name": "door", "y": 2}, Pose(1.0, 2.0, "door")),
+        (Box, {"width": 3.0}, {"width": 3}),
+    ],
+)
+def test_values_go_to_python_and_back(kind, json, python):
+    made = given(kind, json)
+    assert made == python
+    assert type(made) is type(python)
+    assert given(kind, told(kind, made)) == python
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "sentence"),
+    [
+        (float, "far", "must be a number, not 'far'"),
+        (float, True, "must be a number, not True"),
+        (float, None, "must be a number, not None"),
+        (int, 2.5, "must be a whole number, not 2.5"),
+        (int, float("nan"), "must be a whole number, not nan"),
+        (bool, 1, "must be True or False, not 1"),
+        (str, 1, "must be text, not 1"),
+        (Literal["a", "b"], "c", "must be a or b, not 'c'"),
+        (Side, "x", "must be l or r, not 'x'"),
+        (list[float], "abc", "must be a list, not 'abc'"),
+        (list[float], [1, "a"], "value 2 must be a number, not 'a'"),
+        (tuple[float, float], [1], "must have 2 values, not 1"),
+        (dict[str, int], {"a": "b"}, "“a” must be a whole number, not 'b'"),
+        (Pose, {"y": 1}, "x is missing"),
+        (Pose, Pose("far"), "x must be a number, not 'far'"),  # type: ignore[arg-type]
+        (Pose, 7, "must have x, y and name, not be 7"),
+        (object, object(), "must be what JSON has, not object"),
+    ],
+)
+def test_what_is_of_another_type_is_said(kind, value, sentence):
+    with pytest.raises(RobotValueError) as caught:
+        told(kind, value)
+    assert str(caught.value) == sentence
+
+
+def test_numbers_and_arrays_of_numpy_are_numbers_and_lists():
+    assert told(float, np.float32(0.5)) == 0.5
+    assert told(int, np.int64(7)) == 7
+    assert told(bool, np.bool_(True)) is True
+    assert told(list[float], np.array([1.0, 2.0])) == [1.0, 2.0]
+    assert json.dumps(told(object, {"a": [np.int8(3)]})) == '{"a": [3]}'
+
+
+def test_what_holds_itself_is_refused():
+    @dataclass
+    class Tree:
+        below: list[Tree]
+
+    Tree.__annotations__["below"] = list[Tree]
+    with pytest.raises(TypeError, match="can't hold itself"):
+        schema_of(Tree)
+
+
+# ---- a robot with them -----------------------------------------------------------------------------
+
+
+class Arm:
+    """Takes and gives each kind of value."""
+
+    pose = sensor(Pose, title="pose")
+    limits = sensor(tuple[float, float], title="limits")
+    heat = sensor(float | None, title="heat")
+    bumped = event("when bumped", title="bumped", icon="zap", fields={"side": Side, "force": float})
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+        self.had: list[object] = []
+        self.gives: object = None
+
+    @action("take", "Movement", "move")
+    def take(
+        self,
+        call: Call,
+        angles: list[float],
+        at: tuple[float, Side] = (0.0, Side.LEFT),
+        pose: Pose | None = None,
+        speeds: dict[str, float] = {},  # noqa: B006 - as people write it
+        side: Side = Side.FAR_RIGHT,
+        must: int | None = 3,
+    ) -> None:
+        """Keep what it is given."""
+        self.had = [angles, at, pose, speeds, side, must]
+
+    @action("need", "Movement", "move")
+    def need(self, call: Call, maybe: float | None) -> None:
+        """Has no default, and may be left out all the same."""
+        self.had = [maybe]
+
+    @action("measure", "Movement", "move")
+    def measure(self, call: Call) -> Annotated[float, Range(unit="cm"), Title("width")]:
+        """A number."""
+        return self.gives  # type: ignore[return-value]
+
+    @action("look", "Movement", "move")
+    async def look(self, call: Call) -> Pose:
+        """A pose."""
+        return self.gives  # type: ignore[return-value]
+
+    @action("count", "Movement", "move", output={"count": int})
+    def count(self, call: Call) -> int:
+        """One field."""
+        return self.gives  # type: ignore[return-value]
+
+    @action("anything", "Movement", "move")
+    def anything(self, call: Call):
+        """Whatever."""
+        return self.gives
+
+    @safe_stop()
+    def stop(self) -> None:
+        """Still."""
+
+
+ARM = Kind(model="arm", title="Arm", body=Arm)
+
+
+@pytest.fixture
+def arm(node):
+    with nep.node("listener", "memory") as other, Driver(ARM, "Arm", node) as driver:
+        yield driver.body, Ears(other, "Arm")
+
+
+def test_an_action_gets_values_of_its_types(arm):
+    body, ears = arm
+    ears.invoke("1", "take", angles=[1, 2.5])
+    assert ears.final("1")["state"] == "succeeded"
+    assert body.had == [[1.0, 2.5], (0.0, Side.LEFT), None, {}, Side.FAR_RIGHT, 3]
+    given_ = {"at": [2, "r"], "pose": {"x": 1}, "speeds": {"a": 2}, "side": "l", "must": None}
+    ears.invoke("2", "take", angles=[], **given_)
+    assert ears.final("2")["state"] == "succeeded"
+    assert body.had[1:] == [(2.0, Side.FAR_RIGHT), Pose(1.0), {"a": 2.0}, Side.LEFT, None]
+    ears.invoke("3", "need")
+    assert ears.final("3")["state"] == "succeeded"
+    assert body.had == [None]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"angles": ["a"]}, "take: angles value 1 must be a number"),
+        ({"angles": "a"}, "take: angles must be a list"),
+        ({"angles": [], "at": [1]}, "take: at must have 2 values"),
+        ({"angles": [], "at": [1, "up"]}, "take: at value 2 must be left or far right"),
+        ({"angles": [], "pose": {"x": 9}}, "take: pose x must be between -5 and 5 m"),
+        ({"angles": [], "pose": {}}, "take: pose x is missing"),
+        ({"angles": [], "pose": {"x": 1, "z": 1}}, "take: pose has no “z”"),
+        ({"angles": [], "pose": [1]}, "take: pose must be an object with named values"),
+        ({"angles": [], "speeds": {"a": "fast"}}, "take: speeds “a” must be a number"),
+        ({"angles": None}, "take: angles must be a list"),
+    ],
+)
+def test_wrong_values_inside_others_are_refused(arm, wrong, sentence):
+    body, ears = arm
+    ears.invoke("1", "take", **wrong)
+    assert ears.final("1")["error"] == sentence
+    assert body.had == []
+
+
+@pytest.mark.parametrize(
+    ("asked", "returned", "output"),
+    [
+        ("measure", 3, {"value": 3}),
+        ("look", Pose(1.0, name="here"), {"x": 1.0, "y": 0.0, "name": "here"}),
+        ("look", {"x": 1, "y": 2}, {"x": 1, "y": 2}),
+        ("count", 7, {"count": 7}),
+        ("count", {"count": 7, "more": [1]}, {"count": 7, "more": [1]}),
+        ("count", None, {}),
+        ("anything", 2.5, {"value": 2.5}),
+        ("anything", {"a": Side.LEFT}, {"a": "l"}),
+        ("anything", None, {}),
+    ],
+)
+def test_what_a_function_returns_is_the_output(arm, asked, returned, output):
+    body, ears = arm
+    body.gives = returned
+    ears.invoke("1", asked)
+    answer = ears.final("1")
+    assert (answer["state"], answer["output"]) == ("succeeded", output)
+
+
+@pytest.mark.parametrize(
+    ("asked", "returned", "why"),
+    [
+        ("measure", "wide", "must be a number, not 'wide'"),
+        ("measure", None, "must be a number, not None"),
+        ("measure", float("nan"), "must be a finite number, not nan"),
+        ("look", 7, "must have x, y and name, not be 7"),
+        ("count", "many", "count must be a whole number, not 'many'"),
+        ("anything", {"a": float("inf")}, "must be a finite number, not inf"),
+    ],
+)
+def test_a_wrong_return_is_a_failure_with_a_sentence(arm, asked, returned, why):
+    body, ears = arm
+    body.gives = returned
+    ears.invoke("1", asked)
+    answer = ears.final("1")
+    assert answer["state"] == "failed"
+    assert answer["error"] == f"{asked} was done, but its result is wrong: {why}"
+
+
+def test_the_description_tells_what_is_returned():
+    actions = ARM.thing_model["actions"]
+    assert actions["measure"]["output"]["properties"] == {
+        "value": {"title": "width", "type": "number", "unit": "cm"}
+    }
+    assert set(actions["look"]["output"]["properties"]) == {"x", "y", "name"}
+    assert "output" not in actions["anything"]
+    described = parse(ARM.thing_model).action("measure")
+    assert [(field.name, field.title, field.unit) for field in described.output] == [("value", "width", "cm")]
+
+
+def test_sensors_and_events_tell_values_of_their_types(arm):
+    body, ears = arm
+    poses, limits, heats, bumps = (ears.listen(leaf) for leaf in ("pose", "limits", "heat", "bumped"))
+    body.link.sense("pose", Pose(1.0))
+    body.link.sense("limits", (1, np.float32(0.5)))
+    body.link.sense("heat", None)
+    body.link.happen("bumped", side=Side.LEFT, force=1)
+    eventually(lambda: poses and limits and heats and bumps)
+    assert poses == [{"x": 1.0, "y": 0.0, "name": None}]
+    assert (limits, heats, bumps) == ([{"value": [1, 0.5]}], [{"value": None}], [{"side": "l", "force": 1}])
+    with pytest.raises(RobotValueError, match="Arm's sensor 'heat': the value must be a number, not 'hot'"):
+        body.link.sense("heat", "hot")
+    with pytest.raises(RobotValueError, match="Arm's event 'bumped': force must be a number, not 'hard'"):
+        body.link.happen("bumped", side="l", force="hard")

@@ -387,3 +387,25 @@ def test_an_address_is_sent_as_it_is_and_bare_base64_where_the_robot_wants_it(qt
     assert QImage.fromData(base64.b64decode(encoded(image, bare=True))).width() == 32
     linked = parameter_of("p", {"type": "string", "format": "uri-reference", "rb:widget": "image"})
     assert (linked.kind, linked.bare) == ("image", False)
+
+
+# ---- lists and objects -----------------------------------------------------------------------------
+
+
+def test_a_list_of_numbers_and_an_object_are_typed_as_such(qtbot, theme) -> None:
+    speeds = parameter_of("speeds", {"type": "array", "items": {"type": "number"}}, required=True)
+    pose = parameter_of("pose", {"type": "object", "properties": {"x": {"type": "number"}}}, required=True)
+    form = form_of(qtbot, theme, speeds, pose)
+    first, second = form.findChildren(QLineEdit)
+    assert first.placeholderText() == "Numbers with commas between them"
+    assert second.placeholderText() == '{"x": …}'
+    first.setText("1, 2.5")
+    second.setText('{"x": 3}')
+    assert form.input() == {"speeds": [1, 2.5], "pose": {"x": 3}}
+    assert form.action.check(form.input()) == ()
+    first.setText("1, far")
+    second.setText("{x")
+    assert form.action.check(form.input()) == (
+        "do: speeds value 2 must be a number",
+        "do: pose must be an object with named values",
+    )

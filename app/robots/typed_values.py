@@ -1,0 +1,291 @@
+"""The values of typed Python: what a type is made of, and its values from JSON and to JSON.
+
+:func:`given` makes what a function takes from JSON that its description allows; :func:`told` makes JSON of
+what a driver tells, and raises RobotValueError with what it must be: "must be a number, not 'far'".
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
+
+from app.errors import RobotValueError
+
+_LONGEST_SHOWN = 40
+_DEEPEST = 40
+
+
+def bare(annotation: object) -> tuple[object, tuple[object, ...]]:
+    """A type without its ``Annotated``, and what that said about it."""
+    if get_origin(annotation) is Annotated:
+        plain, *notes = get_args(annotation)
+        return plain, tuple(notes)
+    return annotation, ()
+
+
+def without_none(annotation: object) -> tuple[object, bool]:
+    """What an ``Optional`` holds, and whether it is one; ``int | float`` is a number like float."""
+    if get_origin(annotation) not in {Union, UnionType}:
+        return annotation, False
+    kinds = [kind for kind in get_args(annotation) if kind is not type(None)]
+    is_optional = len(kinds) < len(get_args(annotation))
+    if set(kinds) == {int, float}:
+        return float, is_optional
+    if len(kinds) != 1:
+        raise TypeError(f"a robot's value can't be one of several types: {shown(annotation)}")
+    return kinds[0], is_optional
+
+
+def fields_of(annotation: object) -> Mapping[str, tuple[object, bool]] | None:
+    """The fields of a dataclass or TypedDict with their types, and whether each must be given; else None."""
+    if not isinstance(annotation, type):
+        return None
+    if dataclasses.is_dataclass(annotation):
+        hints = get_type_hints(annotation, include_extras=True)
+        missing = dataclasses.MISSING
+        return {
+            each.name: (hints[each.name], each.default is missing and each.default_factory is missing)
+            for each in dataclasses.fields(annotation)
+            if each.init
+        }
+    if is_typeddict(annotation):
+        required: frozenset[str] = getattr(annotation, "__required_keys__", frozenset())
+        hints = get_type_hints(annotation, include_extras=True)
+        return {name: _present(kind, name in required) for name, kind in hints.items()}
+    return None
+
+
+def _present(kind: object, must: bool) -> tuple[object, bool]:
+    """Without the Required or NotRequired around it, which counts more than the TypedDict's own list of keys.
+
+    (That list misses them in a module whose annotations are texts.)
+    """
+    word = str(get_origin(kind))
+    return (get_args(kind)[0], "Not" not in word) if word.endswith("Required") else (kind, must)
+
+
+def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], ...] | None:
+    """Of a Literal or Enum: what JSON has, what Python has, and the word that people see; else None.
+
+    TypeError when JSON can't tell the values of an Enum apart.
+    """
+    if get_origin(annotation) is Literal:
+        return tuple((value, value, None) for value in get_args(annotation))
+    if not (isinstance(annotation, type) and issubclass(annotation, Enum)):
+        return None
+    members = list(annotation)
+    plain = all(isinstance(each.value, (str, int, float)) for each in members)
+    plain = plain and not any(isinstance(each.value, bool) for each in members)
+    words = [each.name.lower().replace("_", " ") for each in members]
+    return tuple(
+        (each.value if plain else each.name, each, word) for each, word in zip(members, words, strict=True)
+    )
+
+
+def shown(annotation: object) -> str:
+    """A type as a person wrote it: ``float``, ``list[str]``, ``Pose``."""
+    if isinstance(annotation, type) and get_origin(annotation) is None:
+        return annotation.__name__
+    return str(annotation).replace("typing.", "")
+
+
+def given(annotation: object, value: object) -> object:
+    """What a function of this type takes, from a JSON value that its description allows.
+
+    A dataclass may refuse with a ValueError of its own.
+    """
+    kind, is_optional = without_none(bare(annotation)[0])
+    kind = bare(kind)[0]
+    if value is None and is_optional:
+        return None
+    choices = choices_in(kind)
+    if choices is not None:
+        return next((python for json, python, _ in choices if same(json, value)), value)
+    if kind is float and isinstance(value, (int, float)):
+        return float(value)
+    if kind is int and isinstance(value, (int, float)):
+        return int(value)
+    fields = fields_of(kind)
+    if fields is not None and isinstance(value, Mapping):
+        made = {name: given(each, value[name]) for name, (each, _) in fields.items() if name in value}
+        if not dataclasses.is_dataclass(kind):
+            return made
+        absent = {name: None for name, (each, must) in fields.items() if must and name not in made}
+        return kind(**absent, **made)  # type: ignore[operator]  # a dataclass that fields_of took is a class
+    arguments = get_args(kind)
+    if isinstance(value, (list, tuple)) and arguments:
+        if get_origin(kind) is tuple and arguments[1:] != (Ellipsis,):
+            return tuple(given(each, item) for each, item in zip(arguments, value, strict=False))
+        items = [given(arguments[0], item) for item in value]
+        return tuple(items) if get_origin(kind) is tuple else items
+    if isinstance(value, Mapping) and len(arguments) == 2:
+        return {str(name): given(arguments[1], item) for name, item in value.items()}
+    return value
+
+
+def told(annotation: object, value: object) -> object:
+    """The JSON value of what a driver tells as this type; RobotValueError says what it must be instead."""
+    kind, is_optional = without_none(bare(annotation)[0])
+    kind = bare(kind)[0]
+    if value is None and is_optional:
+        return None
+    if kind in (Any, object):
+        return plain(value)
+    value = _out_of_numpy(value)
+    choices = choices_in(kind)
+    if choices is not None:
+        found = [json for json, python, _ in choices if python is value or same(json, value)]
+        if not found:
+            words = [str(json) for json, _, _ in choices]
+            raise RobotValueError(f"must be {' or '.join(words)}, not {_shown_value(value)}")
+        return found[0]
+    if kind in (float, int, bool, str):
+        return _simple(kind, value)
+    fields = fields_of(kind)
+    if fields is not None:
+        return told_fields({name: each for name, (each, _) in fields.items()}, value, _required(fields))
+    return _many(kind, value)
+
+
+def told_fields(
+    kinds: Mapping[str, object], value: object, required: Sequence[str] = ()
+) -> dict[str, object]:
+    """The JSON object of what a driver tells as these fields; what it tells besides stays as it is.
+
+    None is what is not known just now, but for the required ones.
+
+    RobotValueError names the field that is wrong, or missing of the required ones.
+    """
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+    if not isinstance(value, Mapping):
+        raise RobotValueError(f"must have {_listed(list(kinds))}, not be {_shown_value(value)}")
+    made: dict[str, object] = {}
+    for name, each in value.items():
+        try:
+            is_unknown = each is None and name not in required
+            made[str(name)] = told(kinds[name], each) if name in kinds and not is_unknown else plain(each)
+        except RobotValueError as error:
+            raise RobotValueError(f"{name} {error}") from error
+    for name in required:
+        if name not in made:
+            raise RobotValueError(f"{name} is missing")
+    return made
+
+
+def plain(value: object, depth: int = 0) -> object:
+    """The value as JSON has it, whatever type was declared; RobotValueError when JSON has no such thing."""
+    value = _out_of_numpy(value)
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, Enum):
+        return plain(value.value, depth + 1)
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real):
+        return float(value)
+    if depth > _DEEPEST:
+        raise RobotValueError("is nested too deeply")
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(name): plain(item, depth + 1) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, depth + 1) for item in value]
+    raise RobotValueError(f"must be what JSON has, not {_shown_value(value)}")
+
+
+def check_finite(value: object) -> None:
+    """RobotValueError when a number in a JSON value is none that JSON can tell: infinite, or not a number."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise RobotValueError(f"must be a finite number, not {value}")
+    if isinstance(value, Mapping):
+        for item in value.values():
+            check_finite(item)
+    elif isinstance(value, list):
+        for item in value:
+            check_finite(item)
+
+
+def same(allowed: object, value: object) -> bool:
+    """Whether two values are the same in JSON: 1 == True in Python, but 1 is not "yes"."""
+    return allowed == value and isinstance(allowed, bool) == isinstance(value, bool)
+
+
+def _simple(kind: object, value: object) -> object:
+    nouns = {bool: "True or False", str: "text", int: "a whole number", float: "a number"}
+    wanted, noun = next((each, noun) for each, noun in nouns.items() if each is kind)
+    if wanted is bool or wanted is str:
+        good = isinstance(value, wanted)
+    else:
+        found = _number(value)
+        good = found is not None and (wanted is float or float(found).is_integer())
+        if good and found is not None:
+            return found if wanted is float else int(found)
+    if not good:
+        raise RobotValueError(f"must be {noun}, not {_shown_value(value)}")
+    return value
+
+
+def _number(value: object) -> int | float | None:
+    """The number as Python's own; None when it is none. Yes and no are no numbers."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return None
+    return int(value) if isinstance(value, numbers.Integral) else float(value)
+
+
+def _many(kind: object, value: object) -> object:
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin in {dict, Mapping}:
+        if not isinstance(value, Mapping):
+            raise RobotValueError(f"must be an object with named values, not {_shown_value(value)}")
+        return {str(name): _placed(arguments[1], item, str(name)) for name, item in value.items()}
+    if not isinstance(value, (list, tuple)):
+        raise RobotValueError(f"must be a list, not {_shown_value(value)}")
+    if origin is tuple and arguments[1:] != (Ellipsis,):
+        if len(value) != len(arguments):
+            raise RobotValueError(f"must have {len(arguments)} values, not {len(value)}")
+        return [
+            _placed(each, item, place)
+            for place, (each, item) in enumerate(zip(arguments, value, strict=True), 1)
+        ]
+    return [_placed(arguments[0], item, place) for place, item in enumerate(value, 1)]
+
+
+def _placed(kind: object, value: object, place: int | str) -> object:
+    try:
+        return told(kind, value)
+    except RobotValueError as error:
+        name = f"“{place}”" if isinstance(place, str) else f"value {place}"
+        raise RobotValueError(f"{name} {error}") from error
+
+
+def _required(fields: Mapping[str, tuple[object, bool]]) -> list[str]:
+    return [name for name, (kind, must) in fields.items() if must and not without_none(bare(kind)[0])[1]]
+
+
+def _out_of_numpy(value: object) -> object:
+    """Numbers and arrays of numpy as Python has them; numpy itself is not needed for that."""
+    if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
+        return value.tolist()
+    return value
+
+
+def _shown_value(value: object) -> str:
+    words = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else type(value).__name__
+    return words if len(words) <= _LONGEST_SHOWN else f"{words[:_LONGEST_SHOWN]}…"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return (
+        words[0]
+        if len(words) == 1
+        else f"{', '.join(words[:-1])} and {words[-1]}"
+        if words
+        else "named values"
+    )

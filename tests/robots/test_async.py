@@ -1,0 +1,244 @@
+"""Actions, a stop and a close that are ``async def``: they run, and end when they are told to."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+
+import pytest
+
+import nep
+from app.robots.driver import Driver
+from app.robots.kit import Call, Failed, Kind, Link, action, safe_stop
+from app.robots.loop import EventLoop
+from app.robots.tasks import STOP_ANSWER_S
+from tests.robots.conftest import Ears, FakeClock, eventually
+
+
+class Drone:
+    """Flies with asyncio."""
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+        self.loops: set[object] = set()
+        self.events: list[str] = []
+        self.let_go = threading.Event()
+        self.raises: BaseException | None = None
+        self.connected = link.run(self._connect())
+
+    async def _connect(self) -> str:
+        self.loops.add(asyncio.get_running_loop())
+        return "connected"
+
+    @action("fly", "Movement", "move", uses=("wings",), timeout_s=5)
+    async def fly(self, call: Call, times: int = 1000) -> int:
+        """Fly until it has flapped so often, or is told to end."""
+        self.loops.add(asyncio.get_running_loop())
+        self.events.append("flies")
+        call.feedback(flapped=0)
+        try:
+            for _ in range(times):
+                await asyncio.sleep(0.005)
+        finally:
+            await asyncio.sleep(0)  # putting away takes its turns, too
+            self.events.append("put away")
+        return times
+
+    @action("break", "Movement", "move")
+    async def crash(self, call: Call) -> None:
+        """Ends as the test says."""
+        await asyncio.sleep(0)
+        if self.raises is not None:
+            raise self.raises
+
+    @action("wait wrongly", "Movement", "move")
+    async def wait_wrongly(self, call: Call) -> None:
+        """Holds the loop up."""
+        call.wait(0.01)
+
+    @action("stubborn", "Movement", "move")
+    async def stubborn(self, call: Call) -> None:
+        """Does not listen."""
+        while not self.let_go.is_set():
+            try:
+                await asyncio.sleep(0.005)
+            except asyncio.CancelledError:
+                self.events.append("told")
+
+    @action("plain", "Movement", "move")
+    def plain(self, call: Call) -> str:
+        """No coroutine."""
+        return "as ever"
+
+    @safe_stop()
+    async def stop(self) -> None:
+        """Stand still."""
+        await asyncio.sleep(0)
+        self.events.append("stopped")
+
+    async def close(self) -> None:
+        """Say good bye."""
+        self.events.append("closed")
+
+
+DRONE = Kind(model="drone", title="Drone", body=Drone)
+
+
+@pytest.fixture
+def drone(node, clock):
+    with nep.node("listener", "memory") as other:
+        ears = Ears(other, "Drone")
+        driver = Driver(DRONE, "Drone", node, clock=clock)
+        driver.start()
+        body = driver.body
+        yield body, ears, clock
+        body.let_go.set()
+        driver.close()
+        assert body.events[-1] == "closed"
+    assert [t.name for t in threading.enumerate() if t.name.startswith("Drone")] == []
+
+
+def test_it_runs_to_its_end_and_tells_what_it_returns(drone):
+    body, ears, _ = drone
+    ears.invoke("1", "fly", times=2)
+    answer = ears.final("1")
+    assert (answer["state"], answer["output"]) == ("succeeded", {"value": 2})
+    assert body.events == ["flies", "put away"]
+    assert {"flapped": 0} in [a["feedback"] for a in ears.answers("1")]
+    ears.invoke("2", "plain")
+    assert ears.final("2")["output"] == {"value": "as ever"}
+
+
+def test_all_of_it_lives_in_one_loop(drone):
+    body, ears, _ = drone
+    assert body.connected == "connected"
+    for wanted in ("1", "2"):
+        ears.invoke(wanted, "fly", times=1)
+        ears.final(wanted)
+    assert len(body.loops) == 1
+
+
+def test_a_cancel_a_time_limit_and_a_stop_end_it(drone):
+    body, ears, clock = drone
+    ears.invoke("1", "fly")
+    eventually(lambda: body.events == ["flies"])
+    ears.command(id="1", op="cancel")
+    assert ears.final("1")["state"] == "canceled"
+    assert body.events == ["flies", "put away"]  # the answer waits for it
+
+    ears.invoke("2", "fly")
+    eventually(lambda: body.events[2:] == ["flies"])
+    clock.advance(5.1)
+    assert ears.final("2")["error"] == "fly took longer than 5 s"
+
+    ears.invoke("3", "fly")
+    eventually(lambda: body.events[4:] == ["flies"])
+    ears.command(id="s", op="stop")
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert ears.final("3")["state"] == "canceled"
+    assert sorted(body.events[5:]) == ["put away", "stopped"]
+
+
+@pytest.mark.parametrize(
+    ("raised", "state", "error"),
+    [
+        (Failed("no wind"), "failed", "no wind"),
+        (ValueError("odd"), "failed", "crash broke off: odd"),
+        (SystemExit(3), "failed", "crash broke off: 3"),
+        (KeyboardInterrupt(), "failed", "crash broke off: KeyboardInterrupt"),
+        (asyncio.CancelledError(), "canceled", None),
+        (None, "succeeded", None),
+    ],
+    ids=repr,
+)
+def test_whatever_it_raises_is_answered_and_the_next_one_runs(drone, raised, state, error):
+    body, ears, _ = drone
+    body.raises = raised
+    ears.invoke("1", "crash")
+    answer = ears.final("1")
+    assert (answer["state"], answer["error"]) == (state, error)
+    ears.invoke("2", "fly", times=1)
+    assert ears.final("2")["state"] == "succeeded"
+    ears.command(id="s", op="stop")
+    assert ears.final("s", "stop")["state"] == "succeeded"
+
+
+def test_a_wait_that_would_hold_all_others_up_says_what_to_use(drone):
+    _, ears, _ = drone
+    ears.invoke("1", "wait_wrongly")
+    assert "use `await asyncio.sleep` there" in str(ears.final("1")["error"])
+
+
+def test_one_that_does_not_listen_is_named_until_it_ends(drone):
+    body, ears, clock = drone
+    ears.invoke("1", "stubborn")
+    eventually(lambda: "running" in ears.states("1"))
+    ears.command(id="s", op="stop")
+    eventually(lambda: "told" in body.events and "stopped" in body.events)
+    clock.advance(STOP_ANSWER_S + 0.01)
+    assert ears.final("s", "stop")["error"] == "Drone may still move: stubborn has not ended"
+    body.let_go.set()
+    eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])
+
+
+def test_a_function_that_returns_an_awaitable_is_run_as_well(node):
+    class Wrapped:
+        ran: list[str] = []  # noqa: RUF012 - read after the robot has ended
+
+        @action("go", "Movement", "move")
+        def go(self, call: Call):  # as a decorator of the driver's own may make it
+            async def later() -> None:
+                self.ran.append("ran")
+
+            return later()
+
+        def __init__(self, link: Link) -> None:
+            self.link = link
+
+        @safe_stop()
+        def stop(self) -> None:
+            """Still."""
+
+    with nep.node("listener", "memory") as other:
+        ears = Ears(other, "Wrapped")
+        with Driver(Kind(model="wrapped", title="W", body=Wrapped), "Wrapped", node, clock=FakeClock()):
+            ears.invoke("1", "go")
+            assert ears.final("1")["state"] == "succeeded"
+    assert Wrapped.ran == ["ran"]
+
+
+def test_a_loop_that_has_ended_runs_nothing_and_leaves_no_warning():
+    async def never() -> None:
+        raise AssertionError
+
+    loop = EventLoop("test")
+    loop.close()
+    with pytest.raises(RuntimeError, match="the robot has ended"):
+        loop.run(never())
+
+
+def test_a_coroutine_that_takes_too_long_is_canceled():
+    ended = threading.Event()
+
+    async def long() -> None:
+        try:
+            await asyncio.sleep(60)
+        finally:
+            ended.set()
+
+    loop = EventLoop("test")
+    with pytest.raises(TimeoutError):
+        loop.run(long(), within_s=0.01)
+    assert ended.wait(5)
+    loop.close()
+
+
+def test_the_loop_itself_is_not_waited_for_in_itself():
+    loop = EventLoop("test")
+
+    async def inner() -> None:
+        loop.run(asyncio.sleep(0))
+
+    with pytest.raises(RuntimeError, match="use await"):
+        loop.run(inner())
+    loop.close()
