@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 
 import pytest
@@ -13,6 +14,12 @@ from app.robots.kit import Call, Failed, Kind, Link, action, safe_stop
 from app.robots.loop import EventLoop
 from app.robots.tasks import STOP_ANSWER_S
 from tests.robots.conftest import Ears, FakeClock, eventually
+
+
+async def pause(seconds: float) -> None:
+    """Let others have their turn for so long, as a robot's library does that waits for its radio."""
+    with contextlib.suppress(asyncio.TimeoutError):
+        await asyncio.wait_for(asyncio.Event().wait(), seconds)
 
 
 class Drone:
@@ -38,16 +45,16 @@ class Drone:
         call.feedback(flapped=0)
         try:
             for _ in range(times):
-                await asyncio.sleep(0.005)
+                await pause(0.005)
         finally:
-            await asyncio.sleep(0)  # putting away takes its turns, too
+            await pause(0.0)  # putting away takes its turns, too
             self.events.append("put away")
         return times
 
     @action("break", "Movement", "move")
     async def crash(self, call: Call) -> None:
         """Ends as the test says."""
-        await asyncio.sleep(0)
+        await pause(0.0)
         if self.raises is not None:
             raise self.raises
 
@@ -61,7 +68,7 @@ class Drone:
         """Does not listen."""
         while not self.let_go.is_set():
             try:
-                await asyncio.sleep(0.005)
+                await pause(0.005)
             except asyncio.CancelledError:
                 self.events.append("told")
 
@@ -73,7 +80,7 @@ class Drone:
     @safe_stop()
     async def stop(self) -> None:
         """Stand still."""
-        await asyncio.sleep(0)
+        await pause(0.0)
         self.events.append("stopped")
 
     async def close(self) -> None:
@@ -222,7 +229,7 @@ def test_a_coroutine_that_takes_too_long_is_canceled():
 
     async def long() -> None:
         try:
-            await asyncio.sleep(60)
+            await pause(60.0)
         finally:
             ended.set()
 
@@ -237,7 +244,7 @@ def test_the_loop_itself_is_not_waited_for_in_itself():
     loop = EventLoop("test")
 
     async def inner() -> None:
-        loop.run(asyncio.sleep(0))
+        loop.run(pause(0.0))
 
     with pytest.raises(RuntimeError, match="use await"):
         loop.run(inner())
