@@ -203,6 +203,27 @@ def test_a_sleep_is_found(source: str) -> None:
     assert sleeps(ast.parse(f"async def f():\n    {source}\n")) == [2]
 
 
+def processes_with_a_console(tree: ast.Module) -> list[int]:
+    """The lines that start a process, but for those that tell Windows not to open a console for it."""
+    starts = {"Popen", "run", "call", "check_call", "check_output"}
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and isinstance(node.func.value, ast.Name)
+        and (node.func.value.id, node.func.attr) in {("subprocess", name) for name in starts}
+        and "creationflags" not in {word.arg for word in node.keywords}
+    ]
+
+
+def test_no_process_opens_a_console_window_on_windows() -> None:
+    assert processes_with_a_console(ast.parse("import subprocess\nsubprocess.run(['x'])")) == [2]
+    assert [
+        f"{module.name}:{line}" for module in modules() for line in processes_with_a_console(module.tree)
+    ] == []
+
+
 def test_qt_does_not_lose_references_of_none() -> None:
     """PySide6 6.12.0 for Linux loses one at every void call; Python 3.10 and 3.11 then abort."""
     program = (

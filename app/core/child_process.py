@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 else:
     psutil = later("psutil")
 
+NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+"""Windows opens a window for every console program otherwise."""
 MOST_BYTES = 1_000_000_000
 """How much memory a program may use, together with what it starts."""
 FAMILY_S = 1.0
@@ -51,6 +53,7 @@ class ChildProcess:
                 stderr=subprocess.PIPE,
                 env={**os.environ, "PYTHONIOENCODING": "utf-8", "PYTHONUNBUFFERED": "1"},
                 cwd=cwd,
+                creationflags=NO_CONSOLE,
                 start_new_session=os.name == "posix",  # a group of its own, which can be ended at once
             )
         except OSError as error:

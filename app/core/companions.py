@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO
 
+from app.core.child_process import NO_CONSOLE
 from app.core.master_start import MasterStart
 
 END_WAIT_S = 2.0
@@ -151,7 +152,7 @@ class Companions:
                     stdout=log,
                     stderr=log,
                     env=environment,
-                    creationflags=_no_console(),
+                    creationflags=NO_CONSOLE,
                 )
             except OSError as error:
                 log.close()
@@ -198,10 +199,6 @@ class Companions:
         for name in list(self._robots):
             self.stop_virtual_robot(name)
         self._master.close()
-
-
-def _no_console() -> int:
-    return getattr(subprocess, "CREATE_NO_WINDOW", 0)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -20,7 +21,8 @@ class Row:
     """One command. ``group`` makes it one of several choices; ``above`` puts a line over it.
 
     Without a ``menu`` it is only in the palette and among the shortcuts. ``check`` makes it something that is
-    on or off, ``everywhere`` a key that works in all windows.
+    on or off, ``everywhere`` a key that works in all windows. ``also`` are more keys beside ``shortcut``,
+    ``mac`` those of a Mac in place of all: Ctrl is written there for Cmd, Meta for the key that says Ctrl.
     """
 
     name: str
@@ -32,6 +34,14 @@ class Row:
     above: bool = False
     everywhere: bool = False
     check: bool = False
+    also: tuple[str, ...] = ()
+    mac: tuple[str, ...] = ()
+
+    def keys_at_first(self, platform: str = sys.platform) -> tuple[str, ...]:
+        """The keys at first, the one that stands in menus before the others."""
+        if platform == "darwin" and self.mac:
+            return self.mac
+        return (self.shortcut, *self.also) if self.shortcut else ()
 
 
 TABLE: tuple[Row, ...] = (
@@ -47,12 +57,30 @@ TABLE: tuple[Row, ...] = (
     Row("settings.open", "File", "Settings", "Ctrl+,", "settings"),
     Row("file.quit", "File", "Quit", "Ctrl+Q", above=True),
     Row("edit.undo", "Edit", "Undo", "Ctrl+Z", "rotate-ccw"),
-    Row("edit.redo", "Edit", "Redo", "Ctrl+Shift+Z", "rotate-cw"),
+    Row("edit.redo", "Edit", "Redo", "Ctrl+Shift+Z", "rotate-cw", also=("Ctrl+Y",)),
     Row("blocks.find", "Edit", "Find in the blocks", "Ctrl+F", "search", above=True),
     Row("blocks.search", "Edit", "Find a block to add"),
     Row("palette.open", "View", "Find a command or panel", "Ctrl+K", "search"),
-    Row("layout.behaviour", "View", "Behaviour layout", "Alt+1", "blocks", group="layout", above=True),
-    Row("layout.developer", "View", "Developer layout", "Alt+2", "activity", group="layout"),
+    # with Option (Alt) a Mac types signs, and Cmd+Tab is the system's
+    Row(
+        "layout.behaviour",
+        "View",
+        "Behaviour layout",
+        "Alt+1",
+        "blocks",
+        group="layout",
+        above=True,
+        mac=("Ctrl+Alt+1",),
+    ),
+    Row(
+        "layout.developer",
+        "View",
+        "Developer layout",
+        "Alt+2",
+        "activity",
+        group="layout",
+        mac=("Ctrl+Alt+2",),
+    ),
     Row("layout.keep", "View", "Keep this layout as"),
     Row("layout.rename", "View", "Rename this layout"),
     Row("layout.delete", "View", "Delete this layout", "", "trash-2"),
@@ -60,8 +88,14 @@ TABLE: tuple[Row, ...] = (
     Row("panel.next", "View", "Next panel", "F6"),
     Row("panel.previous", "View", "Previous panel", "Shift+F6"),
     *(Row(f"panel.{n}", "", f"Go to panel {n}", f"Ctrl+{n}") for n in range(1, 10)),
-    Row("tab.next", "View", "Next behaviour", "Ctrl+Tab", above=True),
-    Row("tab.previous", "View", "Previous behaviour", "Ctrl+Shift+Tab"),
+    Row("tab.next", "View", "Next behaviour", "Ctrl+Tab", above=True, mac=("Meta+Tab", "Ctrl+Shift+]")),
+    Row(
+        "tab.previous",
+        "View",
+        "Previous behaviour",
+        "Ctrl+Shift+Tab",
+        mac=("Meta+Shift+Tab", "Ctrl+Shift+["),
+    ),
     Row("view.freeze", "View", "Freeze what shows", "", "snowflake", check=True, above=True),
     Row("theme.light", "View", "Light", "", "sun", group="theme", above=True),
     Row("theme.dark", "View", "Dark", "", "moon", group="theme"),
@@ -88,6 +122,13 @@ TABLE: tuple[Row, ...] = (
     Row("help.about", "Help", "About NEP Studio", "", "info"),
 )
 
+ROLES = {
+    "settings.open": QAction.MenuRole.PreferencesRole,
+    "file.quit": QAction.MenuRole.QuitRole,
+    "help.about": QAction.MenuRole.AboutRole,
+}
+"""Where a Mac has a place of its own for a command, in the menu with the program's name."""
+
 Handler = Callable[[], object]
 
 
@@ -106,8 +147,8 @@ class Actions:
         action.setObjectName(row.name)
         if row.icon is not None and not row.group:
             action.setIcon(theme.icon(row.icon))
-        if row.shortcut:
-            action.setShortcut(QKeySequence(row.shortcut))
+        action.setShortcuts([QKeySequence(key) for key in row.keys_at_first()])
+        action.setMenuRole(ROLES.get(row.name, QAction.MenuRole.NoRole))
         if row.everywhere:
             action.setShortcutContext(Qt.ShortcutContext.ApplicationShortcut)
         action.setCheckable(bool(row.group) or row.check)
@@ -171,4 +212,4 @@ class Actions:
 
 def shortcuts() -> list[tuple[str, str]]:
     """Every command that has a key: (words, key)."""
-    return [(row.text, row.shortcut) for row in TABLE if row.shortcut]
+    return [(row.text, row.keys_at_first()[0]) for row in TABLE if row.keys_at_first()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt, Signal
@@ -21,14 +22,16 @@ class AppBar(QWidget):
     layout_chosen = Signal(str)
     stop_pressed = Signal()
 
-    def __init__(self, theme: Theme, layouts: Sequence[Layout]) -> None:
+    def __init__(self, theme: Theme, layouts: Sequence[Layout], platform: str = sys.platform) -> None:
+        """``platform`` as `sys.platform` says it."""
         super().__init__()
         self._theme = theme
         self.setMinimumHeight(theme.size("appBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Menus and layouts")
         self.menus = QMenuBar()
-        self.menus.setNativeMenuBar(False)
+        self.native = platform == "darwin"  # a Mac shows the menus at the top of its screen
+        self.menus.setNativeMenuBar(self.native)
         self.menus.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
         self.switch = Segments(
             theme, [(layout.name, layout.title, layout.icon) for layout in layouts], name="Layout"

@@ -21,6 +21,7 @@ from PySide6.QtGui import QFont, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from app.ui.icons import paint_icon
+from app.ui.plain_key import is_plain
 from app.ui.theme import Theme
 from app.ui.widgets import SearchField, paint
 
@@ -262,7 +263,7 @@ class FindWords(SearchField):
         if event.key() == Qt.Key.Key_Escape:
             self.clear()
             self.hide()
-        if event.key() in {Qt.Key.Key_Escape, Qt.Key.Key_Down}:
+        if event.key() in {Qt.Key.Key_Escape, Qt.Key.Key_Down} and is_plain(event):
             self.left.emit()
         else:
             super().keyPressEvent(event)

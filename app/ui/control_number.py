@@ -10,6 +10,7 @@ from app.robots.description import Parameter
 from app.ui.angle_dial import AngleDial
 from app.ui.control import VALUE_WIDTH, Control, Tell, connect
 from app.ui.flow import Flow
+from app.ui.plain_key import is_plain
 from app.ui.theme import Theme
 from app.ui.widgets import NumberField, SliderWithUnit, label
 from app.ui.widgets.slider import decimals_of
@@ -138,7 +139,7 @@ class OpenNumber(NumberField):
             Qt.Key.Key_PageDown: -PAGE_STEPS,
         }.get(Qt.Key(event.key()))
         now = read_number(self.text() or "0", whole=False)
-        if steps is None or not isinstance(now, (int, float)):
+        if steps is None or not is_plain(event) or not isinstance(now, (int, float)):
             super().keyPressEvent(event)
             return
         low, high = self._parameter.minimum, self._parameter.maximum

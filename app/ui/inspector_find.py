@@ -10,6 +10,7 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from app.ui.plain_key import is_plain
 from app.ui.theme import Theme
 from app.ui.tree_values import search
 from app.ui.widgets import IconButton, SearchField, paint
@@ -71,7 +72,7 @@ class FindField(SearchField):
             self.step_wanted.emit(-1 if back else 1)
         elif event.key() == Qt.Key.Key_Escape and self.text():
             self.clear()
-        elif event.key() == Qt.Key.Key_Down:
+        elif event.key() == Qt.Key.Key_Down and is_plain(event):
             self.leave.emit()
         else:
             super().keyPressEvent(event)

@@ -7,6 +7,7 @@ have a second key.
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from app.core.settings import Settings
 from app.errors import SettingsError
 from app.ui.actions import TABLE, Row
 
+MAC_KEYS = {"Ctrl": "⌘", "Alt": "⌥", "Shift": "⇧", "Meta": "⌃"}
 STOP, STOP_KEY = "run.stop", "F12"
 NEEDS_WITH = "A key alone is for typing. Hold Ctrl or Alt with it, or use a function key."
 ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
@@ -60,9 +62,12 @@ FIXED: tuple[Fixed, ...] = (
 )
 
 
-def spoken_key(shortcut: str) -> str:
-    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"."""
-    return re.sub(r"\+(?=.)", " ", shortcut)
+def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
+    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"; on a Mac, where Ctrl is Cmd, "⌘ ⇧ S"."""
+    words = re.sub(r"\+(?=.)", " ", shortcut)
+    if platform != "darwin":
+        return words
+    return " ".join(MAC_KEYS.get(word, word) for word in words.split(" "))
 
 
 def normal(key: str) -> str:
@@ -81,11 +86,16 @@ class Shortcuts(QObject):
     changed = Signal()
 
     def __init__(
-        self, settings: Settings, complain: Callable[[str], object], rows: Sequence[Row] = TABLE
+        self,
+        settings: Settings,
+        complain: Callable[[str], object],
+        rows: Sequence[Row] = TABLE,
+        *,
+        platform: str = sys.platform,
     ) -> None:
-        """``complain`` is told, in a sentence, what can't be kept."""
+        """``complain`` is told, in a sentence, what can't be kept; ``platform`` as `sys.platform` says it."""
         super().__init__()
-        self._settings, self._complain = settings, complain
+        self._settings, self._complain, self._platform = settings, complain, platform
         self.rows: Mapping[str, Row] = {row.name: row for row in rows}
         self._own = self._read()
 
@@ -104,7 +114,7 @@ class Shortcuts(QObject):
     def default(self, name: str) -> tuple[str, ...]:
         """The keys that the table gives a command."""
         row = self.rows.get(name)
-        return (normal(row.shortcut),) if row is not None and row.shortcut else ()
+        return tuple(normal(key) for key in row.keys_at_first(self._platform)) if row is not None else ()
 
     def of(self, name: str) -> tuple[str, ...]:
         """The keys of a command now, the first of them in menus and tooltips."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.arrivals import arrivals
+from app.core.arrivals import MOST_LINES, arrivals
 from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 
@@ -50,3 +50,18 @@ def test_what_nep_itself_publishes_and_who_logs_for_the_master_are_not_told() ->
     assert arrivals(graph(), graph(master=["/nep/log"])) == []
     assert arrivals(graph(master=["/nep/log"]), graph()) == []
     assert arrivals(graph(), graph(one=["/nep/log"])) == ["one is here"]
+
+
+def test_many_at_once_are_one_line_with_their_number() -> None:
+    thousand = [f"/t{number:04}" for number in range(1000)]
+    assert arrivals(graph(one=[]), graph(one=thousand)) == [
+        "1000 new topics: /t0000, /t0001, /t0002 and 997 more"
+    ]
+    crowd: dict[str, list[str]] = {f"n{number}": [] for number in range(200)}
+    assert arrivals(graph(), graph(**crowd)) == ["200 nodes are here: n0, n1, n2 and 197 more"]
+    assert arrivals(graph(**crowd), graph()) == ["200 nodes have left: n0, n1, n2 and 197 more"]
+
+
+def test_a_few_at_once_are_named_each() -> None:
+    few = [f"/t{number}" for number in range(MOST_LINES)]
+    assert len(arrivals(graph(one=[]), graph(one=few))) == MOST_LINES

@@ -6,18 +6,25 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QKeyCombination, Qt
-from PySide6.QtGui import QKeySequence
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtTest import QTest
 
 from app.core.settings import Settings
+from app.robots.description import Parameter
 from app.ui.actions import TABLE
+from app.ui.app_bar import AppBar
 from app.ui.commands import Commands
+from app.ui.console_list import FindWords
+from app.ui.control_number import OpenNumber
 from app.ui.entry_list import Heading
+from app.ui.filter_field import FilterField
+from app.ui.layouts import LAYOUTS
 from app.ui.main_window import MainWindow
 from app.ui.palette import Palette
 from app.ui.palette_match import Found
 from app.ui.shortcut_sheet import ShortcutSheet
-from app.ui.shortcuts import FIXED, Shortcuts
+from app.ui.shortcuts import FIXED, Shortcuts, spoken_key
+from app.ui.theme import Theme
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 CTRL = Qt.KeyboardModifier.ControlModifier
@@ -33,6 +40,67 @@ def test_no_two_commands_have_the_same_key_at_first(keys: Shortcuts) -> None:
     given = [key for row in TABLE for key in keys.of(row.name)]
     assert sorted(given) == sorted(set(given))
     assert all(key == QKeySequence(key).toString() for key in given)
+
+
+def test_ctrl_y_does_again_what_was_undone(window: MainWindow, commands: Commands, keys: Shortcuts) -> None:
+    assert keys.of("edit.redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
+    assert [key.toString() for key in commands.actions["edit.redo"].shortcuts()] == ["Ctrl+Shift+Z", "Ctrl+Y"]
+    assert keys.holder("Ctrl+Y") == "edit.redo"
+
+
+def test_on_a_mac_no_key_is_the_systems_or_types_a_sign(qapp: object, tmp_path: Path) -> None:
+    """Ctrl is Cmd there, Meta the key that says Ctrl; Option types signs, Cmd+Tab changes the program."""
+    keys = Shortcuts(Settings(tmp_path), lambda _sentence: None, platform="darwin")
+    given = [key for row in TABLE for key in keys.of(row.name)]
+    assert sorted(given) == sorted(set(given))
+    assert not {"Ctrl+Tab", "Ctrl+Shift+Tab", "Ctrl+H", "Ctrl+M", "Ctrl+Space"} & set(given)
+    assert not [key for key in given if key.startswith("Alt+")]
+    arrows = ("Left", "Right", "Up", "Down", "Home", "End", "Backspace", "Delete")
+    assert not [key for key in given if key.endswith(arrows)], "they move in the text of a field"
+    assert keys.of("tab.next") == ("Meta+Tab", "Ctrl+Shift+]")
+    assert keys.of("layout.behaviour") == ("Ctrl+Alt+1",)
+    assert not keys.own("tab.next")
+
+
+def test_keys_are_spoken_as_they_stand_on_a_mac() -> None:
+    assert spoken_key("Ctrl+Shift+S", "darwin") == "⌘ ⇧ S"
+    assert spoken_key("Meta+Tab", "darwin") == "⌃ Tab"
+    assert spoken_key("Ctrl++", "darwin") == "⌘ +"
+    assert spoken_key("Ctrl+Shift+S", "linux") == "Ctrl Shift S"
+
+
+def test_a_mac_has_its_menus_at_the_top_of_the_screen(
+    qtbot, theme: Theme, window: MainWindow, commands
+) -> None:
+    for platform, native in (("darwin", True), ("linux", False), ("win32", False)):
+        bar = AppBar(theme, LAYOUTS, platform)
+        qtbot.addWidget(bar)
+        assert bar.native == native
+    roles = {name: commands.actions[name].menuRole() for name in ("settings.open", "file.quit", "help.about")}
+    assert set(roles.values()) == {
+        QAction.MenuRole.PreferencesRole, QAction.MenuRole.QuitRole, QAction.MenuRole.AboutRole,
+    }  # fmt: skip
+    assert commands.actions["file.save"].menuRole() == QAction.MenuRole.NoRole
+
+
+@pytest.mark.parametrize("held", [CTRL, Qt.KeyboardModifier.ShiftModifier])
+def test_keys_that_move_in_a_text_are_left_to_it(qtbot, theme: Theme, held: Qt.KeyboardModifier) -> None:
+    left: list[str] = []
+    field = FilterField(theme, "Filter")
+    qtbot.addWidget(field)
+    field.leave.connect(lambda: left.append("filter"))
+    words = FindWords(theme)
+    qtbot.addWidget(words)
+    words.left.connect(lambda: left.append("console"))
+    number = OpenNumber(theme, Parameter("n", "n", "number", default=5))
+    qtbot.addWidget(number)
+    number.setText("5")
+    for each in (field, words, number):
+        QTest.keyClick(each, Qt.Key.Key_Down, held)
+    assert (left, number.text()) == ([], "5")
+    for each in (field, words, number):
+        QTest.keyClick(each, Qt.Key.Key_Down, Qt.KeyboardModifier.KeypadModifier)  # as arrows of a Mac come
+    assert (left, number.text()) == (["filter", "console"], "4")
 
 
 def test_a_new_key_is_kept(keys: Shortcuts, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.plain_key import is_plain
 from app.ui.robot_drawing import RobotDrawing
 from app.ui.robot_state import RobotState
 from app.ui.theme import Theme
@@ -120,7 +121,7 @@ class RoomView(QWidget):
         self._key(event, down=False)
 
     def _key(self, event: QKeyEvent, *, down: bool) -> None:
-        part = KEYS.get(Qt.Key(event.key())) if event.modifiers() == Qt.KeyboardModifier.NoModifier else None
+        part = KEYS.get(Qt.Key(event.key())) if is_plain(event) else None
         if part is None:
             event.ignore()
         elif not event.isAutoRepeat():
