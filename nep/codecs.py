@@ -5,10 +5,12 @@
 | json    | 1      | what JSON has; also numpy arrays and scalars, dataclasses, date and time |
 | string  | 2      | `str`, as UTF-8                                                          |
 | bytes   | 3      | `bytes`                                                                  |
-| msgpack | 4      | what msgpack has, bytes included; numpy as lists                         |
-| image   | 5      | a picture: `uint8` array (height, width, 3) in BGR order, see `nep.images` |
+| msgpack | 4      | what msgpack has, bytes and NaN included; date and time as its timestamp |
+| image   | 5      | a picture: an array (height, width, 3) in BGR order, see `nep.images`    |
 
-JSON has no NaN and no infinity: they are sent as `null`. Keys that are numbers become strings.
+JSON has no NaN and no infinity: they are sent as `null`, and a publisher tells of it (see `nep.nulls`). Keys
+that are numbers become strings. msgpack takes numpy arrays and dataclasses as JSON does. Readers in other
+languages may want keys that are text or numbers; ours reads all that Python can have.
 Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
 """
 
@@ -16,8 +18,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from datetime import date, datetime, time, timezone
+from enum import Enum
+from uuid import UUID
 
+import msgpack  # type: ignore[import-untyped]
 import orjson
 
 from nep import images
@@ -104,9 +110,26 @@ def _decode_bytes(data: bytes | memoryview, _extension: Mapping[str, object]) ->
     return data if isinstance(data, bytes) else bytes(data)
 
 
+def _packable(value: object) -> object:
+    """What msgpack does not know, in the form that it has in JSON; only times keep their own."""
+    if isinstance(value, datetime):  # without a zone, or of a class of its own
+        return msgpack.Timestamp.from_datetime(value.astimezone(timezone.utc))
+    if isinstance(value, date | time):
+        return value.isoformat()
+    if isinstance(value, UUID):
+        return str(value)
+    if isinstance(value, Enum):
+        return value.value
+    if is_dataclass(value) and not isinstance(value, type):
+        return {
+            each.name: getattr(value, each.name) for each in fields(value) if not each.name.startswith("_")
+        }
+    return _plain(value)
+
+
 def _encode_msgpack(payload: object) -> Encoded:
     try:
-        return Encoded(pack(payload, _plain))
+        return Encoded(pack(payload, _packable))
     except ValueError as error:
         raise EncodeError("msgpack", type(payload).__name__, str(error)) from error
 

@@ -12,9 +12,13 @@ _LEAST, _MOST = -(2**63), 2**64 - 1
 
 
 def pack(value: object, default: Callable[[object], object] | None = None) -> bytes:
-    """`value` as msgpack; `default` turns what msgpack does not know. Raises `ValueError`."""
+    """`value` as msgpack; `default` turns what msgpack does not know. Raises `ValueError`.
+
+    A date with time becomes msgpack's timestamp, which every language reads; without a zone it is this
+    computer's time, as everywhere in Python.
+    """
     try:
-        packed: bytes = msgpack.packb(value, use_bin_type=True, default=default)
+        packed: bytes = msgpack.packb(value, use_bin_type=True, default=default, datetime=True)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         raise ValueError(str(error) or "it does not fit") from error
     return packed
@@ -37,9 +41,37 @@ def pack_surely(value: object) -> bytes:
 
 
 def unpack(data: bytes | memoryview) -> object:
-    """The value in `data`. Raises `ValueError` for anything that is not exactly one msgpack value."""
+    """The value in `data`. Raises `ValueError` for anything that is not exactly one msgpack value.
+
+    Timestamps are `datetime` in UTC, exact to a microsecond; in a message with one beyond the year 9999 all
+    are `msgpack.Timestamp`. Lists that are keys are tuples.
+    """
     try:
-        value: object = msgpack.unpackb(data, raw=False, strict_map_key=False)
-    except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
+        value: object = msgpack.unpackb(data, raw=False, strict_map_key=False, timestamp=3)
+    except (TypeError, OverflowError):  # rare: a list is a key, a timestamp is no date
+        return _unpack_rare(data)
+    except (ValueError, msgpack.UnpackException, RecursionError) as error:
         raise ValueError(str(error) or "the bytes end too early") from error
     return value
+
+
+def _unpack_rare(data: bytes | memoryview) -> object:
+    for timestamp in (3, 0):
+        try:
+            value: object = msgpack.unpackb(
+                data, raw=False, strict_map_key=False, timestamp=timestamp, object_pairs_hook=_map
+            )
+        except OverflowError:
+            continue
+        except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
+            raise ValueError(str(error) or "the bytes end too early") from error
+        return value
+    raise ValueError("a timestamp in it is no time")
+
+
+def _map(pairs: list[tuple[object, object]]) -> dict[object, object]:
+    return {_hashable(key): value for key, value in pairs}
+
+
+def _hashable(key: object) -> object:
+    return tuple(map(_hashable, key)) if isinstance(key, list) else key

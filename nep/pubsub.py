@@ -12,6 +12,7 @@ from nep.codecs import codec_for
 from nep.encoded import Encoded, encoded
 from nep.errors import ClosedError, DecodeError
 from nep.message import Message
+from nep.nulls import NullTeller
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -37,7 +38,8 @@ class Publisher:
         self._is_forked = False
         self._outlet = outlet
         self._spec = spec
-        self._encode = spec.codec.encode
+        self._nulls = NullTeller(spec.topic) if spec.codec.name == "json" else None
+        self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
         self._is_latched = spec.is_latched
         self._is_closed = False
 
@@ -70,6 +72,11 @@ class Publisher:
     def count(self) -> int:
         """Messages published so far, also those that nobody was there to hear."""
         return self._outlet.count
+
+    @property
+    def nulled(self) -> int:
+        """Messages in which NaN or infinity was sent as `null`, because JSON has neither; they are logged."""
+        return 0 if self._nulls is None else self._nulls.count
 
     def publish(self, payload: object) -> None:
         """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.

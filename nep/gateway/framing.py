@@ -115,6 +115,11 @@ class Shape:
             raise FrameError(f"A message on “{self.topic}” is JSON inside JSON", version="0.5.4.7")
 
 
+def lost_numbers(frame: bytes, data: bytes) -> bool:
+    """Whether NaN or infinity in `frame` has become `null` in `data`, which was read from it."""
+    return _NOT_A_NUMBER.search(frame) is not None and data.count(b"null") > frame.count(b"null")
+
+
 def shield_javascript(data: bytes, topic: str) -> bytes:
     r"""The same JSON without the topic's text in it.
 

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import zmq
 
-from nep.gateway.framing import FrameError
+from nep.gateway.framing import FrameError, lost_numbers
 from nep.gateway.pair import Pair
 from nep.gateway.portmap import Line
 from nep.gateway.requests import Role
@@ -161,6 +161,7 @@ class Relay:
         if key in self._publishing and not any(pair.connections["publisher"] for pair in pairs):
             self._publishing.discard(key)
             self._native.stop_publishing(*key)
+            self._alerts.cure(f"nan:{key[0]}")
         for pair in pairs:
             self._judge(pair)
 
@@ -176,6 +177,12 @@ class Relay:
             return
         if pair.line.topic in self._refused:
             self._refused[pair.line.topic].is_cured = True
+        if pair.line.codec == "json" and lost_numbers(frame, data):
+            self._alerts.tell(
+                f"nan:{pair.line.topic}",
+                f"“{pair.line.topic}” has NaN or infinity; JSON has neither, and native programs get null",
+                "Let the program that publishes it send null where it has no value.",
+            )
         for other in self._of(key):
             if other is pair:
                 other.pass_on(frame, data)

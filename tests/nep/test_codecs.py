@@ -5,8 +5,12 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+import uuid
+from datetime import date, datetime, time, timedelta, timezone
+from enum import Enum
 
 import cv2
+import msgpack
 import numpy as np
 import pytest
 from hypothesis import given
@@ -23,9 +27,14 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXT, inner, max_size=4),
     max_leaves=20,
 )
+TIMES = st.datetimes(timezones=st.sampled_from([timezone.utc, timezone(timedelta(hours=-9, minutes=-30))]))
+PLAIN = st.none() | st.booleans() | SMALL | st.integers(0, 2**64 - 1) | st.floats(allow_nan=False) | TEXT
+KEYS = st.recursive(
+    PLAIN | st.binary(max_size=8) | TIMES, lambda inner: st.lists(inner, max_size=3).map(tuple), max_leaves=4
+)
 MSGPACK = st.recursive(
-    st.none() | st.booleans() | SMALL | st.floats(allow_nan=False) | TEXT | st.binary(max_size=20),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXT | SMALL, inner, max_size=4),
+    PLAIN | st.binary(max_size=20) | TIMES,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=4),
     max_leaves=20,
 )
 PAYLOADS = {"json": JSON, "string": TEXT, "bytes": st.binary(), "msgpack": MSGPACK}
@@ -85,6 +94,65 @@ def test_json_has_no_nan_but_reads_that_of_the_originals() -> None:
     value = codec("json").decode(memoryview(b'{"a": NaN}'), {})
     assert isinstance(value, dict)
     assert math.isnan(value["a"])
+
+
+class Mood(Enum):
+    HAPPY = "happy"
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    x: float
+    when: datetime
+
+
+def test_msgpack_takes_what_json_takes_and_keeps_times() -> None:
+    moment = datetime(2026, 11, 22, 16, 30, 0, 123456, timezone.utc)
+    payload = {
+        "place": Place(math.inf, moment), "day": date(2026, 11, 22), "at": time(16, 30), "mood": Mood.HAPPY,
+        "id": uuid.UUID(int=7), "array": np.arange(3), "scalar": np.float32(0.5), "bytes": b"\x00",
+    }  # fmt: skip
+    assert back("msgpack", payload) == {
+        "place": {"x": math.inf, "when": moment}, "day": "2026-11-22", "at": "16:30:00", "mood": "happy",
+        "id": "00000000-0000-0000-0000-000000000007", "array": [0, 1, 2], "scalar": 0.5, "bytes": b"\x00",
+    }  # fmt: skip
+    nan = back("msgpack", math.nan)
+    assert isinstance(nan, float)
+    assert math.isnan(nan)
+
+
+def test_a_time_without_a_zone_is_that_of_this_computer() -> None:
+    moment = datetime(2026, 11, 22, 16, 30, 0, 5)  # noqa: DTZ001 - that is what is tried
+    assert back("msgpack", moment) == moment.astimezone(timezone.utc)
+
+
+@pytest.mark.parametrize(
+    ("data", "moment"),
+    [  # the three forms of msgpack's specification, as other languages write them
+        ("d6ff5a4af6a5", datetime(2018, 1, 2, 3, 4, 5, tzinfo=timezone.utc)),
+        ("d7ff3b9ac9fc5a4af6a5", datetime(2018, 1, 2, 3, 4, 5, 249999, tzinfo=timezone.utc)),
+        ("c70cff00000000fffffffffffffff6", datetime(1969, 12, 31, 23, 59, 50, tzinfo=timezone.utc)),
+    ],
+)
+def test_timestamps_of_other_languages(data: str, moment: datetime) -> None:
+    assert codec("msgpack").decode(memoryview(bytes.fromhex(data)), {}) == moment
+    assert (
+        codec("msgpack").encode(datetime(2018, 1, 2, 3, 4, 5, tzinfo=timezone.utc)).data.hex()
+        == "d6ff5a4af6a5"
+    )
+
+
+@pytest.mark.parametrize("seconds", [2**63 - 1, -(2**63), 2**40])
+def test_a_timestamp_that_is_no_date_is_kept_as_it_came(seconds: int) -> None:
+    stamp = msgpack.Timestamp(seconds, 7)
+    assert back("msgpack", {"t": stamp, (1, (2,)): 3}) == {"t": stamp, (1, (2,)): 3}
+
+
+@given(st.binary(max_size=40))
+def test_any_bytes_behind_a_timestamp_or_a_map_decode_or_raise_a_decode_error(data: bytes) -> None:
+    for head in (b"\xd6\xff", b"\xd7\xff", b"\xc7\x0c\xff", b"\x81\x91", b"\x82\x81", b"\x91\xc7"):
+        with contextlib.suppress(DecodeError):
+            codec("msgpack").decode(memoryview(head + data), {})
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep.gateway.framing import FrameError, Shape, codec_of, framing_of, shield_csharp, shield_javascript
+from nep.gateway.framing import (
+    FrameError,
+    Shape,
+    codec_of,
+    framing_of,
+    lost_numbers,
+    shield_csharp,
+    shield_javascript,
+)
 
 JSON_VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -99,6 +107,18 @@ def test_nan_becomes_null_because_strict_readers_refuse_it():
         "a": None,
         "b": [None, 1],
     }
+
+
+def test_whether_numbers_were_lost_can_be_told():
+    shape = Shape("t", "prefixed", "json")
+    for said, is_lost in (
+        (b'{"a": NaN}', True),
+        (b'{"a": "NaN", "b": Infinity}', True),
+        (b'["NaN", null]', False),
+        (b"[null]", False),
+    ):
+        frame = b"t " + said
+        assert lost_numbers(frame, shape.read(frame)) is is_lost
 
 
 def test_the_word_nan_in_a_text_stays():

@@ -1,0 +1,90 @@
+"""NaN and infinity in JSON: sent as null, counted, and told, never silently."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nep
+from nep.nulls import AGAIN_S, NullTeller, nan_in
+
+
+@dataclasses.dataclass
+class Pose:
+    x: float
+    note: str = "null"
+
+
+@pytest.mark.parametrize(
+    ("payload", "where"),
+    [
+        ({"pose": {"x": math.nan}}, "pose.x"),
+        ({"joints": [1.0, None, -math.inf]}, "joints[2]"),
+        (math.inf, "its only value"),
+        ({"a": np.array([[1.0], [np.nan]], np.float32)}, "a[1][0]"),
+        ({"a": np.float64("nan")}, "a"),
+        ({"a": np.float32("inf")}, "a"),
+        ({"p": Pose(math.nan)}, "p.x"),
+        ({7: (None, math.nan)}, "7[1]"),
+    ],
+)
+def test_it_is_told_with_its_place(payload, where, caplog):
+    teller = NullTeller("/odom")
+    assert b"null" in teller.encode(payload).data
+    assert teller.count == 1
+    (record,) = caplog.records
+    assert record.levelno == logging.WARNING
+    assert (
+        f"'/odom' sends NaN or infinity as null, because JSON has neither: at {where}, "
+        in record.getMessage()
+    )
+
+
+@pytest.mark.parametrize(
+    "payload", [{"a": None}, {"a": "null"}, {"a": [None, 1.5]}, Pose(1.0), [2**53 + 0.0, 1e308]]
+)
+def test_what_is_nothing_on_purpose_is_not(payload, caplog):
+    teller = NullTeller("/odom")
+    teller.encode(payload)
+    assert (teller.count, caplog.records) == (0, [])
+
+
+def test_a_flood_is_counted_whole_and_told_seldom(caplog):
+    now = [0.0]
+    teller = NullTeller("/odom", lambda: now[0])
+    for _ in range(1000):
+        teller.encode({"x": math.nan})
+    now[0] = AGAIN_S
+    teller.encode({"x": math.nan})
+    assert teller.count == 1001
+    assert [record.args[2] for record in caplog.records] == [1, 1001]
+
+
+VALUES = st.recursive(
+    st.none() | st.floats() | st.text(max_size=3) | st.integers(-(2**63), 2**64 - 1),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    max_leaves=15,
+)
+
+
+@given(VALUES)
+def test_none_is_missed_and_none_is_made_up(payload):
+    teller = NullTeller("t")
+    teller.encode(payload)
+    assert (teller.count == 1) == (nan_in(payload) is not None)
+
+
+def test_a_publisher_counts_them_and_its_readers_get_null(master, caplog):
+    with nep.node("robot") as node, node.new_sub("/odom") as sub:
+        pub = node.new_pub("/odom")
+        pub.publish({"x": math.nan, "y": None})
+        assert sub.listen(timeout_s=5) == (True, {"x": None, "y": None})
+        assert pub.nulled == 1
+        assert "at x, message 1" in caplog.text
+        assert node.new_pub("words", "string").nulled == 0
