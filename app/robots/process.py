@@ -11,7 +11,6 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType, TracebackType
-from typing import TextIO
 
 import psutil
 
@@ -22,6 +21,7 @@ from app.robots.declare import Kind
 from app.robots.description import topic_of
 from app.robots.driver import Driver
 from nep.addresses import master_address
+from nep.terminal import Terminal, log_to
 from nep.text import escaped
 
 _OWNER_CHECK_S = 0.5
@@ -39,14 +39,15 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--master", default=None, help="the master's address (default: $NEP_MASTER)")
     parser.add_argument("--owner-pid", type=int, default=None, help="end when this process is gone")
     chosen = parser.parse_args(arguments)
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(name)s: %(message)s")
     ended = threading.Event()
     _on_signals(ended)
-    try:
-        run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
-    except (Failed, AppError, nep.NepError) as error:  # Failed: its own __init__, it can't be reached
-        _say(f"{chosen.name}: {error}", sys.stderr)
-        return 1
+    with Terminal(sys.stderr) as terminal:  # one that takes nothing must not stop the robot's threads
+        log_to(terminal, logging.INFO)
+        try:
+            run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
+        except (Failed, AppError, nep.NepError) as error:  # Failed: its own __init__, it can't be reached
+            _say(f"{chosen.name}: {error}", terminal)
+            return 1
     return 0
 
 
@@ -59,7 +60,8 @@ def tell_briefly() -> None:
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if isinstance(error, DescriptionError):
-            _say(str(error), sys.stderr)
+            with Terminal(sys.stderr) as terminal:
+                _say(str(error), terminal)
         else:
             before(kind, error, trace)
 
@@ -74,35 +76,30 @@ def run(
     if owner_pid is not None and owner is None:
         return
     address = master_address(master)
-    with nep.node(name, master=master) as node, _published(node):
+    with Terminal(sys.stdout) as said, nep.node(name, master=master) as node, _published(node):
         driver = Driver(kind, name, node)
         model = f"virtual {kind.model}" if kind.virtual else kind.model
-        _say(f"{name}: a robot, model {model}; its topics are {topic_of(name, '...')}", sys.stdout)
+        _say(f"{name}: a robot, model {model}; its topics are {topic_of(name, '...')}", said)
         has_waited = False
         try:
             while not _started(driver):
                 if not has_waited:
                     start = "start Studio or `nep master`"
-                    _say(f"{name}: no master answers at {address}; waiting for one, {start}", sys.stdout)
+                    _say(f"{name}: no master answers at {address}; waiting for one, {start}", said)
                 has_waited = True
                 if _over(ended, owner):
                     return
             found = "found the master" if has_waited else "the master is"
-            _say(f"{name}: {found} at {address}; the robot is ready, Ctrl+C ends it", sys.stdout)
+            _say(f"{name}: {found} at {address}; the robot is ready, Ctrl+C ends it", said)
             while not _over(ended, owner):
                 ended.wait(_OWNER_CHECK_S)
         finally:
             driver.close()
 
 
-def _say(words: str, stream: TextIO | None) -> None:
-    """A line for the person who started it; a closed, full or missing output is no reason to end."""
-    try:
-        print(escaped(words), file=stream, flush=True)
-    except UnicodeEncodeError:
-        print(ascii(words)[1:-1], file=stream, flush=True)
-    except (OSError, ValueError):
-        return
+def _say(words: str, terminal: Terminal) -> None:
+    """A line for the person who started it; an output that takes nothing is no reason to wait or to end."""
+    terminal.write(escaped(words) + "\n")
 
 
 @contextmanager

@@ -9,6 +9,8 @@ from nep.cli.screen import console, show_alerts
 from nep.graph import Alert, GraphView
 from nep.masters import Master
 from nep.nodes import Node
+from nep.terminal import Terminal
+from nep.text import escaped
 
 __all__ = ["AlertLog", "AlertPrinter", "Changes"]
 
@@ -31,9 +33,13 @@ class Changes:
 
 
 class AlertPrinter:
-    """Attached to the master: writes each alert when it comes, and when it is cured."""
+    """Attached to the master: writes each alert to `out` when it comes, and when it is cured.
 
-    def __init__(self) -> None:
+    It does so in the master's thread: `out` must not let it wait, see `nep.terminal`.
+    """
+
+    def __init__(self, out: Terminal) -> None:
+        self._out = out
         self._changes = Changes()
 
     def start(self, _master: Master) -> None:
@@ -43,8 +49,9 @@ class AlertPrinter:
         """See `Attachment`."""
         new, cured = self._changes.take(view)
         for alert in cured:
-            console(stderr=True).print(f"cured: {alert.sentence}", style="green", markup=False)
-        show_alerts(new)
+            cured_now = escaped(f"cured: {alert.sentence}")
+            console(out=self._out).print(cured_now, style="green", markup=False)
+        show_alerts(new, self._out)
 
     def close(self) -> None:
         """See `Attachment`."""

@@ -19,6 +19,7 @@ from nep.errors import AddressInUseError, NepError
 from nep.later import later
 from nep.masters import Attachment, Master, is_running
 from nep.network import ANY, own_addresses
+from nep.terminal import Terminal, log_to
 
 if TYPE_CHECKING:
     from nep import doctor
@@ -73,24 +74,28 @@ def master(
     Messages never pass through it; while it is away, programs that have found each other go on.
     """
     address = _address(master, port)
-    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
-    running = _started(address, owner_pid, joins_originals=gateway)
-    try:
-        running.listen(listen or ())
-        _say_running(running.address, joins_originals=gateway)
-        problem = collect.loopback_problem()
-        if problem:
-            say(f"but programs of this computer cannot reach it: {problem}; 'nep doctor' says more")
-        _warn_of_others(running.address, listen or ())
-        signal.signal(signal.SIGTERM, _end)
-        running.wait()
-    finally:
-        running.close()
+    with Terminal(sys.stderr) as terminal:  # one that takes nothing must not stop the master
+        log_to(terminal, logging.WARNING)
+        running = _started(address, owner_pid, terminal, joins_originals=gateway)
+        try:
+            running.listen(listen or ())
+            _say_running(running.address, terminal, joins_originals=gateway)
+            problem = collect.loopback_problem()
+            if problem:
+                say(
+                    f"but programs of this computer cannot reach it: {problem}; 'nep doctor' says more",
+                    terminal,
+                )
+            _warn_of_others(running.address, listen or (), terminal)
+            signal.signal(signal.SIGTERM, _end)
+            running.wait()
+        finally:
+            running.close()
 
 
-def _started(address: str, owner_pid: int | None, *, joins_originals: bool) -> Master:
+def _started(address: str, owner_pid: int | None, terminal: Terminal, *, joins_originals: bool) -> Master:
     """Raises `NepError` with the reason why it can't be started."""
-    attachments: list[Attachment] = [AlertPrinter(), AlertLog()]
+    attachments: list[Attachment] = [AlertPrinter(terminal), AlertLog()]
     if joins_originals:
         attachments.insert(0, attachment.GatewayAttachment())
     try:
@@ -117,17 +122,17 @@ def _address(master: str | None, port: int | None) -> str:
     return address
 
 
-def _say_running(address: str, *, joins_originals: bool) -> None:
-    out = console(stderr=True)
+def _say_running(address: str, terminal: Terminal, *, joins_originals: bool) -> None:
+    out = console(out=terminal)
     out.print(f"[bold green]●[/] master at [bold]{address}[/]")
     if joins_originals:
         out.print("  programs of the original NEP join it too", style="dim")
     out.print("  Ctrl+C ends it", style="dim")
 
 
-def _warn_of_others(address: str, hosts: Sequence[str]) -> None:
+def _warn_of_others(address: str, hosts: Sequence[str], terminal: Terminal) -> None:
     """Say that others can connect, and what they type."""
-    out = console(stderr=True)
+    out = console(out=terminal)
     port = address.rpartition(":")[2]
     chosen = [own.host for own in own_addresses()] if ANY in hosts else hosts
     for host in chosen:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import IO, TYPE_CHECKING, Literal, cast
 
 from nep.cli.values import json_of
 from nep.streams import tell
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from nep.graph import Alert
+    from nep.terminal import Terminal
 
 _GAP = 3
 _NARROWEST = 6
@@ -40,8 +41,8 @@ class Column:
     """Never folded, however narrow the terminal: others give way. Numbers never are."""
 
 
-def console(*, stderr: bool = False) -> Console:
-    """A console for coloured text; rich is loaded when the first one is made."""
+def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
+    """A console for coloured text, on `out` if it is given; rich is loaded when the first one is made."""
     from rich.console import Console  # noqa: PLC0415 - 40 ms that `--json` and `--help` need not wait for
 
     class Ours(Console):
@@ -50,7 +51,7 @@ def console(*, stderr: bool = False) -> Console:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError(errno.EPIPE, "nobody reads the output any more")
 
-    return Ours(stderr=stderr, highlight=False, soft_wrap=True)
+    return Ours(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
 
 
 def json_painter() -> Callable[[str, str], Text]:
@@ -135,7 +136,7 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], room: int)
     return widths
 
 
-def show_alerts(alerts: Iterable[Alert]) -> None:
+def show_alerts(alerts: Iterable[Alert], out: Terminal | None = None) -> None:
     """What is wrong at present, under a table."""
     from rich.text import Text  # noqa: PLC0415 - see `console`
 
@@ -144,13 +145,13 @@ def show_alerts(alerts: Iterable[Alert]) -> None:
         if alert.hint:
             text.append(f"\n  {escaped(alert.hint)}", style="dim")
         with suppress(OSError):  # nobody reads it
-            console(stderr=True).print(text)
+            console(stderr=True, out=out).print(text)
 
 
-def say(sentence: str) -> None:
-    """A sentence beside the results, on the standard error stream."""
+def say(sentence: str, out: Terminal | None = None) -> None:
+    """A sentence beside the results, on the standard error stream or `out`."""
     with suppress(OSError):  # nobody reads it
-        console(stderr=True).print(escaped(sentence), style="dim", markup=False)
+        console(stderr=True, out=out).print(escaped(sentence), style="dim", markup=False)
 
 
 def say_error(sentence: str) -> None:

@@ -167,3 +167,42 @@ def test_the_example_driver_of_rize_is_driven(network):
     read = [rize.from_answer(answer) for answer in answers]
     assert [(answer["id"], answer["state"]) for answer in read] == [("Turtle", "succeeded"), ("2", "failed")]
     assert output.startswith("Turtle says: hello {")
+
+
+CHATTERBOX = """
+import logging
+from app.robots.kit import Call, Kind, Link, action, main, safe_stop
+
+class Chatterbox:
+    def __init__(self, link: Link) -> None:
+        pass
+
+    @action("chatter", "Speech", "message-circle")
+    def chatter(self, call: Call) -> None:
+        for n in range(500):
+            logging.getLogger("chatter").warning("%d %s", n, "x" * 1000)
+
+    @safe_stop(watchdog_s=1.0, within_s=0.2)
+    def stop(self) -> None:
+        logging.getLogger("chatter").warning("stopped")
+
+if __name__ == "__main__":
+    raise SystemExit(main(Kind(model="box", title="Chatterbox", body=Chatterbox)))
+"""
+
+
+def test_a_driver_whose_terminal_takes_nothing_answers_and_ends(network, tmp_path):
+    """Nobody reads its pipe, which has room for 64 kB; a terminal with Ctrl+S has less."""
+    (tmp_path / "box.py").write_text(CHATTERBOX, encoding="utf-8")
+    process = start(str(tmp_path / "box.py"), network=network)
+    try:
+        with nep.node("me", master=network) as node:
+            assert node.new_sub("/Chatterbox/description", "robot/description").receive(15.0) is not None
+            ears = Ears(node, "Chatterbox")
+            for number in ("1", "2"):
+                ears.invoke(number, "chatter")
+                assert ears.final(number)["state"] == "succeeded"
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(10.0) == 0
+    finally:
+        ended(process)

@@ -1,0 +1,147 @@
+"""A terminal that takes nothing: whoever writes to it goes on, and so does who serves others."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep.masters import is_running
+from nep.terminal import LineFormatter, Terminal
+from tests.nep.programs import eventually
+
+if sys.platform == "linux":
+    import fcntl
+
+ON_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="pipes of a chosen size are Linux's")
+
+
+class Stuck(io.StringIO):
+    """A stream whose `write` waits until somebody lets it go on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.begins, self.may_go_on = threading.Event(), threading.Event()
+
+    def write(self, text: str) -> int:
+        self.begins.set()
+        assert self.may_go_on.wait(10.0)
+        return super().write(text)
+
+
+@pytest.fixture
+def stuck() -> Iterator[Stuck]:
+    made = Stuck()
+    yield made
+    made.may_go_on.set()
+
+
+def test_who_writes_never_waits_and_what_was_left_out_is_told(stuck: Stuck) -> None:
+    terminal = Terminal(stuck, max_characters=100)
+    terminal.write("first\n")
+    assert stuck.begins.wait(5.0)
+    for n in range(1000):
+        assert terminal.write(f"line {n}\n") > 0
+        terminal.flush()
+    terminal.close(0.0)  # nor does closing
+    stuck.may_go_on.set()
+    eventually(lambda: "left out" in stuck.getvalue())
+    lines = stuck.getvalue().splitlines()
+    assert lines[:3] == ["first", "line 0", "line 1"]
+    kept = len(lines) - 2
+    assert lines[-1] == f"… {1000 - kept} lines left out: nobody read this for a while"
+    assert terminal.write("too late") == 8
+    terminal.close()
+
+
+def test_a_text_larger_than_the_room_is_written_when_nothing_waits() -> None:
+    stream = io.StringIO()
+    with Terminal(stream, max_characters=10) as terminal:
+        terminal.write("x" * 50)
+    assert stream.getvalue() == "x" * 50
+
+
+def test_all_is_written_before_it_closes() -> None:
+    stream = io.StringIO()
+    with Terminal(stream) as terminal:
+        for n in range(500):
+            terminal.write(f"{n}\n")
+    assert stream.getvalue().splitlines() == [str(n) for n in range(500)]
+    terminal.close()
+
+
+def test_no_stream_and_a_dead_one_are_stood() -> None:
+    with Terminal(None) as nowhere:
+        assert nowhere.write("x") == 1
+        assert not nowhere.isatty()
+    reading, writing = os.pipe()
+    os.close(reading)
+    with io.TextIOWrapper(io.FileIO(writing, "w")) as broken, Terminal(broken) as terminal:
+        terminal.write("x\n")
+        eventually(lambda: terminal._is_over)
+        assert terminal.write("y\n") == 2
+
+
+def test_what_the_stream_has_no_letters_for_is_written_all_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "out"
+    with path.open("w", encoding="ascii") as stream, Terminal(stream) as terminal:
+        terminal.write("● “é”\n")
+    assert path.read_bytes() == b"\\u25cf \\u201c\\xe9\\u201d" + os.linesep.encode()
+
+
+def test_a_pipe_that_somebody_made_non_blocking_gets_everything() -> None:
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    text = "x" * 300_000 + "\n"
+    with io.TextIOWrapper(io.FileIO(writing, "w")) as stream, Terminal(stream) as terminal:
+        terminal.write(text)
+        got = b""
+        while len(got) < len(text):
+            got += os.read(reading, 65536)
+    os.close(reading)
+    assert got.decode() == text
+
+
+def test_a_record_moves_no_cursor() -> None:
+    record = logging.LogRecord("n\x1b[2J", logging.INFO, "f", 1, "two\nlines \x9b31m %s", ("\u202ex",), None)
+    assert LineFormatter("%(name)s: %(message)s").format(record) == "n\\x1b[2J: two\nlines \\x9b31m \\u202ex"
+
+
+@ON_LINUX
+def test_a_master_whose_terminal_is_blocked_serves_on_and_ends(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+    with nep.master("127.0.0.1:0", learn_s=0.0) as free:
+        address = free.address
+    command = [sys.executable, "-m", "nep", "master", "--no-gateway", "--port", address.rpartition(":")[2]]
+    process = subprocess.Popen(
+        command, stdout=writing, stderr=writing, env={**os.environ, "NEP_STATE_DIR": str(tmp_path)}
+    )
+    os.close(writing)
+    try:
+        eventually(lambda: is_running(address, 0.5), 20.0)
+        with nep.node("loud", master=address) as node:
+            for n in range(20):  # each an alert of some hundred letters
+                topic = f"/{n}/" + "x" * 180
+                pair = node.new_pub(topic, "json"), node.new_pub(topic, "string")
+                assert pair[0].id != pair[1].id
+            eventually(lambda: len(node.graph().alerts) == 20)
+            heard, said = node.new_sub("/still"), node.new_pub("/still")
+            said.publish("here")
+            assert heard.listen(2.0) == (True, "here")
+        assert is_running(address)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10.0) == 0
+    finally:
+        process.kill()
+        process.wait(5.0)
+        os.close(reading)
