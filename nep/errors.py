@@ -160,8 +160,13 @@ class RequestRefusedError(NepError):
 class AddressInUseError(NepError):
     """`address` is held by another program, or is not an address of this computer; ":*" is any port of it."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, *, is_own: bool = True) -> None:
         self.address = address
+        if not is_own:
+            super().__init__(
+                f"'{address}' is no address of this computer; use one of its own, or '127.0.0.1'"
+            )
+            return
         if address.endswith(":*"):
             super().__init__(f"no port of '{address[:-2]}' is free; end programs that have many connections")
             return

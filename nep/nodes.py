@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
 
 from nep import forks
-from nep.addresses import master_address
+from nep.addresses import checked_host, master_address
+from nep.arguments import at_least, flag, function, one_of, seconds, text
 from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
 from nep.backends.choosing import backend_named
 from nep.codecs import codec_for
@@ -68,11 +69,11 @@ class Node:
         self.id = node_id_from(key)
         self._key = key
         self._numbers = itertools.count(1)
-        self._backend = backend_named(transport)
+        self._backend = backend_named(text("transport", transport))
         self._master = master or ("memory" if self._backend.name == "memory" else master_address())
         if self._backend.name != "memory":
             self._master = master_address(self._master)
-        self._wait_s = wait_s
+        self._wait_s = seconds("wait_s", wait_s)
         self._lock = threading.RLock()
         self._stop_spin = threading.Event()
         self._callbacks: tuple[tuple[Subscriber, Inlet, Callable[[Any], object]], ...] = ()
@@ -122,9 +123,16 @@ class Node:
         """Connected without a master to `ip:port`; see `Direct` for the modes.
 
         Sends the frames of the original NEP up to 0.5.4.5, or from 0.5.4.8 on (`generation="B"`), or native
-        ones; receives both forms of the original. Raises `NepError` for what is no mode or port.
+        ones; receives both forms of the original. Raises `NepError` for what is no address, mode or
+        port, `ValueError` for another generation or wire.
         """
-        return Direct(ip, checked_port(port), checked_mode(mode), generation, wire)
+        return Direct(
+            checked_host(ip),
+            checked_port(port),
+            checked_mode(mode),
+            one_of("generation", generation, ("A", "B")),
+            one_of("wire", wire, ("original", "native")),
+        )
 
     # ---- publishers and subscribers
 
@@ -139,16 +147,17 @@ class Node:
         """A publisher. The first message reaches every subscriber that was there before this returned.
 
         `latched`: whoever subscribes later gets the last message at once. Raises `MasterUnreachable`,
-        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`.
+        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` or
+        `TypeError` for what is none of the allowed arguments.
         """
         number = next(self._numbers)
         spec = PublisherSpec(
             id_from(self._key, number),
             check_topic(topic),
-            msg_type,
+            text("msg_type", msg_type),
             codec_for(msg_type),
-            latched,
-            configuration or self.hybrid(),
+            flag("latched", latched),
+            self._configured(configuration),
             self._wait_s,
             number,
         )
@@ -179,12 +188,12 @@ class Node:
         spec = SubscriberSpec(
             id_from(self._key, number),
             check_topic(topic),
-            msg_type,
-            configuration or self.hybrid(),
+            text("msg_type", msg_type),
+            self._configured(configuration),
             self._wait_s,
-            keep,
-            max_messages,
-            sink=sink,
+            one_of("keep", keep, ("all", "latest")),
+            at_least("max_messages", max_messages, 1),
+            sink=None if sink is None else function("sink", sink),
             number=number,
         )
         return self._subscribed(self._open_carrier().subscriber(spec), spec)
@@ -198,12 +207,13 @@ class Node:
     ) -> Subscriber:
         """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`."""
         carrier = self._open_carrier()
+        function("callback", callback)
         number = next(self._numbers)
         spec = SubscriberSpec(
             id_from(self._key, number),
             check_topic(topic),
-            msg_type,
-            configuration or self.hybrid(),
+            text("msg_type", msg_type),
+            self._configured(configuration),
             self._wait_s,
             number=number,
         )
@@ -213,6 +223,14 @@ class Node:
             if not inlet.is_closed:
                 self._callbacks = (*self._callbacks, (subscriber, inlet, callback))
         return subscriber
+
+    def _configured(self, configuration: object) -> Configuration:
+        if configuration is None:
+            return self.hybrid()
+        if not isinstance(configuration, Hybrid | Direct):
+            kind = type(configuration).__name__
+            raise TypeError(f"configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'")
+        return configuration
 
     def _subscribed(self, inlet: Inlet, spec: SubscriberSpec) -> Subscriber:
         subscriber = Subscriber(inlet, spec, self._forget)
@@ -234,6 +252,7 @@ class Node:
         What a callback raises comes out here. A `stop_spin` that came before ends the next spin at once. In a
         child that is forked, also by a callback, it raises `ClosedError`.
         """
+        timeout_s = seconds("timeout_s", timeout_s)
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         try:
             while not self._stop_spin.is_set() and not self._is_closed:
@@ -291,6 +310,7 @@ class Node:
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
         """Who is there now. Raises `MasterUnreachable` when the master does not answer in time."""
+        seconds("timeout_s", timeout_s)
         return self._open_carrier().graph(self.hybrid(), timeout_s)
 
     def close(self, timeout_s: float = FLUSH_S) -> None:
@@ -298,6 +318,7 @@ class Node:
 
         What could not be delivered is logged as a warning. Happens by itself when the interpreter ends.
         """
+        seconds("timeout_s", timeout_s)
         _close((self,), timeout_s)
 
     def _end_log(self, timeout_s: float) -> None:

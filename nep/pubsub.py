@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from nep.arguments import seconds
 from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
 from nep.codecs import codec_for
 from nep.encoded import Encoded, encoded
@@ -104,6 +105,7 @@ class Publisher:
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
+        seconds("timeout_s", timeout_s)
         if not self._is_closed:
             self._is_closed = True
             try:
@@ -188,6 +190,8 @@ class Subscriber:
         Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
         decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
         """
+        if timeout_s is not None and not timeout_s >= 0.0:
+            seconds("timeout_s", timeout_s)
         ready = self._ready
         while ready:  # read already
             try:
@@ -198,7 +202,7 @@ class Subscriber:
                 return True, self.decoded(message) if self._problem else message.payload
             except DecodeError as error:
                 self._tell(error)
-        limit = None if block_mode and timeout_s is None else max(0.0, timeout_s or 0.0)
+        limit = None if block_mode and timeout_s is None else timeout_s or 0.0
         deadline = time.monotonic() + limit if limit else None
         while True:
             came = self.receive(limit)
@@ -213,8 +217,10 @@ class Subscriber:
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
 
-        Raises `ClosedError`.
+        Raises `ClosedError`, and `ValueError` for a time below 0.
         """
+        if timeout_s is not None and not timeout_s >= 0.0:
+            seconds("timeout_s", timeout_s)
         if self._ready:  # read already
             try:
                 return self._ready.popleft()

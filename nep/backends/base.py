@@ -35,7 +35,7 @@ HANDSHAKE_S = 0.5
 """How long a new publisher or subscriber waits for the other side, at most."""
 
 Sink = Callable[[Sequence[Message]], None]
-"""Takes messages in batches, in the carrier's thread; it returns soon and does not raise."""
+"""Takes messages in batches, in a thread of the carrier's sinks; it returns soon and does not raise."""
 
 
 @dataclass(frozen=True)

@@ -88,13 +88,13 @@ class ZeromqCarrier:
         )
         try:
             reply = link.add_publisher(record, outlet, spec.wait_s)
-        except BaseException:
+            outlet.expect((*reply.expected, *reply.hung))
+            absent = outlet.wait_for(reply.expected, HANDSHAKE_S)
+            if absent:
+                link.report_missing(spec.id, absent)
+        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
             outlet.close(0.0)
             raise
-        outlet.expect((*reply.expected, *reply.hung))
-        absent = outlet.wait_for(reply.expected, HANDSHAKE_S)
-        if absent:
-            link.report_missing(spec.id, absent)
         return outlet
 
     def _direct_publisher(self, spec: PublisherSpec, direct: Direct) -> Outlet:
@@ -109,7 +109,11 @@ class ZeromqCarrier:
         with _closed_on_error(outlet.release):
             self._attached[spec.id] = attach(socket, direct, is_publisher=True)
             self._hold(outlet)
-        outlet.wait_for_any(DIRECT_WAIT_S)
+        try:
+            outlet.wait_for_any(DIRECT_WAIT_S)
+        except BaseException:
+            outlet.close(0.0)
+            raise
         return outlet
 
     def _xpub(self, spec: PublisherSpec) -> Socket:
@@ -179,9 +183,13 @@ class ZeromqCarrier:
             self._attached[spec.id] = attach(socket, direct, is_publisher=False)
             self._keep(inlet)
         io.add(inlet)
-        if isinstance(inlet, NativeInlet):
-            with self._waker() as waker:
-                inlet.wait_for_any(DIRECT_WAIT_S, waker)
+        try:
+            if isinstance(inlet, NativeInlet):
+                with self._waker() as waker:
+                    inlet.wait_for_any(DIRECT_WAIT_S, waker)
+        except BaseException:
+            inlet.close()
+            raise
         return inlet
 
     def _io_for(self, spec: SubscriberSpec) -> IoThread:

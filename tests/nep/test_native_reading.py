@@ -197,6 +197,21 @@ def test_a_stream_of_large_messages_goes_on_and_on(node: nep.Node, master: Maste
         assert sub.lost == 0
 
 
+def test_a_sink_may_make_what_it_needs(node: nep.Node) -> None:
+    heard: list[object] = []
+
+    def sink(_messages: object) -> None:
+        sub = node.new_sub("answers", sink=heard.extend)
+        node.new_pub("answers").publish(len(node.graph().topics["answers"].subscribers))
+        heard.append(sub)
+
+    pub = node.new_pub("questions")
+    node.new_sub("questions", sink=sink)
+    pub.publish(1)
+    eventually(lambda: len(heard) == 2)
+    assert [each.payload for each in heard if isinstance(each, nep.Message)] == [1]
+
+
 @pytest.fixture
 def context() -> Iterator[zmq.Context[zmq.Socket[bytes]]]:
     made: zmq.Context[zmq.Socket[bytes]] = zmq.Context()

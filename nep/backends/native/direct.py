@@ -187,6 +187,7 @@ class OriginalSub:
         self.refusals = Refusals()
         self.received = 0
         self.lost: int | None = None
+        self.problem = ""
         self._socket = socket
         self._spec = spec
         self._codec = codec_for(spec.msg_type)

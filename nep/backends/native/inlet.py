@@ -17,11 +17,16 @@ class NativeInlet(SocketInlet[SubSocket]):
     """See `SocketInlet`. The methods for publishers are called by the link to the master."""
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
-        """Wait until these publishers have echoed; one that says bye meanwhile is not waited for."""
+        """Wait until these publishers have echoed.
+
+        Who says bye meanwhile, or cannot be connected to, is not waited for.
+        """
         wanted = frozenset(publishers)
         sources = self._readable.sources
         return self.read_until(
-            lambda: all(source.has_echoed for each, source in sources.items() if each in wanted),
+            lambda: all(
+                source.has_echoed or source.problem for each, source in sources.items() if each in wanted
+            ),
             timeout_s,
             waker,
         )

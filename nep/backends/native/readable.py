@@ -30,6 +30,10 @@ class Readable(Protocol):
         """Messages that did not; None when nobody can know."""
 
     @property
+    def problem(self) -> str:
+        """What is wrong as long as nothing changes; empty when nothing is."""
+
+    @property
     def has_input(self) -> bool:
         """Whether something can be read. Also takes note of connections that came and went."""
 

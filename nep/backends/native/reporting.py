@@ -42,6 +42,6 @@ class Reporting(Generic[R]):
 
     def counts(self) -> SubscriberCount:
         """The statistics for a renewal."""
-        problem = self._problem or self._readable.refusals.told()
+        problem = self._problem or self._readable.refusals.told() or self._readable.problem
         lost = None if self.lost is None else as_count(self.lost)
         return SubscriberCount(self.spec.id, as_count(self.received), lost, problem)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import threading
 import time
@@ -9,8 +10,8 @@ from collections.abc import Callable
 
 import zmq
 
-from nep.addresses import endpoint_of, host_of, is_loopback
-from nep.errors import AddressInUseError
+from nep.addresses import endpoint_of, host_of, is_endpoint, is_loopback
+from nep.errors import AddressInUseError, NepError
 
 __all__ = [
     "LOOPBACK",
@@ -36,6 +37,8 @@ SHORT_WAIT_S = 0.005
 """How long a reader may wait in a subscriber's socket, holding its lock. A shorter time is not quicker: a
 timer that ends before the kernel's next tick costs more than the wait."""
 _SLICE_S = 0.1
+_HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
+"""What binding an own address may fail with."""
 _MOST = 50_000
 _LEAST = 32
 _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
@@ -75,13 +78,15 @@ def bind(owner: Socket, address: str) -> str:
     try:
         owner.bind(endpoint_of(address))
     except zmq.ZMQError as error:
-        raise AddressInUseError(address) from error
+        raise AddressInUseError(address, is_own=error.errno in _HELD) from error
     return owner.getsockopt_string(zmq.LAST_ENDPOINT)
 
 
 def connect(owner: Socket, address: str) -> str:
-    """Connect to an address, whether something is there yet or not; the endpoint."""
+    """Connect to an address, whether something is there yet or not; the endpoint. Raises `NepError`."""
     endpoint = endpoint_of(address)
+    if not is_endpoint(endpoint):
+        raise NepError(f"'{address}' cannot be connected to; use a computer's address and a port up to 65535")
     owner.connect(endpoint)
     return endpoint
 

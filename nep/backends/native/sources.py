@@ -28,6 +28,9 @@ class Source:
     kind: Kind = _UNKNOWN
     remote: RemotePublisher | None = None
     endpoint: str = ""
+    refused: str = ""
+    """The endpoint to which it could not be connected, and `problem` why."""
+    problem: str = ""
     last: int | None = None
     has_echoed: bool = False
     is_lapsed: bool = False

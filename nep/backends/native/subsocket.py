@@ -6,17 +6,19 @@ It has no lock: it lives under its inlet's.
 from __future__ import annotations
 
 import errno
+import logging
 from collections.abc import Callable
 from typing import Any
 
 import zmq
 
+from nep.addresses import is_endpoint
 from nep.backends.base import SubscriberSpec
 from nep.backends.native.meaning import NO_COPY_BYTES, Meaning
 from nep.backends.native.readable import Into
 from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import Socket, keep_alive, receive_mark, wait_shortly
-from nep.backends.native.sources import Sources
+from nep.backends.native.sources import Source, Sources
 from nep.backends.native.window import WINDOW_BYTES
 from nep.codecs import codec_for
 from nep.errors import WireError
@@ -25,6 +27,8 @@ from nep.records import RemotePublisher
 from nep.wire import HEADER_BYTES, Read, hello_part, read_part, topic_part, unpack_at, unpack_quickly
 
 __all__ = ["SubSocket"]
+
+_logger = logging.getLogger("nep")
 
 _NO_COPY_BYTES = NO_COPY_BYTES
 _DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
@@ -45,6 +49,7 @@ class SubSocket:
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
         self._recv: Callable[..., Any] = socket.recv
+        self._name = spec.topic
         self._topic = topic_part(spec.topic)
         self._hello = hello_part(spec.id, spec.topic, tells=True)
         self._id = spec.id
@@ -85,13 +90,40 @@ class SubSocket:
         source.is_lapsed = False
         source.ends_at = None
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
-        if endpoint and endpoint != source.endpoint:
-            if source.endpoint:  # its computer has another address now, or its master listens anew
-                self._disconnect(source.endpoint)
-                source.has_echoed = False
-            source.endpoint = endpoint
+        if endpoint and endpoint not in (source.endpoint, source.refused):
+            source.refused = source.problem = ""
+            if is_endpoint(endpoint):
+                self._connect(source, endpoint)
+            else:
+                self._refuse(source, endpoint, "it is none")
+
+    def _connect(self, source: Source, endpoint: str) -> None:
+        if source.endpoint:  # its computer has another address now, or its master listens anew
+            self._disconnect(source.endpoint)
+            source.has_echoed = False
+            source.endpoint = ""
+        try:
             keep_alive(self._socket, endpoint)
             self._socket.connect(endpoint)
+        except zmq.ZMQError as error:
+            self._refuse(source, endpoint, str(error))
+        else:
+            source.endpoint = endpoint
+
+    def _refuse(self, source: Source, endpoint: str, why: str) -> None:
+        """Whoever tells the master nonsense keeps nobody from hearing the others: it is named, not raised."""
+        name = source.remote.node_name if source.remote is not None else ""
+        shown = ascii(endpoint[:100])[1:-1]
+        source.refused = endpoint
+        source.problem = f"the endpoint '{shown}' of '{name}' cannot be connected to: {why}"
+        if self.refusals.add(source.problem):
+            _logger.warning("subscribing to '%s': %s", self._name, source.problem)
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with a publisher that the master lists; empty when nothing is."""
+        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_lapsed)
+        return next((each.problem for each in listed), "")
 
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and forget it."""

@@ -1,0 +1,66 @@
+"""Arguments as callers give them: what is not allowed is refused at the call, in a sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+__all__ = ["at_least", "flag", "function", "one_of", "seconds", "text"]
+
+T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def text(name: str, value: object) -> str:
+    """`value` itself when it is a text with something in it. Raises `TypeError`, `ValueError`."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name} is a '{_kind(value)}'; give a 'str'")
+    if not value:
+        raise ValueError(f"{name} is empty; give a name such as 'json'")
+    return value
+
+
+def flag(name: str, value: object) -> bool:
+    """`value` itself when it is True or False. Raises `TypeError`."""
+    if not isinstance(value, bool):
+        raise TypeError(f"{name} is {value!r}; give True or False")
+    return value
+
+
+def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
+    """`value` itself when it is one of the allowed. Raises `ValueError`."""
+    if value not in allowed:
+        raise ValueError(f"{name} is {value!r}; use {' or '.join(repr(each) for each in allowed)}")
+    return value
+
+
+def at_least(name: str, value: object, least: int) -> int:
+    """`value` itself when it is a whole number and not below `least`. Raises `TypeError`, `ValueError`."""
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError(f"{name} is {value!r}; give a whole number from {least} on")
+    if value < least:
+        raise ValueError(f"{name} is {value}; give a whole number from {least} on")
+    return value
+
+
+def seconds(name: str, value: object) -> float | None:
+    """`value` itself when it is a time: 0 or more seconds, or None. Raises `TypeError`, `ValueError`."""
+    if value is None:
+        return None
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise TypeError(f"{name} is {value!r}; give seconds, 0 or more, or None")
+    if not value >= 0.0:  # also what is not a number
+        raise ValueError(f"{name} is {value}; give seconds, 0 or more, or None")
+    return None if math.isinf(value) else value
+
+
+def function(name: str, value: F) -> F:
+    """`value` itself when it can be called. Raises `TypeError`."""
+    if not callable(value):
+        raise TypeError(f"{name} is a '{_kind(value)}'; give a function")
+    return value
+
+
+def _kind(value: object) -> str:
+    return type(value).__name__

@@ -1,0 +1,217 @@
+"""Arguments that are none: refused at the call, in a sentence that names what is allowed; nothing is left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import nep
+from nep.addresses import is_endpoint, master_address
+from nep.backends.native.subsocket import SubSocket
+from nep.masters import Master
+from nep.records import PublisherRecord, RemotePublisher
+from tests.nep.programs import eventually
+
+
+@pytest.fixture(params=["memory", "zeromq"])
+def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
+    where = "arguments" if request.param == "memory" else master.address
+    with nep.node("arguments", request.param, master=where) as made:
+        yield made
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"keep": "last"}, "keep is 'last'; use 'all' or 'latest'"),
+        ({"keep": None}, "keep is None; use 'all' or 'latest'"),
+        ({"max_messages": -5}, "max_messages is -5; give a whole number from 1 on"),
+        ({"max_messages": 0}, "max_messages is 0; give a whole number from 1 on"),
+        ({"max_messages": 2.5}, "max_messages is 2.5; give a whole number from 1 on"),
+        ({"max_messages": True}, "max_messages is True; give a whole number from 1 on"),
+        ({"sink": "print"}, "sink is a 'str'; give a function"),
+        ({"msg_type": 5}, "msg_type is a 'int'; give a 'str'"),
+        ({"msg_type": ""}, "msg_type is empty; give a name such as 'json'"),
+        ({"topic": b"t"}, "a topic is a 'str'"),
+        (
+            {"configuration": "direct"},
+            "configuration is a 'str'; make one with 'node.hybrid' or 'node.direct'",
+        ),
+    ],
+)
+def test_a_subscriber_of_wrong_arguments_is_not_made(
+    node: nep.Node, given: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises((ValueError, TypeError), match=sentence):
+        node.new_sub(**{"topic": "t", **given})
+    assert not node.graph().topics
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"latched": 1}, "latched is 1; give True or False"),
+        ({"latched": "no"}, "latched is 'no'; give True or False"),
+        ({"msg_type": None}, "msg_type is a 'NoneType'; give a 'str'"),
+        ({"topic": 5}, "a topic is a 'str'"),
+    ],
+)
+def test_a_publisher_of_wrong_arguments_is_not_made(
+    node: nep.Node, given: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises((ValueError, TypeError), match=sentence):
+        node.new_pub(**{"topic": "t", **given})
+    assert not node.graph().topics
+
+
+def test_a_callback_is_a_function(node: nep.Node) -> None:
+    with pytest.raises(TypeError, match="callback is a 'str'; give a function"):
+        node.new_callback("t", "json", "print")  # type: ignore[arg-type]
+    assert not node.graph().topics
+
+
+@pytest.mark.parametrize("time_s", [-1.0, -0.001, math.nan, -math.inf])
+def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
+    sub, pub = node.new_sub("t"), node.new_pub("t")
+    sentence = "_s is .*; give seconds, 0 or more, or None"
+    for call in (sub.receive, node.spin, node.graph, pub.close, node.close):
+        with pytest.raises(ValueError, match=sentence):
+            call(time_s)  # type: ignore[operator]
+    with pytest.raises(ValueError, match=sentence):
+        sub.listen(timeout_s=time_s)
+    with pytest.raises(ValueError, match=sentence):
+        nep.node("n", wait_s=time_s)
+    with pytest.raises(TypeError, match=r"wait_s is '2'; give seconds"):
+        nep.node("n", wait_s="2")  # type: ignore[arg-type]
+    pub.publish(1)
+    assert sub.listen(timeout_s=math.inf) == (True, 1)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (
+            {"ip": "[::1]"},
+            r"'\[::1\]' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1'",
+        ),
+        ({"ip": "fe80::1"}, "'fe80::1' is an IPv6 address"),
+        ({"ip": "a b"}, "'a b' is no address of a computer"),
+        ({"ip": ""}, "'' is no address of a computer"),
+        ({"ip": "999.1.1.1"}, "'999.1.1.1' is no address of a computer"),
+        ({"ip": "1.2.3"}, "'1.2.3' is no address of a computer"),
+        ({"ip": None}, "'None' is no address of a computer"),
+        ({"port": 0}, "'0' is no port"),
+        ({"port": True}, "'True' is no port"),
+        ({"wire": "nativ"}, "wire is 'nativ'; use 'original' or 'native'"),
+        ({"generation": "C"}, "generation is 'C'; use 'A' or 'B'"),
+    ],
+)
+def test_a_direct_connection_to_what_is_no_address(given: dict[str, Any], sentence: str) -> None:
+    with nep.node("direct") as node, pytest.raises((nep.NepError, ValueError), match=sentence):
+        node.direct(**given)
+
+
+@pytest.mark.parametrize("wire", ["original", "native"])
+def test_a_direct_connection_that_cannot_be_leaves_no_socket_behind(wire: Any) -> None:
+    with nep.node("direct") as node:  # closing it would wait for a socket that is left
+        anywhere = node.direct("*", 5003, "many2one", wire=wire)
+        with pytest.raises(nep.NepError, match=r"'\*:5003' cannot be connected to; use a computer's address"):
+            node.new_pub("t", "json", anywhere)
+        elsewhere = node.direct("192.0.2.1", 5003, "one2many", wire=wire)
+        with pytest.raises(nep.AddressInUseError, match=r"'192\.0\.2\.1:5003' is no address of this"):
+            node.new_pub("t", "json", elsewhere)
+        last = node.direct("127.0.0.1", 65535, "many2many", wire=wire)  # a subscriber's port is one higher
+        with pytest.raises(nep.NepError, match=r"'127\.0\.0\.1:65536' cannot be connected to"):
+            node.new_sub("t", "json", last)
+
+
+def test_a_master_is_no_ipv6_address() -> None:
+    for given in ("[::1]:7780", "::1", "[::1]"):
+        with pytest.raises(nep.NepError, match="is an IPv6 address, which nep does not speak"):
+            master_address(given)
+    with pytest.raises(TypeError, match="an address is a 'str'"):
+        master_address(7780)  # type: ignore[arg-type]
+
+
+BAD_ENDPOINTS = [
+    "",
+    "nonsense",
+    "tcp://",
+    "tcp://nowhere",
+    "tcp://127.0.0.1:0",
+    "tcp://127.0.0.1:99999",
+    "tcp://127.0.0.1:x",
+    "tcp://*:5000",
+    "tcp://[::1]:5000",
+    "tcp://a b:5000",
+    "tcp://a;b:5000",
+    "inproc://pyzmq",
+    "ipc:///tmp/file",
+    "ipc://@other-5000",
+    "ipc://@nep-1/2",
+    "udp://127.0.0.1:5000",
+    "tcp://127.0.0.1:5000\0",
+    "tcp://127.0.0.1:5000\n",
+    "tcp://" + "a" * 100_000 + ":1",
+    "\x1b[2J",
+]
+
+
+@pytest.mark.parametrize("endpoint", BAD_ENDPOINTS)
+def test_one_bad_endpoint_keeps_nobody_from_hearing_the_others(
+    master: Master, endpoint: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with nep.node("good", master=master.address) as good, nep.node("victim", master=master.address) as victim:
+        pub, sub = good.new_pub("t"), victim.new_sub("t")
+        inlet: Any = sub._inlet
+        socket: SubSocket = inlet._readable
+        bad = [
+            RemotePublisher(PublisherRecord(number, "t", "json", "json", (endpoint,)), "bad", "bad")
+            for number in (7, 8)
+        ]
+        (known,) = (source.remote for source in socket.sources.by_id.values())
+        assert known is not None
+        inlet.connect((bad[0], known, bad[1]))
+        inlet.connect(bad)  # twice is once
+        pub.publish("heard")
+        assert sub.listen(timeout_s=5.0) == (True, "heard")
+        assert sub.refused == (2 if endpoint else 0)
+        if endpoint:
+            assert "of 'bad' cannot be connected to" in inlet.counts().problem
+            assert "\x1b" not in inlet.counts().problem + caplog.text
+            for each in bad:
+                inlet.gone(each.publisher.id, 0, is_closed=False)
+            socket.refusals = type(socket.refusals)()
+            assert inlet.counts().problem == ""
+
+
+@pytest.mark.parametrize("endpoint", ["tcp://127.0.0.1:1", "tcp://my-host.local:65535", "ipc://@nep-41234"])
+def test_endpoints_of_ours(endpoint: str) -> None:
+    assert is_endpoint(endpoint)
+
+
+def test_a_subscriber_whose_making_is_broken_off_is_not_registered(master: Master) -> None:
+    """So with Ctrl+C while it waits for an echo: nobody has it, so nobody could close it."""
+
+    class BrokenOff(BaseException):
+        pass
+
+    with nep.node("n", master=master.address) as node, nep.node("o", master=master.address) as other:
+        other.new_pub("t")
+        carrier: Any = node._carrier
+
+        class Waker:
+            def __enter__(self) -> None:
+                raise BrokenOff
+
+            def __exit__(self, *_exc: object) -> None: ...
+
+        usual, carrier._waker = carrier._waker, Waker
+        with pytest.raises(BrokenOff):
+            node.new_sub("t")
+        carrier._waker = usual
+        eventually(lambda: not node.graph().topics["t"].subscribers)
+        assert not carrier._inlets
