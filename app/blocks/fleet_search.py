@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Protocol
 
 from app.errors import DescriptionError
-from app.robots.description import Robot, parse
+from app.robots.description import Robot, announced
 from nep.errors import NepError
 from nep.graph import GraphView
 from nep.message import Message
@@ -72,9 +72,9 @@ def find_robots(
                 if info.msg_type == DESCRIPTION and info.publishers and topic not in asked:
                     asked[topic] = node.new_sub(topic, DESCRIPTION)
             for subscription in asked.values():
-                announced = _described(subscription)
-                if announced is not None:
-                    found[announced.name] = announced
+                described = _described(subscription)
+                if described is not None:
+                    found[described.name] = described
             missing = set(wanted) - set(found) if wanted else len(asked) > len(found)
             if not missing or clock() >= until:
                 return tuple(found[name] for name in sorted(found))
@@ -88,6 +88,6 @@ def _described(subscription: Subscription) -> Robot | None:
     """The robot of a description that has arrived; None while it has not, or when it can't be understood."""
     message = subscription.receive(SLICE_S)
     with suppress(NepError, DescriptionError):
-        if message is not None and isinstance(message.payload, Mapping):
-            return parse(message.payload)
+        if message is not None:
+            return announced(message)
     return None

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from app.core.mailbox import Batch
 from app.core.watches import Watch, Watches
 from app.errors import DescriptionError
-from app.robots.description import Robot, parse
+from app.robots.description import Robot, announced
 from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
 from nep.errors import NepError
 from nep.message import Message
@@ -157,11 +157,8 @@ class Announcements:
             return
         known.parsed, known.wrong = newest, ""
         try:
-            payload = newest.payload
-            robot = parse(payload) if isinstance(payload, Mapping) else None
+            robot = announced(newest)
         except (NepError, DescriptionError):
             return  # the session's alert `message:<topic>` says so; what it said before still counts
-        if robot is None:
-            return
         known.wrong = wrong_topic(robot, topic) or ""
         known.robot = None if known.wrong else robot

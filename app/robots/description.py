@@ -16,12 +16,15 @@ from app.robots.members import as_part, part, text
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor, Topics
 from app.robots.profile import validate
 from app.robots.reading import read
+from nep.message import Message
 
 __all__ = [
     "Action", "Choice", "Event", "Field", "Parameter", "Robot", "SafeStop", "Sensor", "Topics",
-    "parse", "pretty_unit", "td_for", "topic_of", "validate",
+    "announced", "parse", "pretty_unit", "td_for", "topic_of", "validate",
 ]  # fmt: skip
 
+LARGEST_BYTES = 1_000_000
+"""A description that is larger is refused before it is decoded."""
 _NOT_IN_TOPICS = re.compile(r"[^\w.-]")
 
 
@@ -37,6 +40,21 @@ def parse(document: Mapping[str, object]) -> Robot:
         title = as_part(document).get("title")
         raise DescriptionError(title if isinstance(title, str) else "a robot", problems)
     return read(document, default_topics(str(document["title"])))
+
+
+def announced(message: Message) -> Robot:
+    """The robot of a message on its description topic; what is larger than 1 MB is not even decoded.
+
+    Raises DescriptionError with what is wrong, NepError when it can't be decoded.
+    """
+    size = len(message.data)
+    if size > LARGEST_BYTES:
+        said = f"it has {size / 1e6:.1f} MB, and at most {LARGEST_BYTES / 1e6:.0f} MB are read"
+        raise DescriptionError(message.topic, (said,))
+    payload = message.payload
+    if not isinstance(payload, Mapping):
+        raise DescriptionError(message.topic, ("a description must be a JSON object",))
+    return parse(payload)
 
 
 def default_topics(name: str, *, virtual: bool = False) -> Topics:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import logging
 import threading
 from collections.abc import Awaitable, Callable, Mapping, Sequence
@@ -10,10 +11,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import nep
-from app.errors import RobotValueError
+from app.errors import DescriptionError, RobotValueError
 from app.robots.calls import Call, Clock, MonotonicClock
 from app.robots.declare import Kind
-from app.robots.description import parse, td_for, topic_of
+from app.robots.description import LARGEST_BYTES, parse, td_for, topic_of
 from app.robots.desk import Desk
 from app.robots.dialect import Dialect
 from app.robots.loop import EventLoop
@@ -42,6 +43,10 @@ class Driver:
         self.kind = kind
         self.description = td_for(kind.thing_model, name)
         self.robot = parse(self.description)
+        if len(json.dumps(self.description)) > LARGEST_BYTES:
+            raise DescriptionError(
+                name, (f"it is larger than {LARGEST_BYTES / 1e6:.0f} MB; nobody would read it",)
+            )
         self._node = node
         self.clock = clock or MonotonicClock()
         self._lock = threading.Lock()

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from app import resources
 from app.errors import DescriptionError
-from app.robots.description import Parameter, parse, td_for, topic_of, validate
+from app.robots.description import Parameter, announced, parse, td_for, topic_of, validate
 from app.robots.inputs import check_input, from_words, parameter_of, to_words
+from nep.errors import NepError
+from nep.message import UNDECODED, Message
 
 MODELS = sorted(resources.path("robots").glob("*.tm.jsonld"))
 
@@ -273,3 +275,35 @@ def test_what_is_shown_of_it_is_read_again(value):
 def test_what_is_inside_a_list_or_an_object_is_checked(described, value, wrong):
     sentences = check_input("go", (parameter(**described),), {"values": value})
     assert sentences == (() if wrong is None else (f"go: values {wrong}",))
+
+
+# ---- what is announced -----------------------------------------------------------------------------
+
+
+def message_of(data: bytes, codec: str = "json") -> Message:
+    return Message("/Pepper/description", data, codec, "robot/description")
+
+
+def test_an_announced_robot_is_read():
+    described = json.dumps(td_for(model("pepper"), "Pepper")).encode()
+    assert announced(message_of(described)).name == "Pepper"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"[" * 400_000 + b"]" * 400_000, b'{"a":' * 150_000 + b"1" + b"}" * 150_000, b"7", b"{", b"",
+     b'{"title": "x"}', b'{"x": ' + b'{"a":' * 900 + b"1" + b"}" * 901],
+    ids=["list", "object", "number", "half", "nothing", "no robot", "deep"],
+)  # fmt: skip
+def test_what_is_no_description_is_an_error(data):
+    with pytest.raises((DescriptionError, NepError)):
+        announced(message_of(data))
+
+
+def test_a_huge_description_is_refused_before_it_is_decoded():
+    described = td_for(model("pepper"), "Pepper")
+    described["description"] = "x" * 1_000_000
+    message = message_of(json.dumps(described).encode())
+    with pytest.raises(DescriptionError, match=r"it has 1\.0 MB, and at most 1 MB are read"):
+        announced(message)
+    assert message.decoded is UNDECODED
