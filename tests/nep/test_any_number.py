@@ -1,0 +1,253 @@
+"""Whatever number, text or shape somebody sends: it ends no renewal, no reply and nobody's graph."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import logging
+import math
+from collections.abc import Mapping
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import pytest
+import zmq
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import nep
+from nep import bodies, requests, wire
+from nep.errors import WireError
+from nep.graph import Graph
+from nep.masters import Master
+from nep.outgoing import with_hosts
+from nep.packing import pack_surely
+from nep.records import (
+    COUNT_MAX,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.renewals import read_renewal, renewed_body
+from nep.requests import AddPublisher, AddSubscriber, Join, Look, Renew, Request, Seen
+from nep.viewpacking import ViewPacker
+from tests.nep.programs import eventually
+
+MANY = settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
+EDGES = [0, 1, -1, 2**31, 2**32, 2**53, 2**63 - 1, 2**63, 2**64 - 1, 2**64, -(2**63), -(2**63) - 1, 2**200]
+INTS = st.sampled_from(EDGES) | st.integers(-(2**70), 2**70)
+ON_THE_WIRE = st.sampled_from([each for each in EDGES if -(2**63) <= each < 2**64]) | st.integers(
+    0, 2**64 - 1
+)
+FLOATS = st.floats() | st.sampled_from([math.nan, math.inf, -math.inf, -1.0, 1e308])
+TEXTS = st.text(st.characters(categories=["L", "Cc", "Cs", "Cf"]), max_size=6) | st.sampled_from(
+    ["", "\ud800", "t", "/a", "x" * 300, "tcp://127.0.0.1:5000", "ipc:///tmp/x", "inproc://a", "tcp://1;2:3"]
+)
+PLAIN = st.recursive(
+    st.none() | st.booleans() | ON_THE_WIRE | FLOATS | st.text(max_size=5) | st.binary(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5) | ON_THE_WIRE, inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+ANSWERS = [*get_args(requests.Reply), *get_args(requests.Push)]
+ASKED = [each for each in get_args(Request) if each is not requests.ReportAlerts]
+
+
+def of(hint: Any, ints: st.SearchStrategy[int] = INTS) -> st.SearchStrategy[Any]:
+    """Values of a type, also those that no honest program makes."""
+    simple: dict[Any, st.SearchStrategy[Any]] = {int: ints, float: FLOATS, str: TEXTS, bool: st.booleans()}
+    if hint in simple:
+        return simple[hint]
+    if dataclasses.is_dataclass(hint):
+        kinds = get_type_hints(hint)
+        return st.builds(hint, **{each.name: of(kinds[each.name], ints) for each in dataclasses.fields(hint)})
+    origin, args = get_origin(hint), get_args(hint)
+    if origin in {UnionType, Union}:
+        return st.one_of(*(st.none() if each is type(None) else of(each, ints) for each in args))
+    if origin is tuple:
+        return st.lists(of(args[0], ints), max_size=3).map(tuple)
+    assert origin is Mapping or issubclass(origin, Mapping), hint
+    return st.dictionaries(of(args[0], ints), of(args[1], ints), max_size=3)
+
+
+@pytest.mark.parametrize("kind", ASKED, ids=lambda kind: kind.__name__)
+def test_every_request_can_be_sent_and_read(kind: type[Request]) -> None:
+    @MANY
+    @given(of(kind))
+    def check(request: Request) -> None:
+        asked = bodies.decode_request(bodies.encode_request(request, 7))
+        assert asked.call == 7
+        assert isinstance(asked.request, kind)
+
+    check()
+
+
+@pytest.mark.parametrize("kind", ANSWERS, ids=lambda kind: kind.__name__)
+def test_every_answer_can_be_sent_and_read(kind: type[Any]) -> None:
+    @MANY
+    @given(of(kind))
+    def check(answer: Any) -> None:
+        for body in (bodies.encode_answer(answer, 7), ViewPacker().body(answer, 7)):
+            call, read = bodies.decode_answer(body)
+            assert (call, type(read)) == (7, kind)
+        with_hosts(answer, ("127.0.0.1",))
+
+    check()
+
+
+@MANY
+@given(st.dictionaries(INTS, INTS, max_size=4), INTS, FLOATS)
+def test_every_quick_answer_to_a_renewal_can_be_read(
+    last_seqs: dict[int, int], epoch: int, next_s: float
+) -> None:
+    call, read = bodies.decode_answer(renewed_body(7, epoch, epoch, last_seqs, ("h",), next_s))
+    assert (call, type(read)) == (7, requests.Renewed)
+
+
+@MANY
+@given(st.sampled_from(sorted(bodies._REQUESTS)), PLAIN, PLAIN)
+def test_nothing_that_comes_in_raises_anything_unexpected(name: str, what: object, call: object) -> None:
+    bodies.decode_request(pack_surely({"do": name, "call": call, "what": what}))
+    read_renewal(pack_surely({"do": "renew", "call": call, "what": what}))
+    for answer in bodies._ANSWERS:
+        with contextlib.suppress(WireError):
+            bodies.decode_answer(pack_surely({"is": answer, "re": call, "what": what}))
+
+
+@settings(MANY, max_examples=150)
+@given(st.lists(st.one_of(*(of(kind, ON_THE_WIRE) for kind in ASKED)), max_size=12), st.booleans())
+def test_no_request_raises_in_the_graph_and_everybody_can_still_look(
+    asked: list[Request], is_foreign: bool
+) -> None:
+    graph, packer = Graph(epoch=7, now=0.0, learn_s=0.0), ViewPacker()
+    honest = NodeRecord("0" * 16, "honest", "host", 1)
+    graph.apply(Join(honest, 0, (PublisherRecord(1, "/a", "json", "json"),)), 1, 0.0, honest.id)
+    for now, request in enumerate(asked):
+        route = "" if is_foreign else "x"
+        if is_foreign and isinstance(request, Join | AddPublisher | AddSubscriber):
+            route = request.node.id
+        for each in graph.apply(request, 1, float(now) / 100, route or "x", is_foreign=is_foreign):
+            packer.body(each.answer, 1)
+        graph.tick(float(now) / 100)
+    (answer,) = graph.apply(Look(), 1, 1.0, "looker")
+    assert isinstance(answer.answer, Seen)
+    call, seen = bodies.decode_answer(packer.body(answer.answer, 5))
+    assert (call, type(seen)) == (5, Seen)
+    for topic in answer.answer.view.topics.values():
+        assert topic.lost is None or 0 <= topic.lost <= COUNT_MAX
+        for told in topic.publishers:
+            assert 0 <= told.count <= COUNT_MAX
+            assert 0 <= told.bytes <= COUNT_MAX
+            assert told.rate_hz is None or math.isfinite(told.rate_hz)
+
+
+@pytest.mark.parametrize("seq", [2**64 - 1, 2**63, 2**40])
+def test_a_message_with_a_number_that_cannot_be_breaks_nobodys_graph(master: Master, seq: int) -> None:
+    """It comes over the connection of a publisher: straight into the socket, as any program can send it."""
+    with (
+        nep.node("hearer", master=master.address) as hearer,
+        nep.node("sayer", master=master.address) as sayer,
+    ):
+        sub = hearer.new_sub("/t", "bytes")
+        pub = sayer.new_pub("/t", "bytes")
+        pub.publish(b"1")
+        assert sub.listen(2.0) == (True, b"1")
+        context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        xpub = context.socket(zmq.XPUB)
+        xpub.setsockopt(zmq.LINGER, 0)
+        port = xpub.bind_to_random_port("tcp://127.0.0.1")
+        record = PublisherRecord(99, "/t", "bytes", "bytes", (f"tcp://127.0.0.1:{port}",))
+        with context.socket(zmq.DEALER) as dealer:
+            dealer.setsockopt(zmq.LINGER, 0)
+            dealer.setsockopt(zmq.ROUTING_ID, b"0" * 16)
+            dealer.connect(f"tcp://{master.address}")
+            dealer.send(bodies.encode_request(AddPublisher(NodeRecord("0" * 16, "x", "h", 1), record), 1))
+            assert xpub.poll(5000)
+            for _ in range(2):  # its topic and its hello
+                xpub.recv()
+            for number in (1, seq):
+                xpub.send_multipart(wire.join("/t", wire.Header(3, 0, number, 1, 99), b"x"))
+            assert sub.listen(2.0) == (True, b"x")
+            eventually(lambda: sub.refused == 1)
+            pub.publish(b"2")
+            assert sub.listen(2.0) == (True, b"2")
+            assert sub.lost == 0
+            (alert,) = eventually_alerts(hearer)
+            assert f"its number leaps from 1 to {seq}" in alert
+            assert hearer.graph().topics["/t"].lost == 0
+        xpub.close()
+        context.term()
+
+
+def eventually_alerts(node: nep.Node) -> list[str]:
+    """The sentences about messages, as soon as there are some."""
+    found: list[str] = []
+
+    def look() -> bool:
+        found[:] = [each.sentence for each in node.graph().alerts if each.id.startswith("message:")]
+        return bool(found)
+
+    eventually(look)
+    return found
+
+
+def test_what_cannot_be_encoded_is_one_answer_that_fails_and_no_other(
+    master: Master, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A mistake of ours: something attached to the master registers what has no form on the wire."""
+    caplog.set_level(logging.CRITICAL, "nep.master")
+    with (
+        nep.node("honest", master=master.address) as honest,
+        nep.node("other", master=master.address) as other,
+    ):
+        sub, still = honest.new_sub("/odd"), honest.new_sub("/still")
+        odd: Any = object()
+        node = NodeRecord("original:odd:1", "odd", "host", 1)
+        master.submit(AddPublisher(node, PublisherRecord(5, "/odd", odd, "json", ("tcp://127.0.0.1:9",))))
+        pub = other.new_pub("/still")
+        pub.publish("here")
+        assert still.listen(2.0) == (True, "here")
+        with pytest.raises(nep.RequestRefusedError, match="the master could not carry this out"):
+            honest.graph()
+        assert sub.lost == 0
+        master.submit(requests.Leave(node.id))
+        assert "/still" in honest.graph().topics
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 1e300])
+def test_a_share_of_a_processor_that_cannot_be_is_none(value: float) -> None:
+    graph = Graph(epoch=7, now=0.0, learn_s=0.0)
+    graph.apply(Join(NodeRecord("n", "N", "h", 1)), 1, 0.0, "n")
+    for request in (Renew("n", 7, 99, (), (), value),):
+        graph.apply(request, 1, 0.1, "n")
+        assert graph.view().nodes["n"].cpu_ratio is None
+        said = read_renewal(bodies.encode_request(request, 1))
+        assert said is not None
+        assert graph.renew_quickly(said, 0.2, "n") is not None
+        assert graph.view().nodes["n"].cpu_ratio is None
+
+
+def test_counts_saturate_where_they_are_added_up() -> None:
+    graph = Graph(epoch=7, now=0.0, learn_s=0.0)
+    subscribers = tuple(SubscriberRecord(n, "/t", "json") for n in (1, 2, 3))
+    graph.apply(
+        Join(NodeRecord("n", "N", "h", 1), 0, (PublisherRecord(9, "/t", "j", "json"),), subscribers),
+        1,
+        0.0,
+        "n",
+    )
+    counts = tuple(SubscriberCount(n, 2**64 - 1, 2**64 - 1, "no\x1b[2J" * 999) for n in (1, 2, 3))
+    for now, most in ((1.0, 2**64 - 1), (2.0, -5), (3.0, 2**64 - 1)):
+        request = Renew("n", 7, 99, (PublisherCount(9, most, most, most, most),), counts)
+        graph.apply(request, 1, now, "n")
+        topic = graph.view().topics["/t"]
+        assert topic.lost == COUNT_MAX
+        assert topic.loss_ratio is not None
+        assert 0.0 <= topic.loss_ratio <= 1.0
+        assert topic.publishers[0].count == (0 if most < 0 else COUNT_MAX)
+    (alert,) = graph.view().alerts
+    assert alert.sentence.isprintable()
+    assert len(alert.sentence) < 4000
