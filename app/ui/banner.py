@@ -60,6 +60,7 @@ class Banner(QWidget):
     second_pressed = Signal()
     more_pressed = Signal()
     closed = Signal()
+    mouse_left = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -123,6 +124,10 @@ class Banner(QWidget):
         super().resizeEvent(event)
         self._fit()
 
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self.mouse_left.emit()
+
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.LayoutRequest:
             self._fit()
@@ -175,7 +180,15 @@ class BannerPlace(QWidget):
         self.banner.second_pressed.connect(lambda: self._answer(1))
         self.banner.more_pressed.connect(self._more)
         self.banner.closed.connect(self._close)
+        self.banner.mouse_left.connect(lambda: self.show_alerts(self._alerts))
         self.hide()
+
+    @property
+    def identity(self) -> str:
+        """What is shown, whatever its words say now: an alert's id, "offer", or "" for nothing."""
+        if self._offer is not None:
+            return "offer"
+        return self._alert.id if self._alert is not None else ""
 
     @property
     def alert(self) -> AlertLike | None:
@@ -199,7 +212,7 @@ class BannerPlace(QWidget):
         self._alerts = alerts
         if self._offer is not None:
             return
-        first = alerts[0] if alerts else None
+        first = self._first(alerts)
         self._alert = first
         if first is None:
             self.hide()
@@ -208,6 +221,15 @@ class BannerPlace(QWidget):
         icon = STEP_ICONS.get(first.action or "")
         self.banner.show_words(first.severity, first.title, first.detail, first.button, others, icon=icon)
         self.show()
+
+    def _first(self, alerts: Sequence[AlertLike]) -> AlertLike | None:
+        """The worst; while the mouse is on the banner the one that is shown, whose button may be pressed."""
+        shown = self._alert
+        if shown is not None and self.banner.underMouse():
+            still = next((alert for alert in alerts if alert.id == shown.id), None)
+            if still is not None:
+                return still
+        return alerts[0] if alerts else None
 
     def _answer(self, which: int) -> None:
         if self._offer is not None:

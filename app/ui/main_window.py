@@ -14,6 +14,7 @@ from app.core.session import Session
 from app.ui.app_bar import AppBar
 from app.ui.arrangements import Arrangements
 from app.ui.banner import BannerPlace
+from app.ui.banner_room import BannerRoom
 from app.ui.coming import Coming
 from app.ui.docks import Dock, fitting
 from app.ui.enter_key import EnterKey
@@ -101,14 +102,16 @@ class MainWindow(QMainWindow):
         self.pages = QStackedWidget()
         self.pages.addWidget(self.start)
         self.status = StatusBar(theme)
+        self.room = BannerRoom(self.banner, self.pages)
         middle = QWidget()
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget in (self.run_bar, self.tool_bar, self.banner):
+        for widget in (self.run_bar, self.tool_bar, self.room):
             column.addWidget(widget)
         column.addWidget(self.pages, 1)
         column.addWidget(self.status)
+        self.banner.setParent(middle)  # over the pages, which it does not move
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
         self.question = MoveQuestion(theme, self, self.session.fleet.moving, self.complain)
@@ -241,6 +244,7 @@ class MainWindow(QMainWindow):
                     "studio", "error", "Studio has a fault and may show old values.", detail
                 )
         self._show_session()
+        self.room.follow()
         self._follow_panels()
         if self.bench is not None:
             self.bench.refresh()

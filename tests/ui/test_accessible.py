@@ -64,6 +64,7 @@ def test_everything_in_a_panel_has_a_name(qtbot, theme: Theme, name: str, full: 
     dock.resize(width, height)
     dock.show()
     dock.front = True
+    qtbot.waitUntil(dock.shown)
     if full:
         prepare(name, widget)
     for _ in range(3):

@@ -13,7 +13,7 @@ from app.core.settings import Settings
 from app.core.source import GraphSeen, Job
 from app.robots import simulated
 from app.robots.description import parse, td_for
-from app.ui.docks import RESTS_AFTER_S, Dock
+from app.ui.docks import RESTS_AFTER_S, Dock, on_screen
 from app.ui.main_window import TICK_MS, MainWindow
 from app.ui.panel_shelf import PanelShelf
 from app.ui.panels.camera import CameraPanel
@@ -113,7 +113,7 @@ def case(qtbot, theme: Theme, home: Path) -> Iterator[Case]:
     theme.apply()
     made.window.resize(1440, 900)
     made.window.show()
-    qtbot.waitExposed(made.window)
+    qtbot.waitUntil(lambda: on_screen(made.window))
     yield made
     made.window.close()
 

@@ -102,6 +102,7 @@ def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, 
         dock.resize(width, height)
         dock.show()
         dock.front = True
+        qtbot.waitUntil(dock.shown)
         if full:
             prepare(name, widget)
         for _ in range(3):
@@ -128,6 +129,7 @@ def test_an_action_is_read_and_tried_without_scrolling_sideways(
     dock.resize(width, 600)
     dock.show()
     dock.front = True
+    qtbot.waitUntil(dock.shown)
     session.tick()
     dock.refresh()
     assert isinstance(widget, robots.RobotsPanel)
