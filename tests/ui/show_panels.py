@@ -65,6 +65,7 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
     dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
     dock.resize(width, height)
     dock.show()
+    wait(10)  # until it is exposed: a panel that nobody can see shows nothing new
     dock.front = True
     prepare(name, widget)
     for _ in range(8):

@@ -62,7 +62,8 @@ def test_everything_in_a_panel_has_a_name(qtbot, theme: Theme, name: str, full: 
     dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
     qtbot.addWidget(dock)
     dock.resize(width, height)
-    dock.show()
+    with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
+        dock.show()
     dock.front = True
     qtbot.waitUntil(dock.shown)
     if full:

@@ -100,7 +100,8 @@ def test_no_panel_cuts_its_words(qtbot, theme: Theme, full: bool, percent: int, 
         dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
         qtbot.addWidget(dock)
         dock.resize(width, height)
-        dock.show()
+        with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
+            dock.show()
         dock.front = True
         qtbot.waitUntil(dock.shown)
         if full:
@@ -127,7 +128,8 @@ def test_an_action_is_read_and_tried_without_scrolling_sideways(
     dock = Dock(theme, panel, widget, "comfortable")  # type: ignore[arg-type]
     qtbot.addWidget(dock)
     dock.resize(width, 600)
-    dock.show()
+    with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
+        dock.show()
     dock.front = True
     qtbot.waitUntil(dock.shown)
     session.tick()
