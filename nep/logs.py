@@ -3,6 +3,7 @@
     node.log.warning("the battery is at %d %%", 9)
     logging.getLogger().addHandler(node.log_handler)      # all that this program logs
 
+A node that logs errors also keeps the last of them, latched on `/nep/log/errors`, as long as it lives.
 A node that never logs has no thread and no publisher for it. A flood is cut to `RATE_HZ` records a second;
 what is left out is counted, and the count is a record of its own.
 """
@@ -16,17 +17,35 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from nep.errors import ClosedError, NepError
 from nep.forks import watch
+from nep.text import shortened
 
-__all__ = ["BURST", "LEVELS", "LOG_TOPIC", "LOG_TYPE", "RATE_HZ", "LogHandler", "LogRecord", "level_of"]
+__all__ = [
+    "BURST",
+    "LAST_ERRORS_TOPIC",
+    "LAST_ERRORS_TYPE",
+    "LEVELS",
+    "LOG_TOPIC",
+    "LOG_TYPE",
+    "RATE_HZ",
+    "LogHandler",
+    "LogRecord",
+    "ShownErrors",
+    "level_of",
+]
 
 LOG_TOPIC = "/nep/log"
 LOG_TYPE = "nep/log"
+LAST_ERRORS_TOPIC = "/nep/log/errors"
+LAST_ERRORS_TYPE = "nep/log_errors"
+"""A latched list of the last errors of a node, for whoever comes later; there once it has logged one."""
+LAST_ERRORS = 20
 LEVELS = ("debug", "info", "warning", "error", "critical")
 """The levels of a record, the quietest first."""
 RATE_HZ = 100.0
@@ -35,11 +54,14 @@ BURST = 200
 TEXT_LIMIT = 8_000
 """Letters of a record's text; a longer one is cut and says so."""
 
+_ERROR_TEXT_LIMIT = 1_000
+_SHOWN = 2_000
 _SAY_LEFT_OUT_S = 1.0
 _FLUSH_S = 1.0
 _AGAIN_S = 1.0
 _WAITING = 1_000
 _OWN = "nep_published_by"
+_ERRORS = ("error", "critical")
 _ALIASES = {"warn": "warning", "fatal": "critical", "err": "error", "trace": "debug"}
 
 
@@ -98,6 +120,34 @@ def level_of(given: object) -> str:
     return word if word in LEVELS else "info"
 
 
+class ShownErrors:
+    """Which errors were shown already: each comes live and again in the lists of the last ones.
+
+    Keeps the newest 2000.
+    """
+
+    def __init__(self) -> None:
+        self._shown: dict[tuple[str, int, str], None] = {}
+
+    def is_new(self, record: LogRecord) -> bool:
+        """Whether it is to be shown: any that is no error, and each error once."""
+        if record.level not in _ERRORS:
+            return True
+        key = (record.node, record.stamp_ns, record.text[:100])
+        if key in self._shown:
+            return False
+        self._shown[key] = None
+        if len(self._shown) > _SHOWN:
+            del self._shown[next(iter(self._shown))]
+        return True
+
+    def new_in(self, payload: object) -> list[LogRecord]:
+        """Those in a list of last errors that were not shown yet, oldest first."""
+        given = payload[-LAST_ERRORS:] if isinstance(payload, list) else []
+        records = sorted(map(LogRecord.from_plain, given), key=lambda record: record.stamp_ns)
+        return [record for record in records if record.stamp_ns and self.is_new(record)]
+
+
 class Publishes(Protocol):
     """What a handler needs of a publisher."""
 
@@ -110,7 +160,7 @@ class MakesPublishers(Protocol):
 
     name: str
 
-    def new_pub(self, topic: str, msg_type: str) -> Publishes:
+    def new_pub(self, topic: str, msg_type: str, *, latched: bool = False) -> Publishes:
         """A publisher."""
 
 
@@ -118,7 +168,8 @@ class LogHandler(logging.Handler):
     """Publishes what is logged, as records of `node`. Never blocks who logs and never raises.
 
     `open_publisher` is called in a thread of the handler's own when the first record comes, and again each
-    second until it succeeds; so long records wait, 1000 of them at most.
+    second until it succeeds; so long records wait, 1000 of them at most. `open_errors` is called when the
+    first error comes, for a latched publisher of the last ones; without it nobody keeps them.
     """
 
     def __init__(
@@ -126,6 +177,7 @@ class LogHandler(logging.Handler):
         node: str,
         open_publisher: Callable[[], Publishes],
         *,
+        open_errors: Callable[[], Publishes] | None = None,
         rate_hz: float = RATE_HZ,
         burst: int = BURST,
         clock: Callable[[], float] = time.monotonic,
@@ -137,6 +189,9 @@ class LogHandler(logging.Handler):
         self.logger.addHandler(self)
         self._node = node
         self._open = open_publisher
+        self._open_errors = open_errors
+        self._errors: deque[dict[str, object]] = deque(maxlen=LAST_ERRORS)
+        self._errors_publisher: Publishes | None = None
         self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
         self._tokens, self._counted_at = float(burst), clock()
         self._waiting: deque[dict[str, object]] = deque()
@@ -243,6 +298,19 @@ class LogHandler(logging.Handler):
                     publisher.publish(record)
                 except NepError:
                     return  # the node is closed
+            self._keep_errors([record for record in records if record["level"] in _ERRORS])
+
+    def _keep_errors(self, records: list[dict[str, object]]) -> None:
+        """Publish the last errors again, with these, for whoever comes later."""
+        if not records or self._open_errors is None:
+            return
+        for record in records:
+            text = shortened(str(record["text"]), _ERROR_TEXT_LIMIT)
+            self._errors.append({**record, "text": text})
+        with suppress(NepError):  # with the next error it is tried again
+            if self._errors_publisher is None:
+                self._errors_publisher = self._open_errors()
+            self._errors_publisher.publish(list(self._errors))
 
     def _opened(self) -> Publishes | None:
         """The publisher, as soon as there is one; None when the handler was closed meanwhile."""
@@ -285,7 +353,11 @@ class LogHandler(logging.Handler):
 
 def handler_of(node: MakesPublishers) -> LogHandler:
     """A handler that publishes on `LOG_TOPIC` as this node."""
-    return LogHandler(node.name, lambda: node.new_pub(LOG_TOPIC, LOG_TYPE))
+    return LogHandler(
+        node.name,
+        lambda: node.new_pub(LOG_TOPIC, LOG_TYPE),
+        open_errors=lambda: node.new_pub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, latched=True),
+    )
 
 
 def _named(level: int) -> str:

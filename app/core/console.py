@@ -47,6 +47,7 @@ class Console:
         self._lines: deque[LogRecord | Message] = deque(maxlen=capacity)
         self._unread = 0
         self._own: deque[int] = deque(maxlen=OWN_KEPT)
+        self._errors = logs.ShownErrors()
         self._count = 0
         self.left_out = 0
         """Records of the bus that were dropped because too many came at once."""
@@ -92,18 +93,23 @@ class Console:
         unread = [self._lines.pop() for _ in range(self._unread)]
         self._unread = 0
         for line in reversed(unread):
-            record = self._record(line) if isinstance(line, Message) else line
-            if record is not None:
+            for record in self._of_bus(line) if isinstance(line, Message) else (line,):
                 self._count += 1
                 self._lines.append(replace(record, number=self._count))
 
-    def _record(self, message: Message) -> LogRecord | None:
+    def _of_bus(self, message: Message) -> Sequence[LogRecord]:
+        """The records in a message; a list of a node's last errors has those that did not come before."""
         try:
-            given = logs.LogRecord.from_plain(message.payload, message.stamp_ns)
+            if message.topic == logs.LAST_ERRORS_TOPIC:
+                given = self._errors.new_in(message.payload)
+            else:
+                one = logs.LogRecord.from_plain(message.payload, message.stamp_ns)
+                given = [one] if self._errors.is_new(one) else []
         except NepError:
-            return None  # an alert says so, as for every topic
-        if given.pid is not None and given.pid in self._own:
-            return None
+            return ()  # an alert says so, as for every topic
+        return [self._record(each) for each in given if each.pid is None or each.pid not in self._own]
+
+    def _record(self, given: logs.LogRecord) -> LogRecord:
         place = f"{given.file}:{given.line}" if given.file and given.line else given.file or ""
         return LogRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),

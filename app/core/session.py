@@ -46,13 +46,15 @@ from app.core.stopping import RobotStopper, StopTarget
 from app.core.topics import Topics
 from app.core.traffic import Traffic
 from app.core.watches import Watch, Watches
-from nep.logs import LOG_TOPIC, LOG_TYPE
+from nep.logs import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE
 from nep.masters import master_address
 from nep.message import Message
 from nep.nodes import Node
 from nep.views import GraphView
 
 CHECK_S = 1.0
+LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
+"""What the Console shows."""
 
 
 class Session:
@@ -115,7 +117,7 @@ class Session:
 
     def _live_network(self) -> LiveSource:
         sinks = [self._checks.look, self._mailbox.post, self._offer]
-        return LiveSource(self.address, sinks, self._mailbox.post_event, always={LOG_TOPIC: LOG_TYPE})
+        return LiveSource(self.address, sinks, self._mailbox.post_event, always=LOGS)
 
     def _offer(self, _topic: str, messages: Sequence[Message]) -> None:
         self.images.offer(messages)
@@ -202,7 +204,7 @@ class Session:
 
     def _on_messages(self, drained: Drained, now: float) -> None:
         for topic, batch in drained.batches.items():
-            if topic == LOG_TOPIC:
+            if topic in LOGS:
                 self.console.take(batch.messages, batch.dropped)
             if not self._watches.watched(topic):
                 continue  # the last of a subscription that has just ended

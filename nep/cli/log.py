@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from datetime import datetime, timezone
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,7 +16,19 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, say, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import DecodeError, did_you_mean
-from nep.logs import LEVELS, LOG_TOPIC, LOG_TYPE, TEXT_LIMIT, LogRecord, level_of
+from nep.logs import (
+    LAST_ERRORS_TOPIC,
+    LAST_ERRORS_TYPE,
+    LEVELS,
+    LOG_TOPIC,
+    LOG_TYPE,
+    TEXT_LIMIT,
+    LogRecord,
+    ShownErrors,
+    level_of,
+)
+from nep.message import Message
+from nep.nodes import Node
 from nep.pubsub import Subscriber
 from nep.text import escaped, shortened
 
@@ -47,7 +61,7 @@ def log(
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what programs log, as it comes. Ctrl+C ends it.
+    """Show what programs log: the last errors of those that are there, then what comes. Ctrl+C ends it.
 
     Robots' drivers, behaviours and the master log here; in a program of your own use node.log.
     """
@@ -57,15 +71,22 @@ def log(
     with node_for("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
         if not as_json:
             say("waiting for log records; Ctrl+C ends it")
-        for number in itertools.count(1):
-            record = _next(subscriber, least, node)
+        wanted = (
+            record
+            for record in _coming(own, subscriber)
+            if LEVELS.index(record.level) >= least and node in {None, record.node}
+        )
+        for record in itertools.islice(wanted, count or None):
             show_json(record.to_plain()) if as_json else _show(record)
-            if number == count:
-                return
 
 
-def _next(subscriber: Subscriber, least: int, node: str | None) -> LogRecord:
-    """The next record that is wanted."""
+def _coming(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
+    """The last errors of the programs that are there, then the records as they come; each error once."""
+    shown = ShownErrors()
+    with own.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as kept:
+        lists = iter(partial(kept.receive, 0.0), None)  # what was kept came while it connected
+        last = [record for each in lists for record in _last_errors(each, shown)]
+    yield from sorted(last, key=lambda record: record.stamp_ns)
     while True:
         message = subscriber.receive()
         if message is None:
@@ -74,8 +95,15 @@ def _next(subscriber: Subscriber, least: int, node: str | None) -> LogRecord:
             record = LogRecord.from_plain(message.payload, message.stamp_ns)
         except DecodeError as error:
             record = LogRecord("warning", str(error), "nep", LOG_TOPIC, message.stamp_ns or 0)
-        if LEVELS.index(record.level) >= least and node in {None, record.node}:
-            return record
+        if shown.is_new(record):
+            yield record
+
+
+def _last_errors(message: Message, shown: ShownErrors) -> list[LogRecord]:
+    try:
+        return shown.new_in(message.payload)
+    except DecodeError:
+        return []
 
 
 def _show(record: LogRecord) -> None:

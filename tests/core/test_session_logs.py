@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
+
+import pytest
 
 import nep
 from app.core.alerts import Alerts
 from app.core.companions import CompanionFailed
 from app.core.session import Session
+from app.core.settings import Settings
 from app.core.source import MasterFound, MasterLost
+from nep.logs import LAST_ERRORS_TOPIC
 from tests.blocks.samples import number, stack, started, text, workspace, write
 from tests.core.waiting import tick_until
+from tests.nep.programs import eventually
 
 
 def told(session: Session, origin: str) -> list[str]:
@@ -36,6 +42,28 @@ def test_the_first_record_of_a_node_arrives_and_is_nobodys_new_topic(session: Se
         assert told(session, "driver") == ["low battery"]
         assert not any("/nep/log" in line for line in told(session, "master"))
     tick_until(session, lambda: "driver has left" in told(session, "master"))
+
+
+def test_a_studio_that_starts_late_shows_the_last_errors_once(
+    master: nep.Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    with nep.node("driver") as node:
+        node.log.error("the brake is hot")
+        eventually(lambda: LAST_ERRORS_TOPIC in node.graph().topics)
+        late = Session(
+            Settings(tmp_path), address=master.address, journal_folder=tmp_path, start_companions=False
+        )
+        late.start()
+        try:
+            tick_until(late, lambda: told(late, "driver"))
+            node.log.error("the brake is gone")
+            tick_until(late, lambda: len(told(late, "driver")) > 1)
+            node.log.info("over")
+            tick_until(late, lambda: "over" in told(late, "driver"))
+            assert told(late, "driver") == ["the brake is hot", "the brake is gone", "over"]
+        finally:
+            late.close()
 
 
 def test_a_storm_of_records_is_bounded_and_counted_exactly(session: Session) -> None:

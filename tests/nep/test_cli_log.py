@@ -11,7 +11,8 @@ import typer
 import nep
 from nep.cli.alert_printer import AlertLog
 from nep.cli.log import log
-from nep.logs import LOG_TOPIC, LOG_TYPE
+from nep.logs import LAST_ERRORS_TOPIC, LOG_TOPIC, LOG_TYPE
+from tests.nep.programs import eventually
 
 
 @pytest.fixture
@@ -48,6 +49,29 @@ def test_records_are_json_for_programs_and_what_is_none_is_told(busy, capfdbinar
     records = [json.loads(line) for line in capfdbinary.readouterr().out.splitlines()]
     assert {record["text"] for record in records} >= {"not mine", "quiet", "the battery is low"}
     assert any("cannot decode" in record["text"] for record in records)
+
+
+def test_who_comes_late_sees_the_last_errors_first_and_each_once(master, capfd):
+    with nep.node("Pepper") as robot, nep.node("other") as other:
+        robot.log.error("the brake is hot\n12:00:00 error  forged\x1b[2J")
+        robot.log.info("fine")
+        other.log.critical("on fire")
+        eventually(lambda: LAST_ERRORS_TOPIC in robot.graph().topics)
+        eventually(lambda: len(robot.graph().topics[LAST_ERRORS_TOPIC].publishers) == 2)
+        log("info", None, 2, master.address)
+        lines = capfd.readouterr().out.splitlines()
+        assert lines[0].endswith("error     Pepper  the brake is hot")
+        assert lines[1] == "    12:00:00 error  forged\\x1b[2J"
+        assert lines[2].endswith("critical  other  on fire")
+        assert len(lines) == 3
+        log("info", "other", 1, master.address)
+        assert "on fire" in capfd.readouterr().out
+
+
+def test_an_error_that_comes_while_one_looks_is_shown_once(busy, capfd):
+    log("error", "other", 1, busy)
+    log("error", "other", 1, busy)  # the same one, which is kept
+    assert capfd.readouterr().out.count("not mine") == 2
 
 
 def test_a_wrong_level_is_a_sentence():

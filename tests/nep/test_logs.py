@@ -9,7 +9,18 @@ import pytest
 
 import nep
 from nep.errors import ClosedError, MasterUnreachable
-from nep.logs import BURST, LEVELS, LOG_TOPIC, LOG_TYPE, TEXT_LIMIT, LogHandler, LogRecord, level_of
+from nep.logs import (
+    BURST,
+    LAST_ERRORS,
+    LEVELS,
+    LOG_TOPIC,
+    LOG_TYPE,
+    TEXT_LIMIT,
+    LogHandler,
+    LogRecord,
+    ShownErrors,
+    level_of,
+)
 from tests.nep.programs import eventually
 
 
@@ -43,6 +54,60 @@ def handler(kept):
     made = LogHandler("robot", kept.open)
     yield made
     made.close()
+
+
+def test_the_last_errors_are_kept_for_who_comes_later_and_no_more_of_them():
+    records, errors = Kept(), Kept([MasterUnreachable("127.0.0.1:1", 2.0)])
+    handler = LogHandler("robot", records.open, open_errors=errors.open)
+    handler.logger.info("fine")
+    handler.logger.error("one, when nobody keeps it yet")
+    eventually(lambda: len(records.records) == 2)
+    for number in range(30):
+        handler.logger.error("error %d %s", number, "x" * 2000)
+    handler.close()
+    assert "fine" not in str(errors.records)
+    assert len(errors.records[-1]) == LAST_ERRORS
+    assert [record["text"][:8] for record in errors.records[-1]] == [
+        f"error {number}" for number in range(10, 30)
+    ]
+    assert all(len(record["text"]) < 1100 for record in errors.records[-1])
+
+
+def test_who_never_logs_an_error_has_no_publisher_for_them(kept):
+    errors = Kept()
+    handler = LogHandler("robot", kept.open, open_errors=errors.open)
+    handler.logger.warning("nearly")
+    handler.close()
+    assert errors.opened == 0
+
+
+def test_an_error_is_shown_once_whichever_way_it_comes():
+    shown = ShownErrors()
+    one, two = ({"level": "error", "text": text, "node": "robot", "stamp_ns": 7} for text in ("one", "two"))
+    assert shown.is_new(LogRecord.from_plain(one))
+    assert [record.text for record in shown.new_in([two, one])] == ["two"]
+    assert not shown.is_new(LogRecord.from_plain(two))
+    fine = LogRecord.from_plain({"text": "fine", "node": "robot", "stamp_ns": 7})
+    assert shown.is_new(fine)
+    assert shown.is_new(fine)
+
+
+@pytest.mark.parametrize(
+    "payload", [None, 7, "text", {}, [None], [[]], [{}], [{"stamp_ns": 2**70, "level": "error"}]]
+)
+def test_what_is_no_list_of_errors_is_nothing(payload):
+    assert ShownErrors().new_in(payload) == []
+
+
+def test_the_errors_that_were_shown_are_bounded():
+    shown = ShownErrors()
+    for number in range(5000):
+        assert shown.is_new(LogRecord("error", "x", "n", "robot", number + 1))
+    assert len(shown._shown) <= 2000
+    assert (
+        len(shown.new_in([{"level": "error", "stamp_ns": 10_000 + number} for number in range(999)]))
+        == LAST_ERRORS
+    )
 
 
 def test_a_record_says_level_text_logger_node_time_place_and_process(handler, kept):
