@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.ui.blockly_bridge import BlocklyBridge
 from app.ui.blockly_scheme import PAGE, SCHEME, Fence, SchemeHandler, register_scheme
+from app.ui.focus_chain import proxy_of
 
 _log = logging.getLogger(__name__)
 _Attribute = QWebEngineSettings.WebAttribute
@@ -79,4 +80,4 @@ class BlocklyWeb:
 
     def keyboard(self) -> QObject | None:
         """The widget that receives the keys while the page has the focus."""
-        return self.view.focusProxy()
+        return proxy_of(self.view)

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.dock_title import DockTitle
+from app.ui.focus_chain import proxy_of, tab_stops
 from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
@@ -214,16 +215,10 @@ class Dock(QDockWidget):
 
     def first_stop(self) -> QWidget:
         """Where the keyboard goes in the panel: what it is about, else the first thing that takes keys."""
-        about = self.panel.focusProxy()
+        about = proxy_of(self.panel)
         if about is not None and about.isVisible():
             return about
-        step = self.panel.nextInFocusChain()
-        while step is not None and step is not self.panel:
-            takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
-            if takes and step.isVisible() and step.isEnabled() and self.panel.isAncestorOf(step):
-                return step
-            step = step.nextInFocusChain()
-        return self.panel
+        return next(tab_stops(self.panel, self.panel), self.panel)
 
     def _float(self) -> None:
         self._let_go()

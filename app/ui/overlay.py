@@ -18,6 +18,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QRegion
 from PySide6.QtWidgets import QApplication, QGraphicsOpacityEffect, QWidget
 from shiboken6 import isValid
 
+from app.ui.focus_chain import tab_stops
 from app.ui.theme import Theme
 from app.ui.widgets import StopButton, paint
 from app.ui.widgets.menus import round_region
@@ -210,14 +211,10 @@ class Overlay(QWidget):
         """Tab stays inside."""
         focus = QApplication.focusWidget()
         step: QWidget = focus if focus is not None and self.isAncestorOf(focus) else self
-        for _ in range(2000):
-            further = step.nextInFocusChain() if forward else step.previousInFocusChain()
-            step = further if further is not None else self
-            takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
-            if self.isAncestorOf(step) and takes and step.isVisible() and step.isEnabled():
-                reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
-                step.setFocus(reason)
-                return True
+        stop = next(tab_stops(self, step, forward=forward), None)
+        if stop is not None:
+            reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
+            stop.setFocus(reason)
         return True
 
     def paintEvent(self, _event: QPaintEvent) -> None:

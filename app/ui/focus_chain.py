@@ -1,0 +1,42 @@
+"""The order in which Tab goes through widgets, asked so that asking changes nothing.
+
+PySide takes whatever a getter without arguments returns for a child of the object that was asked. Of the next
+widget in the focus chain, or a proxy, that is not true: when the widget that was asked is deleted, PySide
+calls the other one, and what Qt made in it, deleted too, while Qt goes on using it. So each gets its own
+parent back at once, and nothing else in `app.ui` may ask these questions (ADR 0018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtWidgets import QWidget
+
+
+def following(widget: QWidget, *, forward: bool = True) -> QWidget:
+    """The widget after this one in its window's focus chain, or the one before; itself when it is alone."""
+    found = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
+    return widget if found is None else _own_again(found)
+
+
+def proxy_of(widget: QWidget) -> QWidget | None:
+    """The widget that gets the keyboard in its place; None when it takes it itself."""
+    found = widget.focusProxy()
+    return None if found is None else _own_again(found)
+
+
+def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
+    """What takes the keyboard by Tab inside a widget, in order, after (or before) ``begin``; each once."""
+    step = following(begin, forward=forward)
+    while step is not begin:
+        takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
+        if takes and step.isVisible() and step.isEnabled() and widget.isAncestorOf(step):
+            yield step
+        step = following(step, forward=forward)
+
+
+def _own_again(found: QWidget) -> QWidget:
+    """Tell PySide whose child this is: Qt, which knows it, finds nothing to do."""
+    QObject.setParent(found, found.parentWidget())
+    return found

@@ -1,0 +1,71 @@
+"""Asking where the keyboard would go next changes nothing, also when the widget that was asked is deleted."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+import shiboken6
+from PySide6.QtCore import QCoreApplication, QEvent
+from PySide6.QtWidgets import QLabel, QLineEdit, QScrollArea, QVBoxLayout, QWidget
+
+import app.ui
+from app.ui.focus_chain import following, proxy_of, tab_stops
+
+ASKS = re.compile(r"\.(nextInFocusChain|previousInFocusChain|focusProxy|buddy)\(\)")
+
+
+def delete(widget: QWidget) -> None:
+    widget.deleteLater()
+    QCoreApplication.sendPostedEvents(widget, QEvent.Type.DeferredDelete.value)
+
+
+@pytest.fixture
+def window(qtbot) -> QWidget:
+    window = QWidget()
+    qtbot.addWidget(window)
+    column = QVBoxLayout(window)
+    for widget in (QLineEdit(), QLabel("not a stop"), QScrollArea(), QLineEdit()):
+        column.addWidget(widget)
+    window.show()
+    return window
+
+
+def test_what_was_asked_for_outlives_what_was_asked(window: QWidget) -> None:
+    first, second = window.findChildren(QLineEdit)
+    area = window.findChildren(QScrollArea)[0]
+    header = area.viewport()  # made by Qt, not by Python: what PySide would call deleted
+    assert list(tab_stops(window, first)) == [area, second]
+    assert list(tab_stops(window, first, forward=False)) == [second, area]
+    step = following(first)
+    while step is not first:
+        step = following(step)
+    delete(first)
+    delete(second)
+    for widget in (window, area, header):
+        assert shiboken6.isValid(widget)
+    assert area.parentWidget() is window
+
+
+def test_a_proxy_stays_where_it_is(window: QWidget) -> None:
+    first, second = window.findChildren(QLineEdit)
+    assert proxy_of(first) is None
+    first.setFocusProxy(second)
+    assert proxy_of(first) is second
+    assert second.parentWidget() is window
+
+
+def test_a_window_is_nobodys_child_after_it_was_asked_for(window: QWidget) -> None:
+    last = window.findChildren(QLineEdit)[-1]
+    assert any(following(each) is window for each in window.findChildren(QWidget))
+    delete(last)
+    assert shiboken6.isValid(window)
+    assert window.isVisible()
+    assert window.isWindow()
+
+
+def test_nobody_else_asks_for_the_focus_chain() -> None:
+    root = Path(app.ui.__file__).parent
+    asking = {path.name for path in root.rglob("*.py") if ASKS.search(path.read_text("utf-8"))}
+    assert asking == {"focus_chain.py"}

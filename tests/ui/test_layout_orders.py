@@ -1,0 +1,110 @@
+"""Every order of layouts, panels and the keyboard's place: the window outlives them all."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent
+from PySide6.QtWidgets import QStackedWidget
+
+from app.ui.docks import Dock
+from app.ui.focus_chain import tab_stops
+from app.ui.layouts import LAYOUTS
+from app.ui.panel_shelf import PanelShelf
+from app.ui.panels.base import Panel, PanelWidget
+from app.ui.workbench import Workbench
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window
+
+# The blocks before their web view is there: a panel in which nothing takes the keyboard.
+BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+STOPS = 3  # in each panel: its first one, and what a person reaches next
+
+
+class Layouts(QStackedWidget):
+    """The workbenches of all layouts, of which one shows, as in the window."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        shell = Window(Session.full())
+        self.session = shell.session
+        self.panels = {**PanelShelf(), "behaviour": BLOCKS}
+        self.benches = {
+            layout.name: Workbench(shell.theme, layout, self.panels, shell.context()) for layout in LAYOUTS
+        }
+        for bench in self.benches.values():
+            self.addWidget(bench)
+            bench.resize(1440, 800)
+            bench.arrange()
+        self.resize(1440, 800)
+
+    def switch(self, name: str) -> Workbench:
+        """Show a layout as the window does, until everything that was put off is done."""
+        bench = self.benches[name]
+        self.setCurrentWidget(bench)
+        bench.focus_home()
+        self.settle()
+        return bench
+
+    def settle(self) -> None:
+        """Tabs are made anew, old ones are deleted, sizes are taken."""
+        for _ in range(3):
+            QCoreApplication.processEvents()
+            QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+        for bench in self.benches.values():
+            bench.refresh()
+
+
+@pytest.fixture
+def layouts(qtbot) -> Layouts:
+    made = Layouts()
+    qtbot.addWidget(made)
+    made.show()
+    yield made
+    for bench in made.benches.values():
+        bench.shut()
+
+
+def rest_of(bench: Workbench) -> list[str]:
+    """What failed in a workbench, in words; nothing when all of it stands."""
+    return [name for name, dock in bench.docks.items() if dock.failed]
+
+
+@pytest.mark.parametrize("order", [*permutations(layout.name for layout in LAYOUTS)])
+def test_every_panel_opened_in_one_layout_outlives_the_other(
+    layouts: Layouts, order: tuple[str, ...]
+) -> None:
+    first, second = order
+    for name in layouts.panels:
+        bench = layouts.switch(first)
+        if (first, name) == ("developer", "behaviour"):
+            continue  # has its own layout
+        dock = bench.open(name)
+        assert isinstance(dock, Dock)
+        layouts.settle()
+        for number in range(STOPS):
+            bench.focus_panel(dock)
+            stops = list(tab_stops(dock, dock))
+            if number < len(stops):
+                stops[number].setFocus()
+            layouts.switch(second)
+            layouts.switch(first)
+        dock.close()
+        layouts.settle()
+    assert not rest_of(layouts.benches[first])
+    assert not rest_of(layouts.benches[second])
+
+
+def test_the_robots_cards_outlive_the_tabs_that_led_to_them(layouts: Layouts) -> None:
+    bench = layouts.switch("developer")
+    dock = bench.open("robots")  # a tab beside Topics
+    layouts.settle()
+    bench.focus_panel(dock)
+    for name in ("topics", "robots", "topics", "robots"):
+        bench.focus_panel(bench.docks[name])
+        layouts.switch("behaviour")
+        layouts.switch("developer")
+    dock.resize(dock.width() - 1, dock.height())
+    assert dock.panel.cards["turn"].form.isVisibleTo(dock)
+    assert not dock.failed
