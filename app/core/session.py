@@ -6,8 +6,10 @@ over what they posted.
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -19,12 +21,13 @@ from app.core.console import Console
 from app.core.doctor import doctor_of
 from app.core.document import Document
 from app.core.documents import Documents
+from app.core.faults import survived, words_of
 from app.core.fleet import Fleet
 from app.core.health import ASK_DOCTOR, Health
 from app.core.images import Images
 from app.core.journal import Journal
 from app.core.kept_tabs import KeptTabs
-from app.core.mailbox import Drained, Mailbox
+from app.core.mailbox import Batch, Drained, Mailbox
 from app.core.master_state import Learning, MasterState
 from app.core.nodes import Nodes
 from app.core.processes import Processes
@@ -55,6 +58,8 @@ from nep.views import GraphView
 CHECK_S = 1.0
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """What the Console shows."""
+
+_log = logging.getLogger("studio")
 
 
 class Session:
@@ -146,42 +151,80 @@ class Session:
         now, now_ns = began, self._clock_ns()
         drained = self._mailbox.drain()
         for event in drained.events:
-            self._on_event(event, now)
+            with self.surviving(f"take over {type(event).__name__}"):
+                self._on_event(event, now)
         self._on_messages(drained, now)
-        self.topics.age(now, now_ns)
-        self.nodes.age(now)
-        self._follow_robots()
-        for name in self.fleet.take_settled():
-            self.runs.stop_again(name)
-        self.companions.follow()
+        with self.surviving("let topics and nodes age"):
+            self.topics.age(now, now_ns)
+            self.nodes.age(now)
+        with self.surviving("follow the robots"):
+            self._follow_robots()
+        with self.surviving("stop robots again"):
+            for name in self.fleet.take_settled():
+                self.runs.stop_again(name)
+        with self.surviving("follow what was started here"):
+            self.companions.follow()
         if now >= self._next_check:
             self._next_check = now + CHECK_S
-            self.companions.check()
-            missed = self.source.missed()
-            self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
-            self._look_for_problems_of_stop()
-            self._health.check(self.runs.kept if self.runs.active else (), self.companions.virtual_robots)
-            if self.runs.kept and self.companions.ended >= self.runs.kept:
-                self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
-            self._health.journal(self.documents.journal_error)
-            self._health.settings(self.settings.not_kept)
-            if self.master.kind == "none" and self._start_companions:
-                self.companions.keep_master()
+            self._check(now)
         self.tick_ms = (self._clock() - began) * 1000
 
+    @contextlib.contextmanager
+    def surviving(self, what: str) -> Iterator[None]:
+        """One thing of a tick: when it raises, the log and an alert say so, and the next has its turn.
+
+        ``what`` completes the sentence "can't ...".
+        """
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001  whatever it is: what comes after must still arrive
+            _log.exception("can't %s", what)
+            if self.alerts.has("studio"):
+                return  # the log counts how often
+            self.alerts.put(
+                "studio",
+                "error",
+                "Studio has a fault and may show old values.",
+                f"It can't {what}: {words_of(error)}",
+                button="Show the log",
+                action="help.log",
+            )
+
+    def _check(self, now: float) -> None:
+        """What is looked at once a second."""
+        with self.surviving("check what was started here"):
+            self.companions.check()
+            if self.master.kind == "none" and self._start_companions:
+                self.companions.keep_master()
+        with self.surviving("count what was missed"):
+            missed = self.source.missed()
+            self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
+        with self.surviving("tell what is wrong with Stop"):
+            self._look_for_problems_of_stop()
+            if self.runs.kept and self.companions.ended >= self.runs.kept:
+                self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
+        with self.surviving("check what is wrong"):
+            self._health.check(self.runs.kept if self.runs.active else (), self.companions.virtual_robots)
+            self._health.journal(self.documents.journal_error)
+            self._health.settings(self.settings.not_kept)
+
     def close(self) -> None:
-        """End the program, the threads and the processes that were started here."""
-        self.runs.close()
-        self.tabs.keep(ended_well=True)
-        self.documents.end()
-        self.fleet.close()
-        if self.stopper is not None:
-            self.stopper.close()
-        self.images.close()
-        self.doctor.close()
-        self.source.close()
-        self.companions.close()
-        self.reach.close()
+        """End the program, the threads and the processes that were started here, whatever one does."""
+        ends: list[tuple[str, Callable[[], object]]] = [
+            ("end the program", self.runs.close),
+            ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
+            ("end the behaviours", self.documents.end),
+            ("end the robots", self.fleet.close),
+            ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
+            ("end the pictures", self.images.close),
+            ("end the doctor", self.doctor.close),
+            ("leave the network", self.source.close),
+            ("end what was started here", self.companions.close),
+            ("end the reach", self.reach.close),
+        ]
+        for what, end in ends:
+            with survived(what):
+                end()
 
     # -- inside ----------------------------------------------------------------------------------------------
 
@@ -204,16 +247,15 @@ class Session:
 
     def _on_messages(self, drained: Drained, now: float) -> None:
         for topic, batch in drained.batches.items():
-            if topic in LOGS:
-                self.console.take(batch.messages, batch.dropped)
-            if not self._watches.watched(topic):
-                continue  # the last of a subscription that has just ended
-            self.topics.add(topic, batch, now)
-            self.topics[topic].watched = True
-        self.traffic.add(drained.batches, now)
-        self.fleet.add(drained.batches)
-        found = self._checks.take()
-        self._health.look({topic: what for topic, what in found.items() if self._watches.watched(topic)})
+            with self.surviving(f"take over messages of {topic}"):
+                self._on_batch(topic, batch, now)
+        with self.surviving("count messages"):
+            self.traffic.add(drained.batches, now)
+        with self.surviving("take over what robots say"):
+            self.fleet.add(drained.batches)
+        with self.surviving("check messages"):
+            found = self._checks.take()
+            self._health.look({topic: what for topic, what in found.items() if self._watches.watched(topic)})
         if drained.lost_events:
             self.alerts.put(
                 "mailbox",
@@ -222,6 +264,13 @@ class Session:
                 "What panels show may be out of date for a second.",
                 count=drained.lost_events,
             )
+
+    def _on_batch(self, topic: str, batch: Batch, now: float) -> None:
+        if topic in LOGS:
+            self.console.take(batch.messages, batch.dropped)
+        if self._watches.watched(topic):  # else the last of a subscription that has just ended
+            self.topics.add(topic, batch, now)
+            self.topics[topic].watched = True
 
     def _on_event(self, event: object, now: float) -> None:
         match event:
@@ -327,3 +376,7 @@ class Session:
             self._reachable, self._tries_to_reach = targets, False
             stopper.expect(targets)
             self.source.submit("watch over the robots", lambda _node: stopper.set_robots(targets))
+
+
+def _nothing() -> None:
+    """Nothing is to be ended."""

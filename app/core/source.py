@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 import time
@@ -13,6 +14,7 @@ from itertools import count
 from typing import Protocol
 
 import nep
+from app.core.faults import survived, words_of
 from nep.errors import NepError
 from nep.message import Message
 from nep.nodes import Node
@@ -25,6 +27,8 @@ POLL_PAUSE = 5.0
 """Where telling the graph takes long (10 000 topics: 0.4 s) the pause is so many times as long, at most:"""
 POLL_SLOWEST_S = 3.0
 NODE_NAME = "studio"
+
+_log = logging.getLogger("studio")
 
 Sink = Callable[[str, Sequence[Message]], None]
 """Takes a batch of one topic, oldest first, in nep's thread."""
@@ -168,17 +172,26 @@ class LiveSource:
     def _run(self) -> None:
         try:
             while not self._closing.is_set():
-                if self._node is None and not self._join():
+                went_well = False
+                with survived("follow the network"):
+                    went_well = self._turn()
+                if not went_well:
                     self._closing.wait(POLL_S)
-                    continue
-                asked_s = self._ask()
-                pause_s = max(POLL_S, min(POLL_SLOWEST_S, POLL_PAUSE * asked_s))
-                self._do_jobs(time.monotonic() + pause_s)
         finally:
             for _, subscriber in self._subscribers.values():
-                subscriber.close()
+                with survived("end a subscription"):
+                    subscriber.close()
             if self._node is not None:
                 self._node.close()
+
+    def _turn(self) -> bool:
+        """Join, ask once, do what is wished until it is time to ask again; False while no master answers."""
+        if self._node is None and not self._join():
+            return False
+        asked_s = self._ask()
+        pause_s = max(POLL_S, min(POLL_SLOWEST_S, POLL_PAUSE * asked_s))
+        self._do_jobs(time.monotonic() + pause_s)
+        return True
 
     def _join(self) -> bool:
         view = look(self.address, timeout_s=0.5)
@@ -229,6 +242,9 @@ class LiveSource:
                 job(self._node)
             except NepError as error:
                 self._post_event(JobFailed(what, str(error)))
+            except Exception as error:  # noqa: BLE001  one job that fails must not end all others
+                _log.exception("can't %s", what or "meet a wish")
+                self._post_event(JobFailed(what, words_of(error)))
             self._reconcile()
 
     def _reconcile(self) -> None:
@@ -273,7 +289,8 @@ class LiveSource:
 
     def _deliver(self, topic: str, messages: Sequence[Message]) -> None:
         for sink in self._sinks:
-            sink(topic, messages)
+            with survived(f"take messages of {topic}"):
+                sink(topic, messages)
 
 
 def _free_name(view: GraphView) -> str:

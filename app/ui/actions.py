@@ -119,6 +119,7 @@ TABLE: tuple[Row, ...] = (
     Row("network.others", "Robots", "Let other computers connect", "", "wifi", above=True),
     Row("help.shortcuts", "Help", "Keyboard shortcuts", "F1", "keyboard"),
     Row("help.doctor", "Help", "Connection doctor", "", "stethoscope"),
+    Row("help.log", "Help", "Show the log", "", "folder-open"),
     Row("help.about", "Help", "About NEP Studio", "", "info"),
 )
 

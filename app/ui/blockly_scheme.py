@@ -113,8 +113,9 @@ class Fence(QWebEngineUrlRequestInterceptor):
         self.blocked: list[str] = []
 
     def interceptRequest(self, info: QWebEngineUrlRequestInfo) -> None:
+        info.block(True)  # first: what fails here must not let it through
         if info.requestUrl().scheme() in ALLOWED:
+            info.block(False)
             return
-        info.block(True)
         if len(self.blocked) < 100:
             self.blocked.append(info.requestUrl().toString())

@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices
 
 from app.core.companions import VIRTUAL_ROBOTS
+from app.core.faults import log_folder
 from app.errors import SettingsError
 from app.ui.actions import Actions, Handler
 from app.ui.docks import Dock
@@ -118,6 +120,7 @@ class Commands:
             "network.others": self._ask_about_others,
             "robots.show": lambda: window.open_panel("robots"),
             "help.doctor": self._doctor,
+            "help.log": self._show_log,
             "help.about": lambda: self._sheet("NEP Studio", [(line, "") for line in ABOUT]),
         }
 
@@ -250,6 +253,17 @@ class Commands:
             self._open_in("developer", "doctor")
         else:
             self._window.open_panel("doctor")
+
+    def _show_log(self) -> None:
+        """Open the folder of the log files, which is there even when nothing was ever wrong."""
+        folder = log_folder()
+        try:
+            folder.mkdir(0o700, parents=True, exist_ok=True)
+        except OSError as error:
+            self._window.toast.say(f"{folder} can't be made: {(error.strerror or str(error)).lower()}")
+            return
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            self._window.toast.say(f"The log files are in {folder}")
 
     def _earlier_versions(self) -> None:
         window, document = self._window, self._session.document

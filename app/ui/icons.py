@@ -1,12 +1,13 @@
 """Lucide icons in the colour of the words beside them, sharp at every device pixel ratio.
 
-One SVG per icon, whatever the theme: an engine puts the colour of a role in place of ``currentColor`` when it
-paints. Delegates and painted widgets call `paint_icon`; controls that want a QIcon get one from `icon`.
+One drawing per icon, whatever the theme: an engine puts the colour of a role in place of ``currentColor``
+when it paints. Delegates and painted widgets call `paint_icon`; controls that want a QIcon use `IconEngine`.
 """
 
 from __future__ import annotations
 
 import difflib
+import logging
 from collections.abc import Callable
 from functools import lru_cache
 
@@ -15,24 +16,43 @@ from PySide6.QtGui import QColor, QIcon, QIconEngine, QPainter, QPixmap
 from PySide6.QtSvg import QSvgRenderer
 
 from app import resources
+from app.ui.overrides import guard
 
 THIN_FROM_PX = 20
 DOT_SHARE = 10 / 16
+UNKNOWN = "circle-question-mark"
+HEAD = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="24" height="24" viewBox="0 0 24 24" fill="none"'
+    ' stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round">'
+)
+
+_log = logging.getLogger("studio")
 
 
 @lru_cache(maxsize=1)
+def _shapes() -> dict[str, str]:
+    """What stands inside each icon's <svg>, by name: all of Lucide, since a robot may name any of them."""
+    text = resources.path("icons", "lucide.txt").read_text("utf-8")
+    return dict(line.split("\t", 1) for line in text.splitlines())
+
+
 def names() -> frozenset[str]:
     """The icons that Studio ships."""
-    return frozenset(path.stem for path in resources.path("icons").glob("*.svg"))
+    return frozenset(_shapes())
 
 
 @lru_cache(maxsize=256)
 def _source(name: str) -> str:
-    if name not in names():
-        near = difflib.get_close_matches(name, names(), 1)
-        hint = f"; did you mean '{near[0]}'?" if near else "; add its SVG to resources/icons"
-        raise KeyError(f"no icon '{name}'{hint}")
-    return resources.path("icons", f"{name}.svg").read_text("utf-8")
+    shape = _shapes().get(name)
+    if shape is None:
+        _log.warning("no icon '%s'%s; another one stands in", name[:80], _near(name))
+        shape = _shapes()[UNKNOWN]
+    return f"{HEAD}{shape}</svg>"
+
+
+def _near(name: str) -> str:
+    near = difflib.get_close_matches(name[:80], names(), 1)
+    return f" (did you mean '{near[0]}'?)" if near else ""
 
 
 @lru_cache(maxsize=512)
@@ -50,7 +70,7 @@ def _renderer(name: str, colour: str, opacity: float, filled: bool, thin: bool) 
 def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, filled: bool = False) -> None:
     """Paint an icon into a square of logical pixels; ``dot`` is the filled disc of "runs now".
 
-    KeyError names the nearest icon when there is none of that name.
+    For a name that is no icon's a circle with a question mark stands in; the log names the nearest one.
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -83,6 +103,7 @@ def paint_icon_again(painter: QPainter, rect: QRectF, name: str, colour: QColor)
     painter.drawPixmap(place, _drawn(name, rect.width(), colour.rgba(), ratio))
 
 
+@guard  # no QObject
 class IconEngine(QIconEngine):
     """Paints one icon in the colours of the moment: enabled, disabled, or chosen."""
 

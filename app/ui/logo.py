@@ -6,6 +6,7 @@ from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QIcon, QIconEngine, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QWidget
 
+from app.ui.overrides import guard
 from app.ui.theme import Theme
 from app.ui.widgets import paint
 
@@ -48,6 +49,7 @@ class Logo(QWidget):
         painter.end()
 
 
+@guard  # no QObject
 class LogoEngine(QIconEngine):
     """The logo as the window's icon."""
 

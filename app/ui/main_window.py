@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 
@@ -10,6 +9,7 @@ from PySide6.QtCore import QSize, QTimer, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
+from app.core.faults import survived
 from app.core.session import Session
 from app.ui.app_bar import AppBar
 from app.ui.arrangements import Arrangements
@@ -40,8 +40,6 @@ SMALLEST = QSize(1100, 700)
 FIRST_SIZE = QSize(1440, 900)
 START = "start"
 FACTS_EVERY = 8  # ticks
-
-_log = logging.getLogger(__name__)
 
 
 class MainWindow(QMainWindow):
@@ -234,20 +232,20 @@ class MainWindow(QMainWindow):
         """Take what is new, and let everything that can be seen show it."""
         began = time.perf_counter()
         self._ticks += 1
-        try:
+        surviving = self.session.surviving
+        with surviving("take over what is new"):
             self.session.tick()
-        except Exception as error:  # noqa: BLE001  the window must live on, and say so once
-            if not self.session.alerts.has("studio"):
-                _log.exception("a tick of the session failed")
-                detail = f"{type(error).__name__}: {error}"
-                self.session.alerts.put(
-                    "studio", "error", "Studio has a fault and may show old values.", detail
-                )
-        self._show_session()
-        self.room.follow()
-        self._follow_panels()
-        if self.bench is not None:
-            self.bench.refresh()
+        with surviving("show how it is"):
+            self._show_session()
+        with surviving("ask a question"):
+            self.question.refresh()
+        with surviving("make room for what is said"):
+            self.room.follow()
+        with surviving("let panels rest"):
+            self._follow_panels()
+        with surviving("show the panels"):
+            if self.bench is not None:
+                self.bench.refresh()
         spent = (time.perf_counter() - began) * 1000
         self._facts.window_ms += 0.1 * (spent - self._facts.window_ms)
 
@@ -265,9 +263,10 @@ class MainWindow(QMainWindow):
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
         if self._ticks % FACTS_EVERY == 0:
-            self._show_facts()
-        self._show_alerts()
-        self.question.refresh()
+            with self.session.surviving("show the figures"):
+                self._show_facts()
+        with self.session.surviving("show the alerts"):
+            self._show_alerts()
 
     def _show_facts(self) -> None:
         """Figures that nobody can read 30 times a second."""
@@ -314,13 +313,17 @@ class MainWindow(QMainWindow):
                 return
             self._shut = True
             self.timer.stop()
-            self.state.keep_place(self)
-            for name, bench in self.benches.items():
-                self.arrangements.keep(bench, name)
-            self.state.keep_theme(self.theme)
+            with survived("keep how the window looks"):
+                self._keep()
             self.hide()
             for bench in self.benches.values():
                 bench.shut()
             self.session.close()
             self.on_shut()
         super().closeEvent(event)
+
+    def _keep(self) -> None:
+        self.state.keep_place(self)
+        for name, bench in self.benches.items():
+            self.arrangements.keep(bench, name)
+        self.state.keep_theme(self.theme)

@@ -10,8 +10,12 @@ import logging
 import re
 from collections import deque
 from collections.abc import Callable, MutableMapping
+from typing import TextIO
 
 from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
+
+from app.core import faults
+from app.core.faults import SaidOnce
 
 FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
 QUIET = "--log-level=3"  # Chromium's own lines: only what ends it
@@ -53,12 +57,15 @@ class Log(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
+        self._once = SaidOnce()
         self._kept: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep one line."""
-        level = "error" if record.levelno >= logging.ERROR else "warn"
-        self._kept.append((level, record.name.partition(".")[0], record.getMessage()))
+        """Keep one line; what happens again and again is kept with its count."""
+        told = self._once.told(record)
+        if told is not None:
+            level = "error" if told.levelno >= logging.ERROR else "warn"
+            self._kept.append((level, told.name.partition(".")[0], told.getMessage()))
 
     def take(self, add: Callable[[str, str, str], object]) -> None:
         """Give what was kept to ``add`` (level, origin, words), oldest first."""
@@ -66,12 +73,33 @@ class Log(logging.Handler):
             add(*self._kept.popleft())
 
 
+class Terminal(logging.StreamHandler[TextIO]):
+    """Warnings and errors on the standard error output, with the traceback of what is new."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._once = SaidOnce()
+        self.setLevel(logging.WARNING)
+        self.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one line; what happens again and again comes with its count."""
+        told = self._once.told(record)
+        if told is not None:
+            super().emit(told)
+
+
 def listen() -> Log:
-    """From now on hear Qt, and keep what is logged; it also goes to the standard error output."""
+    """From now on hear Qt and what is raised anywhere, and keep what is logged.
+
+    It also goes to the standard error output and into the log files (`app.core.faults`).
+    """
+    faults.hear_all()
     qInstallMessageHandler(on_qt_message)
     root = logging.getLogger()
     if not root.handlers:
-        logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+        root.addHandler(Terminal())
     log = Log()
     root.addHandler(log)
+    root.addHandler(faults.LogFile(faults.log_folder()))
     return log

@@ -198,7 +198,7 @@ def test_its_description_is_valid_and_every_action_is_there(bench, request) -> N
         assert not (action.risk and not action.uses), f"{action.name} moves something, so it uses it"
         if not ours:
             continue
-        assert resources.path("icons", f"{action.icon}.svg").is_file()
+        assert f"\n{action.icon}\t" in resources.path("icons", "lucide.txt").read_text("utf-8")
     assert bench.robot.beat_s is not None
     assert bench.robot.safe_stop.confirmed
     assert bench.robot.safe_stop.watchdog_s is not None

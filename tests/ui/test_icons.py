@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import gc
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QByteArray, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QIcon, QImage, QPainter
+from PySide6.QtSvg import QSvgRenderer
 
 from app import resources
+from app.blocks import Problem
+from app.blocks.catalogue import Catalogue
+from app.core.problem_list import Listed
 from app.ui import icons, theme_tokens
 from app.ui.actions import TABLE
+from app.ui.panels.problems import ProblemRow
 from app.ui.theme import Theme
+from tests.blocks.samples import robot
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -62,9 +70,46 @@ def test_an_icon_is_painted_at_the_screens_ratio(theme: Theme, ratio: float) -> 
     assert pixmap.devicePixelRatio() == ratio
 
 
-def test_an_unknown_icon_names_the_nearest() -> None:
-    with pytest.raises(KeyError, match="did you mean 'play'"):
-        icons.IconEngine("plya", lambda _mode, _state: QColor("red"))
+@pytest.mark.parametrize("name", ["plya", "", "../LICENSE", "a\tb", "<svg/>", "x" * 100_000])
+def test_an_unknown_icon_is_told_and_another_one_stands_in(qapp, caplog, name: str) -> None:
+    engine = icons.IconEngine(name, lambda _mode, _state: QColor("#102030"))
+    assert inks(engine.scaledPixmap(QSize(24, 24), QIcon.Mode.Normal, QIcon.State.Off, 2.0).toImage())
+    assert caplog.records[0].getMessage().startswith(f"no icon '{name[:80]}'")
+    assert ("did you mean 'play'?" in caplog.text) == (name == "plya")
+
+
+def test_every_icon_that_the_code_names_is_shipped() -> None:
+    """Words in the code that stand where icons stand: what a person mistyped is found here."""
+    before = r'(?:paint_icon(?:_again)?\([^"\n]*|\bicon\(|icon=|Button\(theme, "[^"]*", )'
+    given = re.compile(before + r'"([a-z0-9-]+)"')
+    root = Path(icons.__file__).parents[1]
+    named = {name for path in root.rglob("*.py") for name in given.findall(path.read_text("utf-8"))}
+    assert len(named) > 50
+    assert named - {"dot", "error", "behaviour"} <= icons.names()  # a disc, a colour, a layout
+
+
+def test_every_shape_is_an_svg_that_paints_something(qapp) -> None:
+    blank = []
+    for name in sorted(icons.names()):
+        image = QImage(24, 24, QImage.Format.Format_ARGB32_Premultiplied)
+        image.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(image)
+        QSvgRenderer(QByteArray(icons._source(name).encode())).render(painter)
+        painter.end()
+        if not any(bytes(image.constBits())):
+            blank.append(name)
+    assert len(icons.names()) > 2000
+    assert not blank
+
+
+def test_a_problem_of_every_block_is_painted(qtbot, theme: Theme, caplog) -> None:
+    for block in Catalogue([robot()]).blocks.values():
+        problem = Problem("error", "a", block.style, "it", "Something is wrong with it.", icon=block.icon)
+        row = ProblemRow(theme, Listed(problem, ()), large=True)
+        qtbot.addWidget(row)
+        row.resize(400, 60)
+        assert not row.grab().isNull(), block.type
+    assert not caplog.records
 
 
 def test_painting_puts_the_icon_into_its_square(qapp: object) -> None:

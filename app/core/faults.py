@@ -1,0 +1,145 @@
+"""Errors of Studio itself: heard wherever they are, said once, and never the end of what comes after.
+
+Everything goes through `logging`: what is raised and caught nowhere (`hear_all`, in any thread), what a
+guard caught (`survived`), and what Qt says. Handlers that a person reads have a `SaidOnce`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from types import TracebackType
+
+import platformdirs
+
+FILE_BYTES, FILES_KEPT = 1_000_000, 3
+FAULTS_KEPT = 500
+FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
+
+_log = logging.getLogger("studio")
+
+
+def log_folder() -> Path:
+    """Where the log files are: the system's place for them, or below ``$NEP_STUDIO_HOME``."""
+    chosen = os.environ.get("NEP_STUDIO_HOME")
+    return Path(chosen) / "log" if chosen else Path(platformdirs.user_log_dir("nep-studio", appauthor=False))
+
+
+@contextlib.contextmanager
+def survived(what: str) -> Iterator[None]:
+    """Log what goes wrong inside as "can't ``what``", with its traceback, and go on behind it."""
+    try:
+        yield
+    except Exception:  # noqa: BLE001  whatever it is: what comes after still has its turn
+        _log.exception("can't %s", what)
+
+
+class SaidOnce:
+    """Says a fault when it is new, and when it has happened 10, 100, 1000 ... times, with the count.
+
+    The same are records of one logger and level, raised at one place or with one text. The newest 500 faults
+    are known; an older one that happens again is new. Handlers call it under their own lock.
+    """
+
+    def __init__(self) -> None:
+        self._counts: dict[tuple[object, ...], int] = {}
+
+    def told(self, record: logging.LogRecord) -> logging.LogRecord | None:
+        """The record as it is to be written, or None; one that was written before says how often it came."""
+        key = (record.name, record.levelno, _place(record) or record.getMessage())
+        count = self._counts.pop(key, 0) + 1
+        while len(self._counts) >= FAULTS_KEPT:
+            del self._counts[next(iter(self._counts))]
+        self._counts[key] = count
+        if count == 1:
+            return record
+        if count < 10 or str(count).strip("0") != "1":
+            return None
+        again = logging.makeLogRecord(record.__dict__)
+        again.msg, again.args = f"{record.getMessage()} ({count} times)", ()
+        again.exc_info, again.exc_text = None, None  # the first one told where
+        return again
+
+
+def _place(record: logging.LogRecord) -> tuple[object, ...] | None:
+    """The type of an exception and the line that raised it; None when a record has none."""
+    if not record.exc_info or record.exc_info[0] is None:
+        return None
+    kind, _, trace = record.exc_info
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    where = (trace.tb_frame.f_code.co_filename, trace.tb_lineno) if trace is not None else ()
+    return (kind, *where)
+
+
+class LogFile(RotatingFileHandler):
+    """Warnings and errors with their tracebacks: ``studio.log`` and three older ones of a megabyte each.
+
+    Only the user may read them. A disk that is full or read-only ends nothing: the line is lost.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """The folder is made with the first line."""
+        super().__init__(
+            folder / "studio.log", maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8", delay=True
+        )
+        self.setLevel(logging.WARNING)
+        self.setFormatter(logging.Formatter(FORMAT))
+        self._once = SaidOnce()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a line, once."""
+        told = self._once.told(record)
+        if told is not None:
+            super().emit(told)
+
+    def _open(self) -> io.TextIOWrapper:
+        path = Path(self.baseFilename)
+        path.parent.mkdir(0o700, parents=True, exist_ok=True)
+        number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        return os.fdopen(number, "a", encoding="utf-8", errors="backslashreplace")
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
+        """Nothing: there is no better place to say it, and the Console has the line."""
+
+
+def hear_all() -> None:
+    """From now on log what is raised and caught nowhere: in this thread, in others, and while things end."""
+    sys.excepthook = _raised
+    threading.excepthook = _raised_in_thread
+    sys.unraisablehook = _raised_at_end
+
+
+def _raised(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    if issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
+        return
+    _log.error("a fault of Studio: %s", words_of(error), exc_info=(kind, error, trace))
+
+
+def _raised_in_thread(raised: threading.ExceptHookArgs) -> None:
+    error = raised.exc_value
+    if error is None or isinstance(error, SystemExit):
+        return
+    name = raised.thread.name if raised.thread is not None else "a thread"
+    _log.error("'%s' ended: %s", name, words_of(error), exc_info=(type(error), error, raised.exc_traceback))
+
+
+def _raised_at_end(raised: sys.UnraisableHookArgs) -> None:
+    error = raised.exc_value
+    if error is not None:
+        trace = raised.exc_traceback
+        _log.error("while something ended: %s", words_of(error), exc_info=(type(error), error, trace))
+
+
+def words_of(error: BaseException) -> str:
+    """An exception in one line: its type and what it says."""
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__

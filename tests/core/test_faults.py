@@ -1,0 +1,279 @@
+"""A fault of Studio is heard, said once with a count, and what comes after it still arrives."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import nep
+from app.core import faults
+from app.core.faults import LogFile, SaidOnce, words_of
+from app.core.runner import RunnerEvent
+from app.core.session import Session
+from app.core.settings import Settings
+from app.core.source import GraphSeen, JobFailed, LiveSource, MasterFound
+from app.core.stop_events import StopDone, StopReport
+from nep.masters import Master
+from nep.message import Message
+
+ADDRESS = "127.0.0.1:1"
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Iterator[logging.Logger]:
+    """A logger of its own that writes into ``log/studio.log``."""
+    logger = logging.getLogger("studio.of-this-test")
+    logger.propagate = False
+    handler = LogFile(tmp_path / "log")
+    logger.addHandler(handler)
+    yield logger
+    logger.removeHandler(handler)
+    handler.close()
+
+
+def written(folder: Path) -> str:
+    return (folder / "log" / "studio.log").read_text("utf-8")
+
+
+# -- said once -------------------------------------------------------------------------------------
+
+
+def test_the_same_fault_is_said_once_then_with_its_count(log: logging.Logger, tmp_path: Path) -> None:
+    for number in range(1000):
+        try:
+            int(f"x{number}")  # another text each time, raised at the same place
+        except ValueError:
+            log.exception("can't read number %d", number)
+    text = written(tmp_path)
+    assert text.count("Traceback") == 1
+    assert [line.rpartition(": ")[2] for line in text.splitlines() if " studio.of-this-test: " in line] == [
+        "can't read number 0",
+        "can't read number 9 (10 times)",
+        "can't read number 99 (100 times)",
+        "can't read number 999 (1000 times)",
+    ]
+
+
+def test_other_places_and_texts_are_other_faults() -> None:
+    once = SaidOnce()
+
+    def said(text: str) -> bool:
+        return once.told(logging.LogRecord("qt", logging.WARNING, "", 0, text, (), None)) is not None
+
+    assert [said(text) for text in ("one", "other", "one", "other")] == [True, True, False, False]
+    assert all(said(f"text {number}") for number in range(2 * faults.FAULTS_KEPT))
+    assert len(once._counts) == faults.FAULTS_KEPT
+    assert said("one")  # so long ago that it is new
+
+
+# -- the file --------------------------------------------------------------------------------------
+
+
+def test_the_file_is_the_users_own_and_bounded(log: logging.Logger, tmp_path: Path) -> None:
+    for number in range(60):
+        log.error("%d %s", number, "x" * 100_000)
+    files = sorted(path.name for path in (tmp_path / "log").iterdir())
+    assert files == ["studio.log", "studio.log.1", "studio.log.2", "studio.log.3"]
+    assert sum(path.stat().st_size for path in (tmp_path / "log").iterdir()) < 4.5 * faults.FILE_BYTES
+    if sys.platform != "win32":
+        assert {path.stat().st_mode & 0o777 for path in (tmp_path / "log").iterdir()} == {0o600}
+
+
+def test_a_folder_that_can_not_be_made_ends_nothing(tmp_path: Path) -> None:
+    (tmp_path / "log").write_text("a file", "utf-8")
+    handler = LogFile(tmp_path / "log")
+    record = logging.LogRecord("studio", logging.ERROR, "", 0, "a fault \ud800", (), None)
+    handler.handle(record)
+    handler.close()
+    assert (tmp_path / "log").read_text("utf-8") == "a file"
+
+
+# -- heard -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def heard(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
+    """Everything is heard, until the test ends."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+    faults.hear_all()
+    return caplog
+
+
+def test_what_is_raised_anywhere_is_logged(heard: pytest.LogCaptureFixture) -> None:
+    class Ends:
+        def __del__(self) -> None:
+            raise OSError("while it ends")
+
+    def fail() -> None:
+        raise KeyError("key")
+
+    sys.excepthook(ValueError, ValueError("a slot of Qt"), None)
+    thread = threading.Thread(target=fail, name="some thread")
+    thread.start()
+    thread.join()
+    one = Ends()
+    del one
+    assert [record.getMessage() for record in heard.records] == [
+        "a fault of Studio: ValueError: a slot of Qt",
+        "'some thread' ended: KeyError: 'key'",
+        "while something ended: OSError: while it ends",
+    ]
+
+
+def test_an_end_that_is_meant_is_no_fault(
+    heard: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]
+) -> None:
+    thread = threading.Thread(target=sys.exit)
+    thread.start()
+    thread.join()
+    sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None)
+    assert not heard.records
+    assert "KeyboardInterrupt" in capsys.readouterr().err
+
+
+def test_an_exception_is_one_line() -> None:
+    assert words_of(ValueError("two\nlines")) == "ValueError: two lines"
+    assert words_of(KeyError()) == "KeyError"
+
+
+# -- a tick ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Session:
+    """Never started: it has no threads and no sockets."""
+    return Session(Settings(tmp_path), address=ADDRESS, journal_folder=tmp_path / "j", start_companions=False)
+
+
+def raising(*_given: object) -> object:
+    return int("x")
+
+
+def test_an_event_that_raises_takes_no_other_with_it(
+    session: Session, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    stopped: list[object] = []
+    monkeypatch.setattr(session.runs, "on_runner", raising)
+    monkeypatch.setattr(session.runs, "on_stop", stopped.append)
+    done = StopDone(1, StopReport((), 0.0))
+    for _ in range(29):
+        for event in (RunnerEvent("running", 1), done, MasterFound(ADDRESS)):
+            session._mailbox.post_event(event)
+        session.tick()
+    assert stopped == [done] * 29
+    assert session.master.kind == "connected"
+    (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
+    assert alert.detail.startswith("It can't take over RunnerEvent: ValueError")
+    assert alert.action == "help.log"
+    once = SaidOnce()
+    assert sum(once.told(record) is not None for record in caplog.records) == 2  # the first, and the tenth
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "topics.add",
+        "topics.age",
+        "nodes.age",
+        "traffic.add",
+        "traffic.miss",
+        "fleet.add",
+        "fleet.take_settled",
+        "companions.follow",
+        "companions.check",
+        "documents.set_topics",
+        "runs.on_runner",
+        "_checks.take",
+        "_health.look",
+        "_health.check",
+        "source.missed",
+        "console.take",
+    ],
+)
+def test_whatever_raises_in_a_tick_a_stop_and_messages_arrive(
+    session: Session, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    part, _, name = place.partition(".")
+    monkeypatch.setattr(getattr(session, part), name, raising)
+    watch = session.watch("/faces")
+    stopped: list[object] = []
+    monkeypatch.setattr(session.runs, "on_stop", stopped.append)
+    message = Message("/faces", b"{}", "json", "json", stamp_ns=1, seq=1, publisher=1)
+    for _ in range(2):
+        session._mailbox.post("/log", [message])
+        session._mailbox.post("/faces", [message])
+        session._mailbox.post_event(RunnerEvent("running", 1))
+        session._mailbox.post_event(StopDone(1, StopReport((), 0.0)))
+        session.tick()
+    assert len(stopped) == 2
+    if place != "topics.add":
+        assert session.topics["/faces"].received == 2
+    watch.close()
+
+
+def test_closing_ends_everything_whatever_fails(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[str] = []
+    for part in ("fleet", "images", "doctor", "companions", "reach"):
+        monkeypatch.setattr(getattr(session, part), "close", partial(ended.append, part))
+    monkeypatch.setattr(session.runs, "close", raising)
+    monkeypatch.setattr(session.source, "close", raising)
+    session.close()
+    assert ended == ["fleet", "images", "doctor", "companions", "reach"]
+
+
+def test_the_source_outlives_what_its_jobs_and_sinks_raise(master: Master) -> None:
+    """A thread that ended would leave Studio deaf, and the robots without Stop."""
+    events: list[object] = []
+    came = threading.Event()
+
+    def sink(_topic: str, messages: Sequence[Message]) -> None:
+        came.set()
+
+    source = LiveSource(master.address, [raising, sink], events.append)
+    source.watch("/talk")
+    source.start()
+    try:
+        done = threading.Event()
+        source.submit("do the impossible", raising)
+        source.submit("do it", lambda _node: done.set())
+        assert done.wait(20)
+        assert [e.sentence for e in events if isinstance(e, JobFailed)] == [
+            "ValueError: invalid literal for int() with base 10: 'x'"
+        ]
+        with nep.node("talker", master=master.address) as node:
+            publisher = node.new_pub("/talk", "json", latched=True)
+            publisher.publish({"n": 1})
+            assert came.wait(20)
+    finally:
+        source.close()
+
+
+def test_the_source_outlives_a_graph_that_nobody_can_take(
+    master: Master, caplog: pytest.LogCaptureFixture
+) -> None:
+    seen: list[object] = []
+    again = threading.Event()
+
+    def take(event: object) -> None:
+        if isinstance(event, GraphSeen):
+            seen.append(event)
+            if len(seen) > 1:
+                again.set()
+                return
+            int("x")
+
+    source = LiveSource(master.address, [], take)
+    source.start()
+    try:
+        assert again.wait(20)
+    finally:
+        source.close()
+    assert "can't follow the network" in caplog.text

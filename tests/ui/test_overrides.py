@@ -1,0 +1,128 @@
+"""An error in what Qt calls ends nothing: it is told once a call, and Qt gets an answer."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QAbstractListModel, QByteArray, QModelIndex, QObject, QRect, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QListView, QWidget
+
+import app.ui
+from app.ui.overrides import ANSWERS
+
+
+def wrong_number() -> object:
+    return int("x")  # made in C: what ended the process
+
+
+def no_attribute() -> object:
+    return None.no_such  # type: ignore[attr-defined]
+
+
+def raised() -> object:
+    raise KeyError("no icon 'split'")
+
+
+@pytest.fixture(params=[wrong_number, no_attribute, raised])
+def fail(request: pytest.FixtureRequest) -> Callable[[], object]:
+    return request.param
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What was told, by its type."""
+    found: list[str] = []
+    monkeypatch.setattr("sys.excepthook", lambda kind, _error, _trace: found.append(kind.__name__))
+    return found
+
+
+def test_a_widget_that_fails_everywhere_is_shown_all_the_same(qtbot, fail, told: list[str]) -> None:
+    class Bad(QWidget):
+        def paintEvent(self, _event: QPaintEvent) -> None:
+            painter = QPainter(self)  # still active when it fails
+            painter.drawLine(0, 0, 9, 9)
+            fail()
+
+        def sizeHint(self) -> QSize:
+            fail()
+            return QSize(1, 1)
+
+        def event(self, event: object) -> bool:
+            return super().event(event)
+
+        def eventFilter(self, _watched: QObject, _event: object) -> bool:
+            return bool(fail())
+
+    window = QWidget()
+    qtbot.addWidget(window)
+    bad = Bad()
+    QHBoxLayout(window).addWidget(bad)
+    window.installEventFilter(bad)
+    window.show()
+    qtbot.waitUntil(lambda: len(told) > 3)
+    window.removeEventFilter(bad)
+    count = len(told)
+    bad.resize(20, 20)
+    assert bad.grab().width() > 0  # paints: its painter of the time before is gone
+    assert len(told) > count
+    assert bad.isVisible()
+
+
+def test_a_layout_and_a_model_that_fail(qtbot, fail, told: list[str]) -> None:
+    class Row(QHBoxLayout):
+        def heightForWidth(self, _width: int) -> int:
+            fail()
+            return 1
+
+        def hasHeightForWidth(self) -> bool:
+            return True
+
+        def setGeometry(self, _rect: QRect) -> None:
+            fail()
+
+    class Names(QAbstractListModel):
+        def rowCount(self, _parent: QModelIndex = QModelIndex()) -> int:  # noqa: B008  Qt's default
+            return 2
+
+        def data(self, _index: QModelIndex, _role: int = Qt.ItemDataRole.DisplayRole) -> object:
+            return fail()
+
+        def roleNames(self) -> dict[int, QByteArray]:
+            return {}
+
+    window = QWidget()
+    qtbot.addWidget(window)
+    view = QListView()
+    view.setModel(Names(view))
+    row = Row(window)
+    row.addWidget(view)
+    window.show()
+    qtbot.waitExposed(window)
+    view.grab()
+    assert told
+    assert view.model().index(0).data() is None
+
+
+def test_a_function_that_is_no_override_raises_as_ever(qapp) -> None:
+    class Own(QWidget):
+        def count(self) -> int:
+            return int("x")
+
+    with pytest.raises(ValueError, match="invalid literal"):
+        Own().count()
+
+
+def test_every_override_of_ours_is_guarded() -> None:
+    """A name with a capital inside is Qt's: guarded, or known to need no guard."""
+    ours = {"setText"}  # Qt does not call it
+    found: set[str] = set()
+    for path in Path(app.ui.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                found |= {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
+    qt = {name for name in found if not name.islower() and "_" not in name}
+    assert {name for name in qt if name not in ANSWERS and not name.endswith("Event")} == ours

@@ -1,0 +1,40 @@
+"""Make resources/icons/lucide.txt, the one file of all icons, from the npm package lucide-static.
+
+    npm pack lucide-static@1.62.0 && tar xzf lucide-static-1.62.0.tgz
+    python3 tools/icons.py package
+
+A line is the name of an icon, a tab, and what stands inside its <svg>; lines are sorted by name.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+TARGET = Path(__file__).resolve().parents[1] / "resources" / "icons"
+HEAD = re.compile(r"\s*(?:<!--.*?-->\s*)?<svg\b[^>]*>(.*)</svg>\s*", re.DOTALL)
+
+
+def inside(svg: str) -> str:
+    """What stands inside <svg>, in one line. ValueError when it is not an icon of Lucide."""
+    found = HEAD.fullmatch(svg)
+    if found is None:
+        raise ValueError("no svg element")
+    return re.sub(r"\s*/>", "/>", re.sub(r">\s+<", "><", found.group(1).strip()))
+
+
+def main(package: Path) -> int:
+    """Write the file and the licence; the exit code."""
+    lines = [
+        f"{path.stem}\t{inside(path.read_text('utf-8'))}\n"
+        for path in sorted((package / "icons").glob("*.svg"))
+    ]
+    (TARGET / "lucide.txt").write_text("".join(lines), "utf-8")
+    (TARGET / "LICENSE.txt").write_text((package / "LICENSE").read_text("utf-8"), "utf-8")
+    sys.stdout.write(f"{len(lines)} icons\n")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(Path(sys.argv[1])))
