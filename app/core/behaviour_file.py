@@ -10,14 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.core import deep_json
-from app.core.files import write_atomically
+from app.core.files import LARGEST_BYTES, read_whole, write_atomically
 from app.errors import DocumentError
 
 FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
 TOO_DEEP = "more than 4000 blocks hang in one stack; divide it into several scripts"
-LARGEST_BYTES = 32 * 1024 * 1024
 OURS = frozenset({"format", "version", "name", "workspace", "robots"})
 
 Workspace = Mapping[str, object]
@@ -37,14 +36,11 @@ class BehaviourFile:
 def read_file(path: Path) -> BehaviourFile:
     """Read a behaviour's file. Raises DocumentError with what to do next."""
     try:
-        size = path.stat().st_size
-        data = path.read_bytes() if size <= LARGEST_BYTES else b""
+        data = read_whole(path)
     except OSError as error:
         raise DocumentError(path, f"can't be read ({error.strerror or error})") from error
     except ValueError as error:  # letters that no file's name has here
         raise DocumentError(path, "can't be read (no file has such a name here)") from error
-    if size > LARGEST_BYTES:
-        raise DocumentError(path, f"is {size // 1_000_000} MB; a behaviour has at most 32 MB")
     return parse_file(data, path)
 
 
@@ -86,7 +82,12 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         **behaviour.others,
     }
     try:
-        write_atomically(path, deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass"))
+        data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
+        if len(data) > LARGEST_BYTES:
+            size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
+            said = f"would have {size:.1f} MB; at most {most:.0f} MB are read, use smaller pictures"
+            raise DocumentError(path, said)
+        write_atomically(path, data)
     except RecursionError as error:
         raise DocumentError(path, f"can't be written: {TOO_DEEP}") from error
     except OSError as error:

@@ -10,16 +10,18 @@ import contextlib
 import hashlib
 import os
 import re
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from app.core.behaviour_file import SUFFIX
-from app.core.files import write_atomically
-from app.core.settings import home
+from app.core.files import make_private, private_folder, read_whole, write_atomically
+from app.core.settings import data_home, home
 from app.errors import DocumentError
 
+NAME = "earlier"
 COPIES_KEPT = 300
 BYTES_KEPT = 500_000_000
 OF_ONE_FILE = 30
@@ -45,7 +47,7 @@ class Earlier:
     def put_back(self) -> None:
         """Write them into the file again. Raises DocumentError; then the file is untouched."""
         try:
-            write_atomically(self.path, self.copy.read_bytes())
+            write_atomically(self.path, read_whole(self.copy))
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise DocumentError(self.path, f"can't be put back ({reason}); open {self.copy}") from error
@@ -56,23 +58,19 @@ def keep_earlier(
 ) -> Earlier | None:
     """Keep what the file says now; None when there is no file, or nothing in it.
 
-    The copies are in ``folder`` (default: ``earlier`` in Studio's folder), the newest 300 of them, at most 30
-    of one file. What is kept already is not kept twice. Raises DocumentError when it can't be kept.
+    The copies are in ``folder`` (default: ``earlier`` in Studio's folder for data), the newest 300 of them,
+    at most 30 of one file. What is kept already is not kept twice. Raises DocumentError when it can't be kept.
     """
     where = _folder(folder)
     if not path.is_file() or not path.stat().st_size:
         return None
     try:
-        data, written = path.read_bytes(), path.stat()
+        data, written = read_whole(path), path.stat()
         newest = next(iter(versions_of(path, where)), None)
-        if (
-            newest is not None
-            and newest.copy.stat().st_size == len(data)
-            and newest.copy.read_bytes() == data
-        ):
+        if newest is not None and newest.copy.stat().st_size == len(data) and read_whole(newest.copy) == data:
             return Earlier(path, newest.copy)
         copy = free_path(where, f"{path.stem}, before", clock(), f" {_mark(path)}")
-        write_atomically(copy, data)
+        write_atomically(copy, data, private=True)
         os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
@@ -128,7 +126,24 @@ def stamp_of(path: Path) -> Stamp | None:
 
 
 def _folder(chosen: Path | None) -> Path:
-    return chosen if chosen is not None else home() / "earlier"
+    return chosen if chosen is not None else data_home() / NAME
+
+
+def bring_here(old: Path | None = None, new: Path | None = None) -> None:
+    """Move the versions that a former Studio kept in the folder for configuration where they belong.
+
+    What can't be moved stays, and is tried again at the next start. Only their owner may read them.
+    """
+    old = old if old is not None else home() / NAME
+    new = new if new is not None else data_home() / NAME
+    if old != new and old.is_dir():
+        with contextlib.suppress(OSError):
+            private_folder(new)
+            for copy in old.glob(f"*{SUFFIX}"):
+                if not (new / copy.name).exists():
+                    shutil.move(copy, new / copy.name)
+            old.rmdir()
+    make_private(new, f"*{SUFFIX}")
 
 
 def _plain(name: str) -> str:

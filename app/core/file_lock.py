@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 import time
@@ -32,6 +33,11 @@ else:
         return True
 
 
+def _opened(path: Path) -> int:
+    # Only for its owner; a pipe that somebody put there is not waited for.
+    return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NONBLOCK", 0), 0o600)
+
+
 @contextmanager
 def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
     """Hold the lock of ``path`` (the file ``<name>.lock`` beside it); whether it could be had in time.
@@ -41,7 +47,7 @@ def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.with_name(f"{path.name}.lock").open("ab")
+        file = os.fdopen(_opened(path.with_name(f"{path.name}.lock")), "ab")
     except OSError:
         yield False
         return

@@ -1,25 +1,59 @@
-"""Writing a file so that a crash never leaves half of it."""
+"""Files of Studio's own: written so that a crash never leaves half of them, read only when they are files.
+
+What only concerns its user (settings, unsaved work, versions) is for nobody else to read, whatever the umask.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
 import os
+import stat
 import tempfile
 import time
 from pathlib import Path
 
+from nep.replacing import replace_file
+
 LEFT_AFTER_S = 60.0
+LARGEST_BYTES = 10_000_000
+"""What is larger is not read into memory."""
+_PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
 
 
-def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
+def read_whole(path: Path, most_bytes: int = LARGEST_BYTES) -> bytes:
+    """A regular file of at most so many bytes. Raises OSError for all else, with the reason in ``strerror``.
+
+    What only looks like a file (a pipe, a device, a folder, a link to one) is never waited for.
+    """
+    # Without NONBLOCK the opening of a pipe waits for its writer, for ever.
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    try:
+        about = os.fstat(handle)
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(errno.EINVAL, "it is no file but a folder, a pipe or a device", str(path))
+        with os.fdopen(handle, "rb", closefd=False) as file:
+            data = file.read(most_bytes + 1) if about.st_size <= most_bytes else b""
+    finally:
+        os.close(handle)
+    if about.st_size > most_bytes or len(data) > most_bytes:
+        size, most = max(about.st_size, len(data)) / 1e6, most_bytes / 1e6
+        raise OSError(errno.EFBIG, f"it has {size:.1f} MB, and at most {most:.0f} MB are read", str(path))
+    return data
+
+
+def write_atomically(path: Path, data: bytes, *, durable: bool = True, private: bool = False) -> None:
     """Replace ``path`` by ``data``: readers see the old file or the new one, never a part.
 
     With ``durable`` the data are on the disk before the old file goes (a power cut leaves one of the two);
-    without, only the death of this process is survived. Raises OSError, and then the old file is untouched.
+    without, only the death of this process is survived. A ``private`` file is for its owner only, and so is a
+    folder that is made for it. Raises OSError, and then the old file is untouched.
     """
     if not data:
         raise ValueError("an empty file is never written over a full one")
+    if private:
+        private_folder(path.parent)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
     try:
@@ -28,8 +62,9 @@ def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
             file.flush()
             if durable:
                 os.fsync(file.fileno())
-        _keep_mode(path, Path(name))
-        Path(name).replace(path)
+        if not private:  # mkstemp makes files that only the owner may read
+            _keep_mode(path, Path(name))
+        replace_file(Path(name), path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
@@ -47,8 +82,37 @@ def _sweep(path: Path) -> None:
                 part.unlink()
 
 
+def private_folder(folder: Path) -> None:
+    """Make the folder if it is not there, and let only its owner into it. Raises OSError if it can't be made.
+
+    One that is another's stays as it is, and so does Windows, where a person's folders are private already.
+    """
+    folder.mkdir(mode=_PRIVATE_FOLDER, parents=True, exist_ok=True)
+    _close_to_others(folder)
+
+
+def make_private(folder: Path, files: str) -> None:
+    """Let only the owner into a folder and at those files in it (a pattern), as earlier versions did not."""
+    if os.name != "posix" or not folder.is_dir():
+        return
+    _close_to_others(folder)
+    with contextlib.suppress(OSError):
+        for file in folder.glob(files):
+            if file.is_file() and not file.is_symlink():
+                _close_to_others(file)
+
+
+def _close_to_others(path: Path) -> None:
+    if os.name != "posix":
+        return
+    with contextlib.suppress(OSError):  # another's, or a disk without modes: as private as it can be
+        mode = stat.S_IMODE(path.stat().st_mode)
+        if mode & _OTHERS:
+            path.chmod(mode & ~_OTHERS)
+
+
 def _keep_mode(old: Path, new: Path) -> None:
-    # mkstemp makes files that only the owner may read; a behaviour is shared as its predecessor was.
+    # A behaviour is shared as its predecessor was.
     try:
         mode = old.stat().st_mode & 0o777
     except FileNotFoundError:

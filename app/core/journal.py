@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.core import deep_json
-from app.core.files import write_atomically
+from app.core.files import make_private, read_whole, write_atomically
 from app.core.settings import home
 from nep.later import later
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     import psutil
 else:
     psutil = later("psutil")
+
+LARGEST_JOURNAL_BYTES = 64_000_000
+"""Unsaved work comes back also when it is larger than a file may be: it can be made smaller then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +82,7 @@ class Journal:
         blocks = text if text is not None else deep_json.dumps(workspace)
         whole = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {blocks}}}'
         data = whole.encode("utf-8", "surrogatepass")
-        write_atomically(self._file, data, durable=False)
+        write_atomically(self._file, data, durable=False, private=True)
 
     def discard(self) -> None:
         """The work is saved or given up: nothing is offered at the next start.
@@ -93,13 +96,14 @@ class Journal:
 def left_behind(folder: Path | None = None) -> list[Unsaved]:
     """Work whose Studio is gone, the newest first. Journals that can't be read are left where they are."""
     folder = folder if folder is not None else home() / "journal"
+    make_private(folder, "*.json")
     found = [_read(file) for file in folder.glob("*.json")] if folder.is_dir() else []
     return sorted((entry for entry in found if entry is not None), key=lambda entry: -entry.edited_s)
 
 
 def _read(file: Path) -> Unsaved | None:
     try:
-        entry = deep_json.loads(file.read_bytes().decode("utf-8", "surrogatepass"))
+        entry = deep_json.loads(read_whole(file, LARGEST_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
         if not isinstance(entry, dict):
             return None
         if _alive(int(entry["pid"]), float(entry["born_s"])):

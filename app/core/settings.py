@@ -13,8 +13,9 @@ from typing import TypeVar
 import platformdirs
 
 from app.core.file_lock import locked
-from app.core.files import write_atomically
+from app.core.files import make_private, read_whole, write_atomically
 from app.errors import SettingsError
+from nep.replacing import replace_file
 
 RECENT_LIMIT = 12
 T = TypeVar("T")
@@ -24,6 +25,12 @@ def home() -> Path:
     """Studio's own folder: ``$NEP_STUDIO_HOME``, else the system's place for configuration."""
     chosen = os.environ.get("NEP_STUDIO_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
+
+
+def data_home() -> Path:
+    """Where Studio keeps what is large: ``$NEP_STUDIO_HOME``, else the system's place for data."""
+    chosen = os.environ.get("NEP_STUDIO_HOME")
+    return Path(chosen) if chosen else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +54,7 @@ class Settings:
         """Why the file could not be written last, as a sentence; None when it could."""
         self._unwritten: dict[str, object] = {}
         self._clock = clock
+        make_private(self.path.parent, "settings*.json")
         self._values: dict[str, object] = self._read()
 
     def get(self, key: str, default: T) -> T:
@@ -59,7 +67,8 @@ class Settings:
     def set(self, key: str, value: object) -> None:
         """Keep ``value`` (anything JSON can say) and write the file. Raises SettingsError.
 
-        What another Studio on this computer has kept meanwhile stays, but for this key.
+        What another Studio on this computer has kept meanwhile stays, but for this key. What could not be
+        written stays here, and is written with the next value.
         """
         if key in self._values and self._values[key] == value and self.not_kept is None:
             return
@@ -102,7 +111,7 @@ class Settings:
 
     def _read(self) -> dict[str, object]:
         try:
-            text = self.path.read_text(encoding="utf-8")
+            text = read_whole(self.path).decode("utf-8")
         except (FileNotFoundError, NotADirectoryError):
             return {}
         except (OSError, UnicodeDecodeError):
@@ -116,7 +125,7 @@ class Settings:
     def _of_others(self) -> dict[str, object]:
         """What the file says now, with what is not written yet; what is known here if it can't be read."""
         try:
-            values = json.loads(self.path.read_text(encoding="utf-8"))
+            values = json.loads(read_whole(self.path))
         except (OSError, ValueError, RecursionError):
             return self._values
         return {**values, **self._unwritten} if isinstance(values, dict) else self._values
@@ -124,7 +133,7 @@ class Settings:
     def _set_aside(self) -> dict[str, object]:
         self.damaged = self.path.with_name("settings.damaged.json")
         try:
-            self.path.replace(self.damaged)
+            replace_file(self.path, self.damaged)
         except OSError:
             self.damaged = None
         return {}
@@ -132,7 +141,7 @@ class Settings:
     def _write(self) -> None:
         text = json.dumps(self._values, indent=1, ensure_ascii=False, sort_keys=True)
         try:
-            write_atomically(self.path, text.encode("utf-8"), durable=False)
+            write_atomically(self.path, text.encode("utf-8"), durable=False, private=True)
         except OSError as error:
             failed = SettingsError(self.path, error.strerror or str(error))
             self.not_kept = str(failed)

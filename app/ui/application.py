@@ -17,6 +17,7 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
 from app import resources
+from app.core.earlier import bring_here
 from app.core.journal import left_behind
 from app.core.session import Session
 from app.core.settings import home
@@ -123,6 +124,7 @@ def first_steps(window: MainWindow, commands: Commands, options: Options) -> lis
 
 def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order."""
+    bring_here()
     meeting_place = single_window.place(home())
     if not options.alone and single_window.hand_over(meeting_place, Asked(options.files, options.demo)):
         return 0

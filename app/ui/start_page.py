@@ -11,6 +11,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
+from app.core.files import read_whole
 from app.core.settings import RecentFile
 from app.ui.miniature import Row, rows
 from app.ui.start_art import EmptyPageArt, RobotArt
@@ -39,7 +40,7 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
     found = []
     for path in sorted(folder.glob("*.nepb")) if folder.is_dir() else []:
         try:
-            data = json.loads(path.read_text("utf-8"))
+            data = json.loads(read_whole(path))
             workspace = data["workspace"]
         except (OSError, ValueError, KeyError, TypeError):
             continue

@@ -13,6 +13,7 @@ from typing import get_args
 
 from nep.gateway.framing import Framing
 from nep.gateway.requests import Mode
+from nep.replacing import replace_file
 
 FIRST_PORT = 9000
 LAST_PORT = 9998
@@ -125,7 +126,7 @@ class PortMap:
         try:
             with os.fdopen(handle, "w", encoding="utf-8") as stream:
                 json.dump(document, stream)
-            Path(name).replace(self._file)
+            replace_file(Path(name), self._file)
         except OSError:
             Path(name).unlink(missing_ok=True)
             raise

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from app.core.behaviour_file import LARGEST_BYTES
 from app.core.beside import Beside
 from app.core.compiled import Compiled
 from app.core.document import Document, read
+from app.core.files import LARGEST_BYTES
 from app.core.journal import Journal, left_behind
 from app.errors import DocumentError
 from app.robots import rize
@@ -114,8 +114,16 @@ def test_a_huge_file_is_refused_unread(document: Document, tmp_path: Path) -> No
     path = tmp_path / "huge.nepb"
     with path.open("wb") as file:
         file.truncate(LARGEST_BYTES + 1)
-    with pytest.raises(DocumentError, match="at most 32 MB"):
+    with pytest.raises(DocumentError, match="at most 10 MB are read"):
         document.open(path)
+
+
+def test_one_that_would_be_too_large_to_read_again_is_not_written(document: Document, tmp_path: Path) -> None:
+    path = tmp_path / "large.nepb"
+    document.edited({"blocks": {"x": "y" * LARGEST_BYTES}})
+    with pytest.raises(DocumentError, match="at most 10 MB are read, use smaller pictures"):
+        document.save(path)
+    assert not path.exists()
 
 
 def test_a_stack_too_long_for_json_is_a_sentence_and_stays_open(document: Document, tmp_path: Path) -> None:

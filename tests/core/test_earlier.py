@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
 
 from app.core import earlier
-from app.core.earlier import free_path, keep_earlier, namesakes_of, stamp_of, versions_of
+from app.core.earlier import bring_here, free_path, keep_earlier, namesakes_of, stamp_of, versions_of
+from app.core.settings import data_home, home
 from app.errors import DocumentError
 
 
@@ -145,3 +147,42 @@ def test_versions_do_not_fill_the_disk(tmp_path: Path, folder: Path, monkeypatch
     for number in range(4):
         kept(path, folder, b"%010d" % number, number * 100, number * 1000)
     assert [each.copy.read_bytes()[-1:] for each in versions_of(path, folder)] == [b"3", b"2"]
+
+
+# ---- where they are --------------------------------------------------------------------------------
+
+
+def test_versions_move_once_to_the_folder_for_data(tmp_path: Path) -> None:
+    old, new = tmp_path / "config" / "earlier", tmp_path / "data" / "earlier"
+    document = tmp_path / "mine.nepb"
+    document.write_bytes(b"first")
+    os.utime(document, (1_000_000, 1_000_000))
+    kept = keep_earlier(document, old)
+    assert kept is not None
+    bring_here(old, new)
+    assert not old.exists()
+    (version,) = versions_of(document, new)
+    assert (version.copy.read_bytes(), version.written_s) == (b"first", 1_000_000)
+    bring_here(old, new)
+    assert len(versions_of(document, new)) == 1
+
+
+def test_versions_that_can_not_be_moved_stay(tmp_path: Path) -> None:
+    old, new = tmp_path / "config" / "earlier", tmp_path / "data"
+    document = tmp_path / "mine.nepb"
+    document.write_bytes(b"first")
+    assert keep_earlier(document, old) is not None
+    new.write_text("in the way")
+    bring_here(old, new / "earlier")
+    assert len(versions_of(document, old)) == 1
+
+
+def test_they_are_in_the_system_s_folder_for_data(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("NEP_STUDIO_HOME", raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    if sys.platform == "linux":
+        assert data_home() == tmp_path / "data" / "nep-studio"
+        assert home() == tmp_path / "config" / "nep-studio"
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    assert data_home() == home() == tmp_path

@@ -6,11 +6,18 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from app.core.files import write_atomically
+from app.core.behaviour_file import read_file
+from app.core.earlier import bring_here, keep_earlier
+from app.core.files import read_whole, write_atomically
+from app.core.journal import Journal, left_behind
+from app.core.settings import Settings
+from app.errors import DocumentError
+from nep.replacing import replace_file
 
 
 def test_it_writes_and_replaces(tmp_path: Path) -> None:
@@ -85,3 +92,138 @@ def test_what_killed_writers_left_is_swept_away_but_no_write_that_goes_on(tmp_pa
         os.utime(each, (1.0, 1.0))
     write_atomically(path, b"whole")
     assert (old.exists(), young.exists(), other.exists()) == (False, True, True)
+
+
+# ---- what is read ----------------------------------------------------------------------------------
+
+
+def test_a_regular_file_is_read_whole(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(b"x" * 1000)
+    (tmp_path / "link").symlink_to(path)
+    assert read_whole(path, 1000) == b"x" * 1000
+    assert read_whole(tmp_path / "link", 1000) == b"x" * 1000
+    with pytest.raises(OSError, match=r"at most 0 MB are read"):
+        read_whole(path, 999)
+    with pytest.raises(FileNotFoundError):
+        read_whole(tmp_path / "none")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs pipes and devices that look like files")
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "link to a pipe", "link to a device"])
+def test_what_is_no_file_is_a_sentence_for_every_reader(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "settings.json"
+    real = tmp_path / "real" if kind.startswith("link") else path
+    if "pipe" in kind:
+        os.mkfifo(real)
+    elif "folder" in kind:
+        real.mkdir()
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    if kind.startswith("link"):
+        path.symlink_to(real if "pipe" in kind else "/dev/zero")
+    with pytest.raises(OSError, match=r"no file but a folder, a pipe or a device"):
+        read_whole(path)
+    with pytest.raises(DocumentError, match="can't be read"):
+        read_file(path)
+    assert keep_earlier(path, tmp_path / "earlier") is None
+    assert left_behind(tmp_path) == []
+    assert Settings(tmp_path).get("a", 1) == 1
+    Settings(tmp_path).set("a", 2)
+    assert Settings(tmp_path).get("a", 1) == 2
+
+
+# ---- who may read it -------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def open_umask() -> Iterator[None]:
+    before = os.umask(0)
+    yield
+    os.umask(before)
+
+
+def modes(folder: Path) -> dict[str, int]:
+    found = {".": folder} | {file.name: file for file in folder.iterdir() if not file.name.endswith(".lock")}
+    return {name: file.stat().st_mode & 0o777 for name, file in found.items()}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
+@pytest.mark.usefixtures("open_umask")
+def test_what_concerns_only_its_user_is_private_whatever_the_umask(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    Settings(home).set("a", 1)
+    Journal(home / "journal").write("x", None, {}, {})
+    document = tmp_path / "mine.nepb"
+    document.write_bytes(b"{}")
+    kept = keep_earlier(document, home / "earlier")
+    assert kept is not None
+    assert modes(home) == {".": 0o700, "settings.json": 0o600, "journal": 0o700, "earlier": 0o700}
+    assert set(modes(home / "journal").values()) == {0o700, 0o600}
+    assert modes(home / "earlier") == {".": 0o700, kept.copy.name: 0o600}
+    kept.put_back()
+    assert document.stat().st_mode & 0o777 == 0o666  # a behaviour stays as shared as it was
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
+@pytest.mark.usefixtures("open_umask")
+def test_what_an_earlier_version_left_open_is_closed_at_the_start(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    for folder in (home, home / "journal", home / "earlier"):
+        folder.mkdir()
+        (folder / "settings.json").write_text("{}")
+    (home / "earlier" / "settings.json").rename(home / "earlier" / "settings.json.nepb")
+    (home / "somebody's.sh").write_text("")
+    Settings(home)
+    left_behind(home / "journal")
+    bring_here(home / "earlier", home / "earlier")
+    for folder in (home, home / "journal", home / "earlier"):
+        found = modes(folder)
+        assert found.pop(".") == 0o700
+        assert found.pop("somebody's.sh", 0o666) == 0o666
+        assert {mode for name, mode in found.items() if "." in name} == {0o600}
+
+
+# ---- a file that another program has open ----------------------------------------------------------
+
+
+def busy(code: int) -> PermissionError:
+    error = PermissionError(13, "in use")
+    error.winerror = code  # type: ignore[attr-defined,unused-ignore]
+    return error
+
+
+@pytest.mark.parametrize("code", [5, 32, 33])
+def test_a_file_that_is_open_elsewhere_is_tried_again(tmp_path: Path, code: int) -> None:
+    errors, waited = [busy(code), busy(code)], []
+
+    def replace(new: Path, old: Path) -> None:
+        if errors:
+            raise errors.pop()
+        new.replace(old)
+
+    (tmp_path / "new").write_text("new")
+    replace_file(tmp_path / "new", tmp_path / "old", replace=replace, pause=waited.append)
+    assert (tmp_path / "old").read_text() == "new"
+    assert len(waited) == 2
+
+
+def test_one_that_stays_open_is_a_sentence(tmp_path: Path) -> None:
+    waited: list[float] = []
+
+    def replace(new: Path, old: Path) -> None:
+        raise busy(32)
+
+    with pytest.raises(PermissionError, match="another program has the file open; close it there"):
+        replace_file(tmp_path / "new", tmp_path / "old", replace=replace, pause=waited.append)
+    assert 0 < sum(waited) <= 1
+
+
+def test_a_refusal_of_another_kind_is_not_tried_again(tmp_path: Path) -> None:
+    def replace(new: Path, old: Path) -> None:
+        raise PermissionError(13, "read only")
+
+    waited: list[float] = []
+    with pytest.raises(PermissionError, match="read only"):
+        replace_file(tmp_path / "new", tmp_path / "old", replace=replace, pause=waited.append)
+    assert waited == []
