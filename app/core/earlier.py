@@ -59,7 +59,7 @@ def keep_earlier(
     """Keep what the file says now; None when there is no file, or nothing in it.
 
     The copies are in ``folder`` (default: ``earlier`` in Studio's folder for data), the newest 300 of them,
-    at most 30 of one file. What is kept already is not kept twice. Raises DocumentError when it can't be kept.
+    at most 30 of one file. What is kept already is not kept twice. DocumentError when it can't be kept.
     """
     where = _folder(folder)
     if not path.is_file() or not path.stat().st_size:
