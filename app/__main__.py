@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from nep.addresses import MASTER_VARIABLE, master_address
+from nep.descriptors import allow_many
 from nep.errors import NepError
 from nep.streams import close_streams, prepare_streams, words_given
 from nep.version import __version__
@@ -89,6 +90,7 @@ def _main(given: Sequence[str]) -> int:
     gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.garbage`)
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
+    allow_many()
     from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
     return run(

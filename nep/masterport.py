@@ -9,6 +9,7 @@ from collections.abc import Callable
 import zmq
 
 from nep.addresses import endpoint_of
+from nep.descriptors import check_room
 from nep.errors import AddressInUseError
 
 __all__ = ["MasterPort"]
@@ -16,6 +17,7 @@ __all__ = ["MasterPort"]
 REQUEST_MAX_BYTES = 8 * 2**20
 """Whoever sends more in one part is disconnected."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
+_FILES = 16
 _RETURN_S = 0.5
 """A node whose connection ends has so long to be back."""
 _SRCFD = int(zmq.SRCFD)
@@ -24,9 +26,10 @@ _EVENT = struct.Struct("=HI")
 
 
 class MasterPort:
-    """Raises `AddressInUseError` when `address` cannot be bound."""
+    """Raises `AddressInUseError` when `address` cannot be bound, `TooManyFilesError`."""
 
     def __init__(self, address: str) -> None:
+        check_room(_FILES, "a master")
         self._monitor: zmq.Socket[bytes] | None = None
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.socket = self._context.socket(zmq.ROUTER)

@@ -13,6 +13,7 @@ import zmq
 
 from nep.addresses import endpoint_of, master_address
 from nep.bodies import decode_answer, encode_request
+from nep.descriptors import check_room
 from nep.errors import MasterUnreachable, RequestRefusedError, WireError
 from nep.later import later
 from nep.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     import psutil
 else:
     psutil = later("psutil")
+
+_FILES = 16
 
 __all__ = ["Owner", "is_running", "listen", "look", "start_process"]
 
@@ -73,6 +76,7 @@ def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 
 
 def _ask(request: Request, address: str, timeout_s: float) -> Reply | None:
     """A master's reply to one request; None when there is none that answers in time."""
+    check_room(_FILES, "a question to the master")
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.DEALER)
     try:

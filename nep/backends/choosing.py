@@ -5,18 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nep.backends.base import Backend
-from nep.errors import UnknownBackendError
+from nep.descriptors import check_room
+from nep.errors import PluginsMissingError, UnknownBackendError
 from nep.plugins import discover, discover_own
 
 __all__ = ["backend_named"]
 
 
 def backend_named(name: str) -> Backend:
-    """The back end of this name, or of which it is an alias. Raises `UnknownBackendError`.
+    """The back end of this name, or of which it is an alias.
 
     Entry points are looked for only when it is none of ours: a node is made in less than a millisecond.
+    Raises `UnknownBackendError`, `TooManyFilesError`.
     """
-    own = discover_own("nep.backends", "BACKEND", Backend)
+    try:
+        own = discover_own("nep.backends", "BACKEND", Backend)
+    except PluginsMissingError:
+        check_room(1, "a node")  # without a file to open a folder seems to be empty
+        raise
     backend = _named(name.lower(), own.values())
     if backend is None:
         known = discover("nep.backends", "BACKEND", Backend)

@@ -15,6 +15,7 @@ from nep.addresses import host_of, is_loopback, master_address
 from nep.cli.alert_printer import AlertLog, AlertPrinter
 from nep.cli.options import MasterOption
 from nep.cli.screen import console, say
+from nep.descriptors import allow_many
 from nep.errors import AddressInUseError, NepError
 from nep.later import later
 from nep.masters import Attachment, Master, is_running
@@ -95,6 +96,7 @@ def master(
 
 def _started(address: str, owner_pid: int | None, terminal: Terminal, *, joins_originals: bool) -> Master:
     """Raises `NepError` with the reason why it can't be started."""
+    allow_many()
     attachments: list[Attachment] = [AlertPrinter(terminal), AlertLog()]
     if joins_originals:
         attachments.insert(0, attachment.GatewayAttachment())

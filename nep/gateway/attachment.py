@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nep.descriptors import allow_many
 from nep.errors import ClosedError, WaitTimeoutError
 from nep.gateway.desk import Ports
 from nep.gateway.gateway import Gateway
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 else:
     psutil = later("psutil")
 
-_WANTED_FILES = 8192
 _WAIT_S = 3.0
 """A master that has just started keeps newcomers waiting for a second."""
 
@@ -42,7 +41,7 @@ class GatewayAttachment:
 
     def start(self, master: Master) -> None:
         """Start the gateway. A port that is taken is an alert, not an error."""
-        allow_many_files()
+        allow_many()
         address = master.address
 
         def make_node() -> Node:
@@ -70,18 +69,3 @@ class GatewayAttachment:
         if self._gateway is not None:
             self._gateway.close()
             self._gateway = None
-
-
-def allow_many_files() -> None:
-    """Let this process open as many files as the system allows: each topic needs about twenty handles.
-
-    macOS starts programs with 256, which would be a dozen topics.
-    """
-    if sys.platform == "win32":
-        return
-    import resource  # noqa: PLC0415 - not on Windows
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = _WANTED_FILES if hard == resource.RLIM_INFINITY else min(_WANTED_FILES, hard)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

@@ -15,11 +15,17 @@ from nep.addresses import is_loopback
 from nep.backends.native.calls import Asking, Calls
 from nep.backends.native.inlet import NativeInlet
 from nep.backends.native.io import IoThread, Rest
-from nep.backends.native.local import in_reach
+from nep.backends.native.local import in_reach, may_stay
 from nep.backends.native.outlet import NativeOutlet
 from nep.backends.native.pace import Pace
 from nep.backends.native.sockets import LOOPBACK, Socket, host_towards
-from nep.errors import AddressInUseError, ClosedError, MasterUnreachable, RequestRefusedError
+from nep.errors import (
+    AddressInUseError,
+    ClosedError,
+    MasterUnreachable,
+    RequestRefusedError,
+    TooManyFilesError,
+)
 from nep.load import CpuLoad
 from nep.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
 from nep.requests import (
@@ -210,17 +216,20 @@ class MasterLink:
         return Rest(due=min(self._pace.due_at, self._follow_at))
 
     def _follow_addresses(self) -> None:
-        """Move publishers when this computer or the master has another address."""
+        """Move publishers when this computer or the master has another address, or files are short."""
         if not self._is_near:
             self._own_host = host_towards(self.address) or self._own_host
-        if self.hosts == self._moved_to:
+        is_cramped = not may_stay()
+        if self.hosts == self._moved_to and not is_cramped:
             return
         self._moved_to = self.hosts
         with self._lock:
             for id, (record, outlet) in self._publishers.items():
+                if is_cramped:
+                    outlet.leave_local()
                 try:
                     moved = replace(record, endpoints=outlet.move(self.hosts), local=outlet.is_local)
-                except AddressInUseError:
+                except (AddressInUseError, TooManyFilesError):
                     self._moved_to = ()  # tried again with the next renewal
                     continue
                 if moved != record and moved.endpoints:

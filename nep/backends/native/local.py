@@ -19,10 +19,11 @@ import zmq
 
 from nep.addresses import is_loopback
 from nep.backends.native.sockets import LOOPBACK, Socket
+from nep.descriptors import has_room
 from nep.network import nearest
 from nep.records import RemotePublisher
 
-__all__ = ["SMALL", "bind_beside", "in_reach", "is_there", "local_of"]
+__all__ = ["SMALL", "bind_beside", "in_reach", "is_there", "local_of", "may_stay"]
 
 _logger = logging.getLogger("nep")
 
@@ -30,6 +31,9 @@ SMALL = frozenset({"json", "string", "msgpack"})
 """Codecs of what is small as a rule: commands, answers, states."""
 _TCP = f"tcp://{LOOPBACK}:"
 _LOCAL = "ipc://@nep-"
+_ROOM_TO_BIND = 384
+_ROOM_TO_STAY = 192
+"""So many connections at once come to nobody within the second in which room is looked for again."""
 _reached: set[bool] = set()
 """Holds True once a program was reached in this way: then none is tried out any more."""
 
@@ -39,6 +43,14 @@ def is_there() -> bool:
     return sys.platform == "linux" and zmq.has("ipc")
 
 
+def may_stay() -> bool:
+    """Whether this process has room for those who come by such a name.
+
+    libzmq 4.3 ends the program when it has no descriptor for them; who comes by TCP just waits.
+    """
+    return has_room(_ROOM_TO_STAY)
+
+
 def local_of(endpoint: str) -> str:
     """The name beside a loopback endpoint; "" for any other."""
     return f"{_LOCAL}{endpoint.removeprefix(_TCP)}" if endpoint.startswith(_TCP) else ""
@@ -46,7 +58,11 @@ def local_of(endpoint: str) -> str:
 
 def bind_beside(owner: Socket, endpoint: str) -> str:
     """Bind to the name beside a loopback endpoint; "" when it cannot be: then there is TCP."""
-    name = local_of(endpoint) if is_there() and os.environ.get("NEP_LOCAL", "") != "0" else ""
+    name = (
+        local_of(endpoint)
+        if is_there() and has_room(_ROOM_TO_BIND) and os.environ.get("NEP_LOCAL", "") != "0"
+        else ""
+    )
     if name:
         try:
             owner.bind(name)
@@ -59,12 +75,12 @@ def bind_beside(owner: Socket, endpoint: str) -> str:
 def _is_reached(name: str) -> bool:
     """Whether a program can be reached by this name: a sandbox may forbid it. Asked in earnest only once."""
     if not _reached:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-            try:
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
                 probe.connect("\0" + name.removeprefix("ipc://@"))
-            except OSError as error:
-                _logger.debug("'%s' could not be reached: %s", name, error)
-                return False
+        except OSError as error:
+            _logger.debug("'%s' could not be reached: %s", name, error)
+            return False
         _reached.add(True)
     return True
 

@@ -143,6 +143,13 @@ class NativeOutlet:
             self._read_subscriptions()  # binding may have swallowed the descriptor's signal
             return endpoints
 
+    def leave_local(self) -> None:
+        """Be reached by TCP only from now on."""
+        with self._lock:
+            if not self._socket.closed and self._places.is_local:
+                self._places.leave_local()
+                self._read_subscriptions()
+
     @property
     def refusals(self) -> Refusals:
         """What was sent to it and is no subscription."""

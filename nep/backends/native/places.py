@@ -12,7 +12,7 @@ import zmq
 
 from nep.backends.native.local import bind_beside
 from nep.backends.native.sockets import Socket, bind_free_port
-from nep.errors import AddressInUseError
+from nep.errors import AddressInUseError, TooManyFilesError
 
 __all__ = ["Places"]
 
@@ -42,11 +42,12 @@ class Places:
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Bind at these hosts and no others, each with a port of its own; the endpoints, in their order.
 
-        A host at which nothing can be bound is left out; raises `AddressInUseError` when none is left.
+        A host at which nothing can be bound is left out; raises `AddressInUseError` or
+        `TooManyFilesError` when none is left.
         """
         for host in [known for known in self._bound if known not in hosts]:
             self._leave(host)
-        problem: AddressInUseError | None = None
+        problem: AddressInUseError | TooManyFilesError | None = None
         for host in hosts:
             if host not in self._bound:
                 try:
@@ -54,15 +55,24 @@ class Places:
                     name = bind_beside(self._socket, self._bound[host]) if self._may_be_local else ""
                     if name:
                         self._local[host] = name
-                except AddressInUseError as error:
+                except (AddressInUseError, TooManyFilesError) as error:
                     problem = error
         if problem is not None and not self._bound:
             raise problem
         return tuple(self._bound[host] for host in hosts if host in self._bound)
 
+    def leave_local(self) -> None:
+        """Be reached by TCP only from now on. Connections that are there stay."""
+        for name in self._local.values():
+            self._unbind(name)
+        self._local.clear()
+
     def _leave(self, host: str) -> None:
         for endpoint in filter(None, (self._bound.pop(host), self._local.pop(host, ""))):
-            try:
-                self._socket.unbind(endpoint)
-            except zmq.ZMQError as error:  # the address is gone: there was nothing to give back
-                _logger.debug("'%s' could not be unbound: %s", endpoint, error)
+            self._unbind(endpoint)
+
+    def _unbind(self, endpoint: str) -> None:
+        try:
+            self._socket.unbind(endpoint)
+        except zmq.ZMQError as error:  # the address is gone: there was nothing to give back
+            _logger.debug("'%s' could not be unbound: %s", endpoint, error)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import zmq
 
 from nep.addresses import endpoint_of, host_of, is_endpoint, is_loopback
+from nep.descriptors import check_room
 from nep.errors import AddressInUseError, NepError
 
 __all__ = [
@@ -41,6 +42,7 @@ _HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE,
 """What binding an own address may fail with."""
 _MOST = 50_000
 _LEAST = 32
+_PORT_FILES = 2
 _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 """Ports that programs of the original NEP expect to find something else on."""
 
@@ -74,7 +76,8 @@ def bind_free_port(owner: Socket, host: str) -> str:
 
 
 def bind(owner: Socket, address: str) -> str:
-    """Bind to an address; the endpoint. Raises `AddressInUseError`."""
+    """Bind to an address; the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+    check_room(_PORT_FILES, f"a port of '{host_of(address)}'")
     try:
         owner.bind(endpoint_of(address))
     except zmq.ZMQError as error:
@@ -95,12 +98,12 @@ def host_towards(address: str) -> str | None:
     """The address of this computer under which a master at `address` sees it; None without a way to it."""
     if is_loopback(address):
         return LOOPBACK
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.connect((host_of(address), 9))  # sends nothing: it only chooses the way
-        except OSError:
-            return None
-        return str(probe.getsockname()[0])
+            return str(probe.getsockname()[0])
+    except OSError:
+        return None
 
 
 def keep_alive(owner: Socket, endpoint: str) -> None:

@@ -1,0 +1,184 @@
+"""A program that may open no more files gets a sentence; libzmq does not end it; nothing is half made."""
+
+from __future__ import annotations
+
+import sys
+
+import psutil
+import pytest
+
+import nep
+from nep.masters import Master
+from tests.nep.programs import Program, eventually, running
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
+
+FEW = """
+import os, resource, sys
+import nep
+
+def refused(do):
+    try:
+        do()
+    except nep.TooManyFilesError as error:
+        return str(error)
+    raise AssertionError("there was room")
+"""
+
+
+def test_at_the_limit_new_publishers_are_refused_and_those_there_work(master: Master) -> None:
+    code = (
+        FEW
+        + """
+resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
+node = nep.node("many")
+pubs = []
+def more():
+    while True:
+        pubs.append(node.new_pub(f"t{len(pubs)}"))
+print(refused(more))
+print(len(pubs))
+refused(lambda: node.new_sub("t0"))
+refused(lambda: node.new_callback("t0", "json", print))
+refused(lambda: nep.node("another").new_pub("x"))
+refused(lambda: nep.master("127.0.0.1:0").start())
+refused(lambda: nep.is_running())
+print(sorted(node.graph().topics) == sorted(f"t{n}" for n in range(len(pubs))))
+for pub in pubs[10:20]:
+    pub.close()
+sub = node.new_sub("t0")
+pubs[0].publish("there")
+print(sub.listen(timeout_s=5.0))
+"""
+    )
+    with running(code) as program:
+        sentence, count = program.line(), int(program.line())
+        assert sentence.startswith(f"no room for a publisher of 't{count}': this program has 2")
+        assert sentence.endswith(
+            " of 256 files open; close what it no longer needs, or start it after 'ulimit -n 8192'"
+        )
+        assert count > 60
+        assert program.line() == "True"
+        assert program.line() == "(True, 'there')"
+        assert program.end()[1] == ""
+        assert program.process.returncode == 0
+
+
+def test_with_no_file_left_at_all_nothing_ends(master: Master) -> None:
+    """The program itself has opened all that it may; what is there goes on, the rest is refused."""
+    code = (
+        FEW
+        + """
+import gc, threading
+resource.setrlimit(resource.RLIMIT_NOFILE, (128, 128))
+node = nep.node("full")
+pub, sub = node.new_pub("own"), node.new_sub("own")
+taken = []
+try:
+    while True:
+        taken.append(os.dup(0))
+except OSError:
+    pass
+for do in (lambda: node.new_pub("x"), lambda: node.new_sub("x"), lambda: nep.node("y"),
+           lambda: nep.master("127.0.0.1:0").start(), lambda: sub.listen(timeout_s=0.01)):
+    refused(do)
+pub.publish(1)
+while not (got := sub.listen())[0]:
+    pass
+print(got)
+print("ready")
+for line in sys.stdin:
+    pub.publish(line.strip())
+    break
+for number in taken:
+    os.close(number)
+print(sub.listen(timeout_s=5.0)[0])
+print(node.new_sub("own").listen(), [each for each in node.graph().topics])
+"""
+    )
+    with nep.node("peer") as node, running(code) as program:
+        assert program.line() == "(True, 1)"
+        assert program.line() == "ready"
+        with node.new_sub("own", keep="latest") as late:  # it cannot be accepted now: half a second is waited
+            program.say("go on")
+            assert program.line() == "True"
+            assert program.line() == "(False, {}) ['own']"
+            assert program.process.wait(20) == 0
+            assert not late.is_closed
+
+
+def test_a_hundred_subscribers_of_a_program_with_few_files(master: Master) -> None:
+    """libzmq accepts what it can; the publisher is not ended, and goes on with those who reach it."""
+    code = (
+        FEW
+        + """
+resource.setrlimit(resource.RLIMIT_NOFILE, (100, 100))
+node = nep.node("few")
+pub = node.new_pub("wanted")
+print("ready")
+for line in sys.stdin:
+    pub.publish(line.strip())
+    print(pub.subscribers)
+"""
+    )
+    with running(code) as program, nep.node("peer", wait_s=5.0) as node:
+        assert program.line() == "ready"
+        first = node.new_sub("wanted")
+        inlets = [node.new_sub("wanted", keep="latest") for _ in range(20)]
+        program.say("one")
+        assert int(program.line()) == 21
+        assert first.listen(timeout_s=5.0) == (True, "one")
+        more = SUBSCRIBERS.replace("COUNT", "100")
+        with running(more) as crowd:
+            assert crowd.line() == "connecting"
+            eventually(lambda: _asked(program) > 40)
+        for each in inlets:
+            each.close()
+        eventually(lambda: _asked(program) == 1)
+        assert first.listen(timeout_s=5.0)[0]
+
+
+def _asked(program: object) -> int:
+    program.say("again")  # type: ignore[attr-defined]
+    return int(program.line())  # type: ignore[attr-defined]
+
+
+SUBSCRIBERS = """
+import nep, threading
+nodes = [nep.node(f"n{n}") for n in range(COUNT)]
+threads = [threading.Thread(target=each.new_sub, args=("wanted",)) for each in nodes]
+for thread in threads:
+    thread.start()
+print("connecting")
+import sys
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has local names")
+def test_a_publisher_gives_up_its_local_name_when_files_are_short(master: Master) -> None:
+    """libzmq ends the program when it cannot accept there; by TCP it only makes others wait."""
+    code = (
+        FEW
+        + """
+node = nep.node("p")
+pub = node.new_pub("wanted", latched=True)
+pub.publish("here")
+print("ready")
+sys.stdin.readline()
+resource.setrlimit(resource.RLIMIT_NOFILE, (128, 128))
+sys.stdin.readline()
+"""
+    )
+    with running(code) as program, nep.node("peer") as node:
+        program.line()
+        node.new_sub("wanted").close()
+        assert len(local_names(program)) == 1
+        program.say("few")
+        eventually(lambda: not local_names(program))
+        eventually(lambda: node.new_sub("wanted").listen(timeout_s=1.0) == (True, "here"))
+
+
+def local_names(program: Program) -> list[str]:
+    connections = psutil.Process(program.process.pid).net_connections(kind="unix")
+    return [each.laddr for each in connections if str(each.laddr).startswith("@nep-")]
