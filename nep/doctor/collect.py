@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING
 import zmq
 
 import nep.errors
+from nep import descriptors
 from nep.addresses import host_of, master_address
 from nep.doctor import installs, processes
-from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact
+from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact, ProgramFact
 from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
@@ -85,6 +86,7 @@ def gather(
         tuple(_clocks(view)),
         loopback_problem(),
         installs.install_of(master_pid) if master_pid is not None else None,
+        tuple(_programs(view)),
     )
 
 
@@ -176,6 +178,22 @@ def _files(master_pid: int | None) -> FileFact:
         for each in resource.getrlimit(resource.RLIMIT_NOFILE)
     )
     return FileFact(soft, hard, opened, limit)
+
+
+def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
+    """The native programs of this computer, each with the name of one of its nodes."""
+    here = {
+        node.pid: node.name
+        for node in (view.nodes.values() if view is not None else ())
+        if node.generation == "native" and node.host == platform.node() and node.pid != os.getpid()
+    }
+    for pid, name in here.items():
+        if pid is None:
+            continue
+        opened, limit = processes.open_files(pid)
+        limit = limit or descriptors.limit()  # macOS tells a program's own only
+        if opened is not None and limit is not None:
+            yield ProgramFact(pid, name, opened, limit)
 
 
 def _folder(purpose: str, path: Path) -> FolderFact:

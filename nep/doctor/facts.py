@@ -8,7 +8,16 @@ from dataclasses import dataclass, field
 from nep.doctor.installs import Install
 from nep.views import GraphView
 
-__all__ = ["ClockFact", "Facts", "FileFact", "FolderFact", "PackageFact", "PortFact", "ProcessFact"]
+__all__ = [
+    "ClockFact",
+    "Facts",
+    "FileFact",
+    "FolderFact",
+    "PackageFact",
+    "PortFact",
+    "ProcessFact",
+    "ProgramFact",
+]
 
 
 @dataclass(frozen=True)
@@ -54,6 +63,16 @@ class FileFact:
 
 
 @dataclass(frozen=True)
+class ProgramFact:
+    """A program of this computer with a node `name`: how many files it has open, and how many it may have."""
+
+    pid: int
+    name: str
+    opened: int
+    limit: int
+
+
+@dataclass(frozen=True)
 class FolderFact:
     """A folder that must take files: what for, and why it does not ("" when it does)."""
 
@@ -79,7 +98,8 @@ class Facts:
     package `nep` is imported from; `strange_files` in it are the original NEP's. `shadow` is a file that
     hides it from programs that are started here. `loopback` says why programs of this computer cannot reach
     each other, "" when they can. `master_install` is where the master that answers was started from, None
-    when that is not known.
+    when that is not known. `programs` are those of this computer that have nodes, as far as the system tells
+    of their files.
     """
 
     now_s: float
@@ -101,3 +121,4 @@ class Facts:
     clocks: tuple[ClockFact, ...] = ()
     loopback: str = ""
     master_install: Install | None = None
+    programs: tuple[ProgramFact, ...] = ()

@@ -13,8 +13,6 @@ from nep.doctor.verdict import Finding, Severity
 __all__ = ["findings", "report", "to_plain", "worst"]
 
 FEWEST_FILES = 1024
-MOST_SOCKETS = 1023
-"""libzmq's own limit of sockets in one context."""
 NEARLY = 0.8
 _FILES_A_TOPIC = 20
 """A topic of the original NEP takes about so many handles of the master; a native one fewer."""
@@ -27,7 +25,7 @@ EARLIEST_S = 1_704_067_200.0
 def findings(facts: Facts) -> tuple[Finding, ...]:
     """Everything that the facts say, the worst first."""
     parts: Sequence[Callable[[Facts], Iterator[Finding]]] = (
-        loopback, masters, ports, _packages, originals, told_by_master, _files, _sockets, _folders, clocks,
+        loopback, masters, ports, _packages, originals, told_by_master, _files, _programs, _folders, clocks,
         _clock, _versions,
     )  # fmt: skip
     found = [finding for part in parts for finding in part(facts)]
@@ -108,24 +106,16 @@ def _files(facts: Facts) -> Iterator[Finding]:
         )
 
 
-def _sockets(facts: Facts) -> Iterator[Finding]:
-    if facts.view is None:
-        return
-    counts: dict[str, int] = {}
-    for topic in facts.view.topics.values():
-        for node_id in (
-            *(each.node_id for each in topic.publishers),
-            *(s.node_id for s in topic.subscribers),
-        ):
-            counts[node_id] = counts.get(node_id, 0) + 1
-    for node_id, count in counts.items():
-        node = facts.view.nodes.get(node_id)
-        if node is not None and node.generation == "native" and count > NEARLY * MOST_SOCKETS:
+def _programs(facts: Facts) -> Iterator[Finding]:
+    for program in facts.programs:
+        if program.opened > NEARLY * program.limit:
             yield Finding(
-                f"sockets:{node_id}",
+                f"files:{program.pid}",
                 "warning",
-                f"“{node.name}” has {count} publishers and subscribers; a node can have {MOST_SOCKETS}.",
-                "Share topics, or use several nodes.",
+                f"The program of “{program.name}” has {program.opened} of at most {program.limit} files open;"
+                " soon it can make no publisher or subscriber, and nobody can connect to it.",
+                "Let it close what it no longer needs, or start it from a terminal that allows more.",
+                command="ulimit -n 8192",
             )
 
 

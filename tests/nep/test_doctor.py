@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from nep.doctor import Facts, findings, report, to_plain, worst
-from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact
+from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact, ProgramFact
 from nep.doctor.installs import Install
-from nep.graph import Alert, GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.graph import Alert, GraphView, NodeInfo
 
 NOW = 1_800_000_000.0
 MASTER = ProcessFact(41, "nep", is_master=True, since_s=NOW - 7200)
@@ -176,19 +176,11 @@ def test_few_files_say_for_how_many_topics_that_is():
     assert "files" not in found(files=FileFact(None, None))
 
 
-def test_a_node_with_nearly_all_sockets_is_told():
-    many = {
-        f"t{number}": TopicInfo(
-            f"t{number}",
-            "json",
-            "json",
-            (PublisherInfo(number, "Pepper", (), False, 0, 0, 0, None, None, None),),
-        )
-        for number in range(900)
-    }
-    assert "900 publishers" in found(view=view(node("Pepper"), topics=many))["sockets:Pepper"].sentence
-    # the sockets of originals are their own, not in one context of ours
-    assert "sockets:Pepper" not in found(view=view(node("Pepper", "0.5.4.8"), topics=many))
+def test_a_program_with_nearly_all_its_files_open_is_told():
+    made = found(programs=(ProgramFact(7, "Pepper", 250, 256), ProgramFact(8, "Rover", 90, 256)))
+    assert "“Pepper” has 250 of at most 256 files open" in made["files:7"].sentence
+    assert (made["files:7"].severity, made["files:7"].command) == ("warning", "ulimit -n 8192")
+    assert "files:8" not in made
 
 
 def test_originals_are_named_and_those_that_cannot_be_served_are_errors():

@@ -16,6 +16,7 @@ import nep
 from nep.cli.doctor import doctor
 from nep.doctor import gather, hindrance, installs, processes
 from nep.doctor.collect import loopback_problem
+from tests.nep.programs import running
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -204,3 +205,21 @@ def test_connections_that_a_killed_program_left_do_not_hold_its_port():
         accepted.close()  # from here on its end of the connection waits for the other to close
         server.close()
         assert processes.is_free(address[1])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
+def test_programs_with_nodes_are_looked_at_for_their_files(master):
+    code = """
+    import resource, sys, nep
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
+    node = nep.node("Pepper")
+    pub = node.new_pub("topic")
+    print("ready")
+    sys.stdin.readline()
+    """
+    with running(code, NEP_MASTER=master.address) as program:
+        program.line()
+        (found,) = gather(master.address).programs
+        assert (found.pid, found.name) == (program.process.pid, "Pepper")
+        assert 5 < found.opened < 100
+        assert found.limit == 256 or sys.platform == "darwin"

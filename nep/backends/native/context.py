@@ -13,7 +13,7 @@ import zmq
 from nep import forks
 from nep.backends.native.io import IoThread
 from nep.backends.native.sockets import Socket
-from nep.descriptors import check_room, is_lack, limit, opened
+from nep.descriptors import SPARE, check_room, has_room, is_lack, limit, opened
 from nep.errors import ClosedError, TooManyFilesError
 from nep.waker import Waker
 
@@ -25,6 +25,7 @@ _CONTEXT_FILES = 12
 _SOCKET_FILES = 4
 """A socket, its port, its local name, and a connection."""
 _IDLE_WAKERS = 8
+_LOOKS, _LOOK_S = 10, 0.01
 
 
 class SharedContext:
@@ -37,6 +38,7 @@ class SharedContext:
         self.io = IoThread("nep-io")
         self._lock = threading.Lock()
         self._idle_wakers: list[Waker] = []
+        self._pause = threading.Event()
         self._is_over = False
         self.users = 0
         """How many joined and have not left; under the lock of this module."""
@@ -48,7 +50,7 @@ class SharedContext:
 
     def socket(self, kind: int, what: str) -> Socket:
         """A socket that drops what it has when it is closed. Raises `TooManyFilesError`, for `what`."""
-        check_room(_SOCKET_FILES, what)
+        self._wait_for_room(what)
         try:
             made = self._context.socket(kind)
         except zmq.ZMQError as error:
@@ -59,6 +61,14 @@ class SharedContext:
             raise
         made.setsockopt(zmq.LINGER, 0)
         return made
+
+    def _wait_for_room(self, what: str) -> None:
+        """For a moment: libzmq closes sockets in its own time, and some may just have been closed."""
+        for _ in range(_LOOKS):
+            if has_room(_SOCKET_FILES + SPARE):
+                return
+            self._pause.wait(_LOOK_S)
+        check_room(_SOCKET_FILES, what)
 
     def take_waker(self) -> Waker:
         """A waker for a thread that begins to wait. Raises `TooManyFilesError`."""
