@@ -75,6 +75,9 @@ def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None
     room = shutil.get_terminal_size().columns if is_terminal else _ENDLESS
     lines = [[escaped(cell, lines=True) for cell in row] for row in rows]
     widths = _widths(columns, lines, room)
+    if _total(widths) > room:
+        write("".join(_blocks(columns, lines)))
+        return
     if len(lines) > _LONG and _fit(lines, widths):
         sys.stdout.write("".join(f"{line}\n" for line in _laid_out(columns, lines, widths)))
         return
@@ -93,6 +96,20 @@ def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None
     for row in lines:
         table.add_row(*(Text(cell, style="dim" if cell == UNKNOWN else "") for cell in row))
     out.print(table, soft_wrap=False)
+
+
+def _total(widths: Sequence[int]) -> int:
+    """How wide a table of these columns is."""
+    return sum(widths) + _GAP * (len(widths) - 1)
+
+
+def _blocks(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """The rows one below the other, for a terminal too narrow for a table; what is not known is left out."""
+    for row in rows:
+        yield f"{row[0]}\n"
+        for column, cell in zip(columns[1:], row[1:], strict=True):
+            if cell != UNKNOWN:
+                yield f"  {column.head}: {', '.join(cell.splitlines())}\n"
 
 
 def _fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
@@ -116,7 +133,7 @@ def _laid_out(
         ).rstrip()
 
     yield line(column.head for column in columns)
-    yield "─" * (sum(widths) + _GAP * (len(widths) - 1))
+    yield "─" * _total(widths)
     yield from map(line, rows)
 
 
@@ -127,7 +144,7 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], room: int)
         for at, column in enumerate(columns)
     ]
     kept = [column.is_whole or column.justify == "right" for column in columns]
-    while sum(widths) + _GAP * (len(widths) - 1) > room:
+    while _total(widths) > room:
         giving = [at for at, width in enumerate(widths) if width > _NARROWEST and not kept[at]]
         giving = giving or [at for at, width in enumerate(widths) if width > _NARROWEST]
         if not giving:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import io
 import json
 
 import pytest
@@ -109,3 +110,21 @@ def test_json_is_one_line_also_with_bytes_number_keys_and_nan(capfdbinary):
     line = capfdbinary.readouterr().out
     assert line.count(b"\n") == 1
     assert json.loads(line) == {"1": "00ff", "a": None, "text": "Grüße\n日本"}
+
+
+def test_a_terminal_too_narrow_for_a_table_gets_the_rows_one_below_the_other(monkeypatch):
+    class Terminal(io.StringIO):
+        encoding = "utf-8"
+
+        def isatty(self):
+            return True
+
+    monkeypatch.setenv("COLUMNS", "20")
+    monkeypatch.setattr("sys.stdout", screen := Terminal())
+    columns = [Column("topic", is_whole=True), Column("type"), Column("publishers"), Column("rate", "right")]
+    show_table(
+        columns, [("/Pepper/battery", "json", "one\ntwo", UNKNOWN), ("/b", "string", UNKNOWN, "1.0 /s")]
+    )
+    assert screen.getvalue() == (
+        "/Pepper/battery\n  type: json\n  publishers: one, two\n/b\n  type: string\n  rate: 1.0 /s\n"
+    )
