@@ -9,20 +9,27 @@ from __future__ import annotations
 import re
 import sys
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TextIO
 
 import nep
 from app.blocks import Program, compile_behaviour
-from app.blocks.fleet_search import find_robots
+from app.blocks.fleet_search import Found, find_robots
+from app.blocks.publishing import guarded
 from app.blocks.workspace import Workspace, parse_workspace
+from app.core.companions import VIRTUAL_ROBOTS
 from app.core.document import read
 from app.core.moving import risky, wanted_by
+from app.core.processes import Processes
 from app.core.runner import Runner, RunnerEvent
-from app.core.stopping import RobotStopper, StopReport
+from app.core.stopping import RobotStopper, StopReport, StopTarget
 from app.errors import AppError, DescriptionError
 from app.robots.description import Robot, parse
+from app.robots.identity import DESCRIPTION_TYPE
 from nep.errors import MasterUnreachable, NepError
 from nep.network import unknown_host
 from nep.streams import tell
@@ -31,6 +38,9 @@ from nep.text import escaped
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 ROBOT_WAIT_S = 10.0
 SLICE_S = 0.1
+EVERYBODY_S = 3.0
+"""How long a behaviour that publishes waits for what the robots that are there say of themselves."""
+LATE_S = 1.0
 _STARTER = re.compile(r"events_|robot_.*_when_")
 
 
@@ -58,18 +68,23 @@ def run_file(
         known = _known(descriptions)
         wanted = robots_named(workspace)
         with nep.node("behaviour runner", master=master) as node:
-            robots = find_robots(node, robot_wait_s, wanted=wanted, known=known) if wanted else ()
-            program = compile_behaviour(workspace, robots, absent=known, name=name)
-            code = _refused(program, wanted, robots, say)
+            found = find_robots(node, robot_wait_s, wanted=wanted, known=known) if wanted else Found()
+            if compile_behaviour(workspace, found.robots, absent=known).publishes:
+                found = find_robots(node, EVERYBODY_S, wanted=(), known=known)  # it may move any of them
+            found = _judged(found)
+            for claim in found.claims:
+                say(f"warning: {claim}")
+            program = compile_behaviour(workspace, found.robots, absent=known, name=name)
+            code = _refused(program, wanted, found.robots, say)
             if code is not None:
                 return code
-            used = [robot for robot in robots if robot.name in program.robots]
+            used = [robot for robot in found.robots if robot.name in program.robots]
             if not allow_moving and _would_move(program, used, say):
                 return MAY_NOT_MOVE
             stopper = RobotStopper(node)
             try:
-                stopper.set_robots(used)
-                return _run(program, used, master, stopper, say, ending)
+                stopper.set_robots(StopTarget(robot, found.owners.get(robot.name)) for robot in used)
+                return _run(program, found, _Reach(master, node, stopper), say, ending)
             finally:
                 stopper.close()
     except KeyboardInterrupt:
@@ -80,6 +95,18 @@ def run_file(
         return UNUSABLE
     finally:
         say.tell_problem()
+
+
+def _judged(found: Found) -> Found:
+    """The same; virtual are only robots whose programs are known to be ours (docs/trust.md)."""
+    processes = Processes(VIRTUAL_ROBOTS.values())
+    robots = (
+        replace(robot, virtual=robot.virtual and processes.is_ours(found.owners[robot.name]))
+        if robot.name in found.owners
+        else robot
+        for robot in found.robots
+    )
+    return replace(found, robots=tuple(robots))
 
 
 def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
@@ -155,31 +182,38 @@ def _refused(
 def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], None]) -> bool:
     """Name each real robot that the program would move; whether there is one."""
     real = [robot for robot in robots if not robot.virtual]
-    moves = {robot.name: risky(robot, asked) for robot, asked in wanted_by(program.runnable, real)}
+    wanted = wanted_by(program.runnable, real, program.moves)
+    moves = {robot.name: risky(robot, asked) for robot, asked in wanted}
     for name, titles in moves.items():
         if titles:
             say(f"{name} would move ({', '.join(titles)}). Add --allow-moving if it may.")
     return any(moves.values())
 
 
-def _run(
-    program: Program,
-    robots: Sequence[Robot],
-    master: str | None,
-    stopper: RobotStopper,
-    say: _Lines,
-    interrupted: threading.Event,
-) -> int:
+@dataclass(frozen=True)
+class _Reach:
+    """How the network is reached: the master's address, the node, and the way to stop robots."""
+
+    master: str | None
+    node: nep.Node
+    stopper: RobotStopper
+
+
+def _run(program: Program, found: Found, reach: _Reach, say: _Lines, interrupted: threading.Event) -> int:
+    stopper = reach.stopper
     told = _Told(say)
     runner = Runner(told)
     say(f"“{program.name}” runs")
     if interrupted.is_set():
         return FAILED if say.is_lost else INTERRUPTED
-    runner.start(program, [robot.source for robot in robots], master)
+    owners = {name: owner.node_id for name, owner in found.owners.items()}
+    runner.start(program, [robot.source for robot in found.robots], reach.master, owners=owners)
     was_interrupted = False
+    late = _LateRobots(reach.node, runner) if program.publishes else None
     try:
         while not runner.wait(SLICE_S) and not interrupted.is_set():
-            pass
+            if late is not None:
+                late.look()
         was_interrupted = interrupted.is_set()
     except KeyboardInterrupt:
         was_interrupted = True
@@ -187,13 +221,35 @@ def _run(
         ends=runner.program_id
     )  # at once; and again when the program is gone and can't move them any more
     runner.close()
-    names = [*(robot.name for robot in robots), *told.silent]
+    names = [*(robot.name for robot in found.robots if robot.name in program.robots), *told.silent]
     report = stopper.stop_all(names, ends=runner.program_id)
     for line in stop_lines(report):
         say(line)
     if was_interrupted:
         return INTERRUPTED if report.proven and not say.is_lost else FAILED
     return OK if told.ok and report.proven else FAILED
+
+
+class _LateRobots:
+    """Lets a program that publishes know which robots have come: it may not move them."""
+
+    def __init__(self, node: nep.Node, runner: Runner) -> None:
+        self._node, self._runner = node, runner
+        self._next_s = time.monotonic() + LATE_S
+        self._known: tuple[str, ...] = ()
+
+    def look(self) -> None:
+        """Once a second: whoever is new is told."""
+        if time.monotonic() < self._next_s:
+            return
+        with suppress(NepError):
+            view = self._node.graph()
+            there = tuple(sorted(t for t, info in view.topics.items() if info.msg_type == DESCRIPTION_TYPE))
+            if there != self._known:
+                found = find_robots(self._node, LATE_S)
+                self._runner.set_robots({}, guarded(found.robots))
+                self._known = there
+        self._next_s = time.monotonic() + LATE_S
 
 
 class _Told:

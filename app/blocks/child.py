@@ -1,8 +1,9 @@
 """The process of a program: ``python -m app.blocks.child``. It talks JSON lines with the runner.
 
-In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "master": …, "name": …,
-"paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" | "stop"}`` or ``{"do": "pace",
-"pace_s": seconds}`` (slow motion). Out: ``{"is": "ready" | "running" |
+In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node's id},
+"master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
+"stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), or ``{"do": "robots", "owners": …,
+"guarded": {topic: [robots]}}`` when robots came or were started anew. Out: ``{"is": "ready" | "running" |
 "paused" | "error" | "print" | "ended", …}``. When its input ends, the program ends, and its robots are told.
 """
 
@@ -25,6 +26,7 @@ import nep
 from app.blocks.explain import BehaviourError
 from app.blocks.network import Network
 from app.blocks.program import Program
+from app.blocks.publishing import PublishGuard, guarded
 from app.blocks.runtime import Runtime
 from app.errors import AppError
 from app.robots.description import Robot, parse
@@ -107,9 +109,12 @@ class Run:
         if not isinstance(program, Mapping) or not isinstance(robots, list):
             raise TypeError("a start needs a program and robots")
         self._program = Program.from_json(program)
+        everybody = tuple(map(parse, robots))
         self._robots: tuple[Robot, ...] = tuple(
-            robot for robot in map(parse, robots) if robot.name in self._program.robots
+            robot for robot in everybody if robot.name in self._program.robots
         )
+        self._owners = _table(order.get("owners"))
+        self._guard = PublishGuard(guarded(everybody), self._program.moves)
         self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
         self._master = None if order.get("master") is None else str(order["master"])
         self._out = out
@@ -150,6 +155,14 @@ class Run:
         if isinstance(pace_s, (int, float)):
             self._runtime.scheduler.set_pace(pace_s)
 
+    def know(self, order: Mapping[str, object]) -> None:
+        """Robots have come, or were started anew and may be moved."""
+        topics = order.get("guarded")
+        if isinstance(topics, Mapping):
+            self._guard.know({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
+        if self._network is not None:
+            self._network.know(_table(order.get("owners")))
+
     def stop(self) -> None:
         """End the scripts; `run` then ends at once: who asked for it waits for the robots' answers."""
         self._stop_answer_s = 0.0
@@ -181,7 +194,9 @@ class Run:
             events=self._program.events,
             publishes=self._program.publishes,
             listens=self._program.listens,
+            owners=self._owners,
         )
+        network.guard = self._guard
         self._network = network
         if self._begins_paused:
             network.rest()
@@ -228,6 +243,11 @@ class Run:
                 self._out.send("running", blocks=now.blocks, says=words)
 
 
+def _table(told: object) -> dict[str, str]:
+    """A table of texts; what is none is empty."""
+    return {str(key): str(value) for key, value in told.items()} if isinstance(told, Mapping) else {}
+
+
 def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
     """The runner's orders until its end of the pipe closes; what is none is left out."""
     for line in stream:
@@ -267,6 +287,8 @@ def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
     for order in incoming:
         if order.get("do") == "pace":
             run.set_pace(order)
+        elif order.get("do") == "robots":
+            run.know(order)
         do = obeyed.get(str(order.get("do")))
         if do is not None:
             do()

@@ -70,19 +70,23 @@ STOP_ANSWER_S = 1.0
 def run(name: str) -> None:
     """Run all scripts until they end or Ctrl+C; SystemExit with a sentence when a block fails."""
     with new_node(f"program {name}") as node:
-        robots = find_robots(node, LOOK_S)
-        network = Network(node, f"program {name}", robots)
+        found = find_robots(node, LOOK_S)
+        for claim in found.claims:
+            _say(claim)
+        owners = {robot: owner.node_id for robot, owner in found.owners.items()}
+        network = Network(node, f"program {name}", found.robots, owners=owners)
         try:
-            _runtime.start(network, robots)
+            _runtime.start(network, found.robots)
             while not _runtime.finished.wait(0.1):
                 pass
         except KeyboardInterrupt:
             pass
         finally:
             _runtime.scheduler.stop()
-            silent = network.stop_robots(STOP_ANSWER_S)
+            moving = network.stop_robots(STOP_ANSWER_S)
+            wrong = [network.stop_words(robot) for robot in moving]
             network.close()
-    for robot_name in silent:
-        _say(f"{robot_name} did not answer. Switch it off by hand.")
+    for words in wrong:
+        _say(f"{words}. Switch it off by hand.")
     if _runtime.error is not None:
         sys.exit(_runtime.error.sentence)

@@ -8,18 +8,19 @@ from dataclasses import replace
 
 from app.blocks.block import Block
 from app.blocks.catalogue import Catalogue
-from app.blocks.fields import Field, FieldError, StatementInput, ValueInput, VariableField
+from app.blocks.fields import Field, FieldError, StatementInput, TopicField, ValueInput, VariableField
 from app.blocks.growing import InputField
 from app.blocks.names import Names
 from app.blocks.notes import Notes
 from app.blocks.pieces import COMMANDS as COMMANDS
 from app.blocks.pieces import RESERVED, ending, imports, keywords, template
 from app.blocks.program import Program
+from app.blocks.publishing import moved_by
 from app.blocks.reading import reading
 from app.blocks.render import instrumented, readable
 from app.blocks.shaping import END, Function, Shaping
 from app.blocks.template import expression, literal, statements
-from app.blocks.uses import Uses
+from app.blocks.uses import Uses, saved_value
 from app.blocks.workspace import Placed, Workspace, parse_workspace
 from app.robots.description import Robot
 
@@ -85,6 +86,7 @@ class _Compiler:
             events=tuple(self._uses.events),
             publishes=tuple(self._uses.publishes),
             listens=tuple(self._uses.listens),
+            moves=tuple(self._uses.moves),
             readings=self._readings,
             labels=self._labels,
             problems=self._notes.problems(),
@@ -185,6 +187,8 @@ class _Compiler:
             return []
         self._uses.remember(placed, block)
         self._notes.look(placed, block)
+        if block.publishes:
+            self._move(placed, block)
         bodies = {
             argument.name: self._statements(placed.inputs.get(argument.name, ()))
             for argument in block.arguments
@@ -196,6 +200,15 @@ class _Compiler:
             self._marks[made[0].value] = placed.id
             self._calls.add(placed.id)
         return self._marked(made, placed)
+
+    def _move(self, placed: Placed, block: Block) -> None:
+        """A block that publishes on a robot's own topic moves that robot, like any of its blocks."""
+        topics = [argument.name for argument in block.arguments if isinstance(argument, TopicField)]
+        for topic in (str(saved_value(block, placed, name)) for name in topics):
+            names = moved_by(topic, self._catalogue.connected.values())
+            self._uses.robots |= dict.fromkeys(names)
+            self._uses.moves |= dict.fromkeys(names)
+            self._notes.moves(placed, block, topic, names)
 
     def _is_at_home(self, block: Block) -> bool:
         """Whether the function that is being compiled is of the kind that the block needs."""

@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from app.errors import DescriptionError
 from app.robots.description import Robot, announced
+from app.robots.identity import (
+    DESCRIPTION_TYPE,
+    Identity,
+    Senders,
+    foreign_topic,
+    identity_of,
+    publishing,
+    wrong_topic,
+)
 from nep.errors import NepError
 from nep.graph import GraphView
 from nep.message import Message
 
-DESCRIPTION = "robot/description"
 RIZE = "rize"
 SLICE_S = 0.1
+MOST_ROBOTS = 200
+MOST_TOLD = 8
 
 
 class Subscription(Protocol):
@@ -43,6 +54,30 @@ class Node(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Found:
+    """The robots that are there, by name; ``owners`` are the programs that they are.
+
+    ``claims`` say what programs tell of themselves and is not believed, as sentences.
+    """
+
+    robots: tuple[Robot, ...] = ()
+    owners: Mapping[str, Identity] = field(default_factory=dict)
+    claims: tuple[str, ...] = ()
+
+
+@dataclass
+class _Topic:
+    """A description topic: whose it is, and what was heard there."""
+
+    subscription: Subscription
+    owner: Identity
+    told: list[Message] = field(default_factory=list)
+    twins: tuple[str, ...] = ()
+    robot: Robot | None = None
+    wrong: str = ""
+
+
 def find_robots(
     node: Node,
     timeout_s: float,
@@ -51,8 +86,8 @@ def find_robots(
     known: Sequence[Robot] = (),
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
-) -> tuple[Robot, ...]:
-    """The robots that announce themselves, by name.
+) -> Found:
+    """The robots that announce themselves, each on its own topic, by the program that was first.
 
     With `wanted` it waits until those are there, `timeout_s` at most; else it takes who is there at once.
     Robots of RIZE announce nothing: those of `known` count as there when somebody listens to their commands.
@@ -60,34 +95,78 @@ def find_robots(
     wait = wait or threading.Event().wait
     until = clock() + timeout_s
     found: dict[str, Robot] = {}
-    asked: dict[str, Subscription] = {}
+    asked: dict[str, _Topic] = {}
+    senders = Senders()
     try:
         while True:
-            topics = node.graph().topics
+            view = node.graph()
             for robot in known:
-                info = topics.get(robot.topics.command)
+                info = view.topics.get(robot.topics.command)
                 if robot.dialect == RIZE and info is not None and info.subscribers:
                     found.setdefault(robot.name, robot)
-            for topic, info in topics.items():
-                if info.msg_type == DESCRIPTION and info.publishers and topic not in asked:
-                    asked[topic] = node.new_sub(topic, DESCRIPTION)
-            for subscription in asked.values():
-                described = _described(subscription)
-                if described is not None:
-                    found[described.name] = described
-            missing = set(wanted) - set(found) if wanted else len(asked) > len(found)
+            _follow(node, view, asked)
+            senders.learn(view, asked)
+            for topic, each in asked.items():
+                _hear(each, topic, senders)
+            there = found | {each.robot.name: each.robot for each in asked.values() if each.robot is not None}
+            heard = sum(each.robot is not None or bool(each.wrong) for each in asked.values())
+            missing = set(wanted) - there.keys() if wanted else heard < len(asked)
             if not missing or clock() >= until:
-                return tuple(found[name] for name in sorted(found))
+                return _found(there, asked)
             wait(SLICE_S)
     finally:
-        for subscription in asked.values():
-            subscription.close()
+        for each in asked.values():
+            each.subscription.close()
 
 
-def _described(subscription: Subscription) -> Robot | None:
-    """The robot of a description that has arrived; None while it has not, or when it can't be understood."""
-    message = subscription.receive(SLICE_S)
-    with suppress(NepError, DescriptionError):
-        if message is not None:
-            return announced(message)
-    return None
+def _follow(node: Node, view: GraphView, asked: dict[str, _Topic]) -> None:
+    """Subscribe new descriptions; whoever announces one first is the robot while it does so."""
+    for topic, info in view.topics.items():
+        nodes = publishing(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()
+        if not nodes or (topic not in asked and len(asked) >= MOST_ROBOTS):
+            continue
+        if topic not in asked:
+            asked[topic] = _Topic(node.new_sub(topic, DESCRIPTION_TYPE), identity_of(view, nodes[0]))
+        each = asked[topic]
+        if each.owner.node_id not in nodes:
+            each.owner, each.robot = identity_of(view, nodes[0]), None
+        each.twins = tuple(identity_of(view, id).words for id in nodes if id != each.owner.node_id)
+
+
+def _hear(each: _Topic, topic: str, senders: Senders) -> None:
+    """Take over what was told on a description topic by the program whose it is."""
+    message = each.subscription.receive(SLICE_S if each.robot is None else 0.0)
+    while message is not None:
+        each.told = [*each.told[1 - MOST_TOLD :], message]
+        message = each.subscription.receive(0.0)
+    for message in each.told:
+        if senders.node_of(message) != each.owner.node_id:
+            continue
+        with suppress(NepError, DescriptionError):
+            robot = announced(message)
+            each.wrong = wrong_topic(robot, topic) or ""
+            each.robot = None if each.wrong else robot
+
+
+def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> Found:
+    """The result, with what is not believed in words; a robot with another one's topics is left out."""
+    claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
+    claims += [
+        f"{len(each.twins) + 1} programs say that they are {each.robot.name}: {each.owner.words} was first "
+        f"and is the robot; {' and '.join(each.twins)} changes nothing."
+        for each in asked.values()
+        if each.twins and each.robot is not None
+    ]
+    robots = {}
+    for name in sorted(there):
+        claim = foreign_topic(there[name], there.values())
+        if claim is None:
+            robots[name] = there[name]
+        else:
+            claims.append(f"{claim}; {name} is left out.")
+    owners = {
+        each.robot.name: each.owner
+        for each in asked.values()
+        if each.robot is not None and each.robot.name in robots
+    }
+    return Found(tuple(robots.values()), owners, tuple(claims))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from app.blocks.block import Block
 from app.blocks.catalogue import Catalogue
 from app.blocks.fields import Field, FieldError, TextField, ValueInput
@@ -176,6 +178,14 @@ class Notes:
         action = robot.action(block.robot.name) if robot and block.robot else None
         if action is not None:
             self._check_input(placed, block, action)
+
+    def moves(self, placed: Placed, block: Block, topic: str, robots: Sequence[str]) -> None:
+        """A block that moves robots by publishing on their topics."""
+        real = [name for name in robots if not self._catalogue.connected[name].virtual]
+        if real:
+            who, name = " and ".join(real), self.label(placed, block)
+            sentence = f"{name} on {topic} moves {who}: you are asked before it does, and Stop stops it."
+            self._note("info", placed, block, name, sentence)
 
     def _never(self, placed: Placed) -> str:
         condition = placed.inputs["CONDITION"][0]

@@ -34,7 +34,8 @@ class Program:
 
     ``source`` is for people, and runs as a file; ``lines`` gives the block of a line of it. ``runnable`` is
     the same tree with a ``step`` before each block. ``robots`` are those that its blocks name and that are
-    there; ``sensors`` and ``events`` are (robot, name). ``readings`` are the blocks in words ("wait 2 s"),
+    there, and those that it moves by publishing on their topics (``moves``); ``sensors`` and ``events`` are
+    (robot, name). ``readings`` are the blocks in words ("wait 2 s"),
     ``labels`` the words that name them ("wait").
     """
 
@@ -47,6 +48,7 @@ class Program:
     events: tuple[tuple[str, str], ...] = ()
     publishes: tuple[str, ...] = ()
     listens: tuple[str, ...] = ()
+    moves: tuple[str, ...] = ()
     readings: Mapping[str, str] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
     problems: tuple[Problem, ...] = ()
@@ -78,6 +80,7 @@ class Program:
             events=_pairs(saved["events"]),
             publishes=_texts(saved["publishes"]),
             listens=_texts(saved["listens"]),
+            moves=_texts(saved.get("moves", ())),
             readings=_table(saved["readings"]),
             labels=_table(saved["labels"]),
         )

@@ -16,6 +16,7 @@ class Uses:
         self.events: dict[tuple[str, str], None] = {}
         self.publishes: dict[str, None] = {}
         self.listens: dict[str, None] = {}
+        self.moves: dict[str, None] = {}
 
     def remember(self, placed: Placed, block: Block) -> None:
         """Add what this block names; its fields are sound."""

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from nep.errors import NepError
 from nep.message import Message
+from nep.views import GraphView
 
 
 class Publisher(Protocol):
@@ -29,6 +30,10 @@ class Node(Protocol):
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
     ) -> object:
         """A subscriber whose messages go to `sink`, in the node's thread."""
+        ...
+
+    def graph(self, timeout_s: float = 2.0) -> GraphView:
+        """Who is there."""
         ...
 
 

@@ -19,7 +19,7 @@ from app.core.moving import MayNotMoveError, Moving
 from app.core.rize_names import RizeNames
 from app.core.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.settings import Settings
-from app.core.stopping import MOST_TOPICS, refusal_words
+from app.core.stopping import MOST_TOPICS
 from app.core.tries import Tries
 from app.core.watches import Watch, Watches
 from app.errors import AppError, RobotInputError, RobotUnknownError
@@ -29,10 +29,10 @@ from app.robots.identity import (
     GATEWAY,
     Identity,
     Senders,
+    foreign_topic,
     hearing,
-    is_home,
     publishing,
-    reserved,
+    said_of_stop,
 )
 from nep.errors import NepError
 from nep.message import Message
@@ -43,8 +43,6 @@ COMMAND_TYPE = "robot/command"
 MOST_HELD = 256
 """Answers of publishers that no master has told of yet, kept until the next graph."""
 MOST_EARLIER = 4
-SHARED = frozenset({rize.COMMANDS, rize.ANSWERS})
-"""Topics of all robots of RIZE together."""
 
 
 class Processes(Protocol):
@@ -100,7 +98,7 @@ class Fleet:
         self._rize = RizeNames()
         self._rize_events: Watch | None = None
         self._alive = Heartbeat(SENDER)
-        self.moving, self.known = Moving(settings), KnownRobots(settings)
+        self.moving, self.known = Moving(settings, self._identity_of), KnownRobots(settings)
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
         self._told = False
@@ -282,6 +280,10 @@ class Fleet:
 
     # -- inside ----------------------------------------------------------------------------------------------
 
+    def _identity_of(self, name: str) -> Identity | None:
+        link = self._links.get(name)
+        return None if link is None else link.identity
+
     def _get(self, name: str) -> RobotLink:
         link = self._links.get(name)
         if link is None:
@@ -331,16 +333,10 @@ class Fleet:
 
     def _foreign(self, robot: Robot) -> Claim | None:
         """Why a robot can't have the topics that it names: they are another robot's."""
-        for topic in set(reserved(robot)) - SHARED:
-            if is_home(robot.name, topic):
-                continue
-            for other in self._links.values():
-                if other.name == robot.name:
-                    continue
-                if is_home(other.name, topic) or topic in reserved(other.robot):
-                    title = f"{robot.name} says that {topic} is its own; it belongs to {other.name}."
-                    return Claim(title, f"{robot.name} is left out. Find out what this program is.")
-        return None
+        why = foreign_topic(robot, (link.robot for link in self._links.values()))
+        if why is None:
+            return None
+        return Claim(f"{why}.", f"{robot.name} is left out. Find out what this program is and close it.")
 
     def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
         """A robot is there, known by ``topic``; said again it does nothing unless the robot changed."""
@@ -497,7 +493,7 @@ class Fleet:
             return
         before, link.goes_on = link.goes_on, ""
         if answer["not_ended"]:
-            link.goes_on = refusal_words(link.name, answer.get("error") or "an action has not ended")
+            link.goes_on = said_of_stop(link.name, answer.get("error") or "an action has not ended")
         elif before and link.not_stopped:
             self._settled[link.name] = None
 

@@ -1,18 +1,21 @@
 """Which real robots may move: a person is asked once for each robot, before it moves for the first time.
 
-A virtual robot may always. Everything that makes a robot act comes through here: the forms, the palette, keys
-and programs. Stop does not.
+A virtual robot may always, if Studio knows the program that it is (`app.core.processes`). Everything that
+makes a robot act comes through here: the forms, the palette, keys and programs, also those that publish on
+a robot's topics. Stop does not. A yes counts for the program that the robot is now, *always* for its name,
+model, program and computer.
 """
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from app.errors import AppError
 from app.robots.description import Robot
+from app.robots.identity import Identity
 
 ALWAYS = "robots.may_move"
 MOST_NAMED = 4
@@ -62,18 +65,22 @@ class Question:
 class Moving:
     """Who may move. One thread uses it (the window's)."""
 
-    def __init__(self, settings: Keeps | None = None) -> None:
-        """`settings` keep the robots that may always."""
-        self._settings = settings
+    def __init__(
+        self,
+        settings: Keeps | None = None,
+        identity_of: Callable[[str], Identity | None] = lambda _name: None,
+    ) -> None:
+        """`settings` keep the robots that may always; `identity_of` tells the program that a robot is."""
+        self._settings, self._identity_of = settings, identity_of
         self._allowed: set[str] = set()
-        self._asked: tuple[str, ...] = ()
+        self._asked: tuple[tuple[str, str], ...] = ()
         self.question: Question | None = None
         """What a person is to answer now."""
         self.revision = 0
 
     def allowed(self, robot: Robot) -> bool:
         """Whether this robot may move without being asked for."""
-        return robot.virtual or _key(robot) in self._allowed or _key(robot) in self._always()
+        return robot.virtual or self._now(robot) in self._allowed or self._key(robot) in self._always()
 
     def permits(self, wanted: Iterable[tuple[Robot, Sequence[str]]], go_on: Callable[[], None]) -> bool:
         """Whether these robots may do these actions now.
@@ -84,7 +91,7 @@ class Moving:
         open_ = [(robot, moves) for robot, moves in asked if moves]
         if not open_:
             return True
-        self._asked = tuple(_key(robot) for robot, _ in open_)
+        self._asked = tuple((self._now(robot), self._key(robot)) for robot, _ in open_)
         self.question = Question({robot.name: moves for robot, moves in open_}, go_on)
         self.revision += 1
         return False
@@ -95,10 +102,10 @@ class Moving:
         self.revision += 1
         if question is None or not let:
             return
-        self._allowed.update(self._asked)
+        self._allowed.update(now for now, _ in self._asked)
         try:
             if always and self._settings is not None:
-                self._settings.set(ALWAYS, sorted({*self._always(), *self._asked}))
+                self._settings.set(ALWAYS, sorted({*self._always(), *(key for _, key in self._asked)}))
         finally:
             question.go_on()
 
@@ -113,6 +120,16 @@ class Moving:
         self._allowed.clear()
         if self._settings is not None:
             self._settings.set(ALWAYS, [])
+
+    def _key(self, robot: Robot) -> str:
+        """What *always* is kept for: who announces another robot under this name is not meant."""
+        identity = self._identity_of(robot.name)
+        return f"{robot.name} ({robot.model})" + (f", {identity.words}" if identity is not None else "")
+
+    def _now(self, robot: Robot) -> str:
+        """What a yes counts for: this very program, until it is started anew."""
+        identity = self._identity_of(robot.name)
+        return f"{self._key(robot)} {identity.node_id if identity is not None else ''}"
 
     def _always(self) -> list[str]:
         return self._settings.get(ALWAYS, []) if self._settings is not None else []
@@ -140,12 +157,20 @@ def actions_of(runnable: str) -> dict[str, tuple[str, ...]] | None:
     return {robot: tuple(actions) for robot, actions in found.items()}
 
 
-def wanted_by(runnable: str, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
-    """The robots of a program with what it asks of each."""
+def wanted_by(
+    runnable: str, robots: Iterable[Robot], moves: Collection[str] = ()
+) -> list[tuple[Robot, Sequence[str]]]:
+    """The robots of a program with what it asks of each; of those that it `moves` by publishing anything."""
     asked = actions_of(runnable)
-    if asked is None:
-        return [(robot, [action.name for action in robot.actions]) for robot in robots]
-    return [(robot, asked.get(robot.name, ())) for robot in robots]
+    return [
+        (
+            robot,
+            [action.name for action in robot.actions]
+            if asked is None or robot.name in moves
+            else asked.get(robot.name, ()),
+        )
+        for robot in robots
+    ]
 
 
 def _argument(node: ast.expr) -> ast.expr | None:
@@ -154,10 +179,6 @@ def _argument(node: ast.expr) -> ast.expr | None:
 
 def _literal(node: ast.expr | None) -> str | None:
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
-
-
-def _key(robot: Robot) -> str:
-    return f"{robot.name} ({robot.model})"
 
 
 def _listed(words: Sequence[str]) -> str:

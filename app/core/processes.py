@@ -6,7 +6,6 @@ import os
 import platform
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from itertools import pairwise
 
 from app.robots.identity import Identity
 
@@ -62,4 +61,5 @@ class Processes:
             return False
 
     def _is_virtual(self, command: list[str]) -> bool:
-        return any(first in RUNS_MODULE and then in self._modules for first, then in pairwise(command))
+        """Whether a command runs one of the modules; what stands behind other words is no option."""
+        return len(command) > 2 and command[1] in RUNS_MODULE and command[2] in self._modules

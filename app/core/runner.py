@@ -82,10 +82,12 @@ class Runner:
         name: str | None = None,
         paused: bool = False,
         pace_s: float = 0.0,
+        owners: Mapping[str, str] | None = None,
     ) -> None:
         """Start the program; `robots` are the descriptions of those that are connected.
 
-        `pace_s` is slow motion (`set_pace`). RunnerError if its process can't be started.
+        `owners` are the ids of the nodes that they are, by their names: only what these say counts. `pace_s`
+        is slow motion (`set_pace`). RunnerError if its process can't be started.
         """
         if self._child is not None:
             raise RunnerError("this runner has run its program; make another one")
@@ -99,6 +101,7 @@ class Runner:
                 "id": self.program_id,
                 "program": kept,
                 "robots": list(robots),
+                "owners": dict(owners or {}),
                 "master": master,
                 "paused": paused,
                 "pace_s": pace_s,
@@ -118,6 +121,11 @@ class Runner:
     def set_pace(self, seconds: float) -> None:
         """Slow motion: how long each script stays at a block before it is done; 0 for none."""
         self._orders.put({"do": "pace", "pace_s": seconds})
+
+    def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
+        """Robots have come, or were started anew: the nodes that they are, and the topics that move them."""
+        topics = {topic: list(names) for topic, names in guarded.items()}
+        self._orders.put({"do": "robots", "owners": dict(owners), "guarded": topics})
 
     def pause(self) -> None:
         """Hold the program, and what its robots do; the event "paused" says when all stand still."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
+from app.blocks.publishing import guarded
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.document import Document
@@ -29,6 +30,7 @@ from app.core.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
 from app.core.stopping import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.stopping import RobotStop, RobotStopper, StopReport
 from app.errors import AppError
+from app.robots.description import Robot
 
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 NO_NETWORK = "there is no connection to the network yet"
@@ -58,6 +60,9 @@ class Runs:
         self._program_id: str | None = None  # the last one's: robots refuse what still comes from it
         self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
         self._labels: Mapping[str, str] = {}
+        self._wanted: list[tuple[Robot, Sequence[str]]] = []  # what the program asks of its robots
+        self._told_owners: Mapping[str, str] = {}  # the programs that its robots are, as it knows them
+        self._robots_told = -1
         self._run = RunState()
         self._stop_number = 0
         self._stop_thread: threading.Thread | None = None
@@ -147,6 +152,37 @@ class Runs:
         elif self._run.state in {"ready", "proven"}:
             self.stop_robot(name)
 
+    def follow_robots(self) -> None:
+        """Robots came, or were started anew: the program is told, of what moves after the question."""
+        if self._runner is None or not self.active or self._fleet.revision == self._robots_told:
+            return
+        self._robots_told, owners = self._fleet.revision, self._owners()
+        links = [self._fleet.link(robot.name) for robot, _ in self._wanted]
+        asked = {robot.name: actions for robot, actions in self._wanted}
+        anew = [
+            link
+            for link in links
+            if link is not None
+            and link.name in owners
+            and owners[link.name] != self._told_owners.get(link.name)
+        ]
+        if self._fleet.moving.permits([(link.robot, asked[link.name]) for link in anew], self._tell_robots):
+            self._tell_robots()
+        else:
+            self._tell_robots(without=[link.name for link in anew])
+
+    def _tell_robots(self, without: Collection[str] = ()) -> None:
+        if self._runner is None:
+            return
+        owners = {name: id for name, id in self._owners().items() if name not in without}
+        self._told_owners = {**self._told_owners, **owners}
+        self._runner.set_robots(owners, guarded(link.robot for link in self._fleet.connected))
+
+    def _owners(self) -> dict[str, str]:
+        """The nodes that the connected robots are."""
+        there = self._fleet.connected
+        return {link.name: link.identity.node_id for link in there if link.identity is not None}
+
     def confirm_still(self) -> None:
         """A person says that the robot that did not answer stands still."""
         if self._run.state == "unanswered":
@@ -234,18 +270,26 @@ class Runs:
                 self._run = RunState(nothing_in=program, last_words=self._run.last_words)
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
-            wanted = wanted_by(program.runnable, used)
+            wanted = wanted_by(program.runnable, used, program.moves)
             if not self._fleet.moving.permits(wanted, self.step if paused else self.run):
                 return  # a person is asked first; the question stands in the window
             runner = Runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
+            owners = self._owners()
             runner.start(
-                program, robots, self._network.address, name=document.name, paused=paused, pace_s=self.pace_s
+                program,
+                robots,
+                self._network.address,
+                name=document.name,
+                paused=paused,
+                pace_s=self.pace_s,
+                owners=owners,
             )
         except AppError as error:
             self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
+        self._wanted, self._told_owners, self._robots_told = wanted, owners, self._fleet.revision
         self.kept, self._program_id = frozenset(program.robots), runner.program_id
         self._console.leave_out(runner.pid)
         last = self._run.last_words

@@ -159,6 +159,8 @@ class Session:
             self.nodes.age(now)
         with self.surviving("follow the robots"):
             self._follow_robots()
+        with self.surviving("tell the program of its robots"):
+            self.runs.follow_robots()
         with self.surviving("stop robots again"):
             for name in self.fleet.take_settled():
                 self.runs.stop_again(name)

@@ -17,7 +17,15 @@ from typing import Protocol
 
 from app.robots import rize
 from app.robots.description import Robot, Topics
-from app.robots.identity import Identity, Senders, first_to_announce, hearing, identity_of, publishing
+from app.robots.identity import (
+    Identity,
+    Senders,
+    first_to_announce,
+    hearing,
+    identity_of,
+    publishing,
+    said_of_stop,
+)
 from nep.errors import NepError
 from nep.message import Message
 from nep.views import GraphView
@@ -32,7 +40,6 @@ UNKNOWN_KEPT = 32
 LOOK_S = 0.1
 """How often the master is asked at most while an answer of an unknown publisher waits."""
 GRAPH_S = 0.3
-WORDS_MOST = 200
 
 STOP_TIMEOUT_S = 1.0
 """How long a robot may take to answer a stop, if its description does not say that it needs longer."""
@@ -583,7 +590,7 @@ class RobotStopper:
             return None
         name, program = asked.line.name, asked.programs.get(node, "")
         elapsed_ms = (self._clock() - asked.sent_s) * 1000
-        error = "" if is_still else refusal_words(name, told.get("error"))
+        error = "" if is_still else said_of_stop(name, told.get("error"))
         said = RobotStop(name, is_still, elapsed_ms, error=error, refused=not is_still, program=program)
         asked.serving[node] = said
         return said if asked.is_over else None
@@ -626,13 +633,6 @@ def _stop_answer(message: Message) -> Mapping[str, object] | None:
     except NepError:
         return None
     return payload if isinstance(payload, Mapping) and payload.get("op") == "stop" else None
-
-
-def refusal_words(name: str, error: object) -> str:
-    """What a robot said that has not stopped, in its own words: "Arm may still move: the brake is stuck"."""
-    words = "".join(sign if sign.isprintable() else " " for sign in str(error or "its stop failed"))
-    words = " ".join(words[:WORDS_MOST].split()).rstrip(".")
-    return words if words.startswith(f"{name} may still move") else f"{name} may still move: {words}"
 
 
 def _untold(line: _Line) -> str:

@@ -18,7 +18,10 @@ from nep.views import GraphView
 
 DESCRIPTION_TYPE = "robot/description"
 GATEWAY = "gateway"
+SHARED = frozenset({"robot_action", "action_state"})
+"""Topics of all robots of RIZE together (`app.robots.rize`)."""
 MOST_SENDERS = 20_000
+WORDS_MOST = 200
 _NATIVE = frozenset({"native", GATEWAY})
 
 
@@ -94,6 +97,28 @@ def reserved(robot: Robot) -> tuple[str, ...]:
 def is_home(robot_name: str, topic: str) -> bool:
     """Whether a topic lies among those that belong to a robot of this name: ``/NAME/...``."""
     return topic.startswith(topic_of(robot_name, ""))
+
+
+def said_of_stop(name: str, error: object) -> str:
+    """What a robot said that has not stopped, in its own words: "Arm may still move: the brake is stuck"."""
+    words = "".join(sign if sign.isprintable() else " " for sign in str(error or "its stop failed"))
+    words = " ".join(words[:WORDS_MOST].split()).rstrip(".")
+    return words if words.startswith(f"{name} may still move") else f"{name} may still move: {words}"
+
+
+def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
+    """Why a robot can't have the topics that it names; None when it can. They are another robot's.
+
+    ``/NAME/...`` belongs to the robot of that name, whoever comes first; other topics to who is there first.
+    """
+    known = [other for other in others if other.name != robot.name]
+    for topic in set(reserved(robot)) - SHARED:
+        if is_home(robot.name, topic):
+            continue
+        for other in known:
+            if is_home(other.name, topic) or topic in reserved(other):
+                return f"{robot.name} says that {topic} is its own, which belongs to {other.name}"
+    return None
 
 
 class Senders:

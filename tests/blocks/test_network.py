@@ -53,11 +53,11 @@ def test_answers_of_another_robot_and_words_of_no_robot_change_nothing(network, 
     pepper.slow = {"say"}
     call = network.invoke("Pepper", "say", {"text": "Hi"})
     until(lambda: call.state == "accepted")
-    answer = node.new_pub("/Pepper/answer", "robot/answer")
+    answer = pepper._answer
     told = {"id": call.id, "op": "invoke", "action": "say", "output": {}, "feedback": {}, "error": None}
     for state in ("dancing", None, ["succeeded"], "accepted"):
         answer.publish({**told, "state": state})
-    network._answer("/Other/answer", {**told, "state": "succeeded"})
+    network._answer("/Other/answer", {**told, "state": "succeeded"}, pepper._node.id)
     answer.publish({"op": "alive", "id": "", "state": "running"})
     until(lambda: call.heard_s > 0 and call.state == "accepted")
     answer.publish({**told, "state": "running", "waits_for": "no list"})
@@ -127,7 +127,7 @@ def test_a_stop_of_a_pause_that_is_answered_twice_is_still_ours(network, pepper,
     network._rest(pepper.described)
     until(lambda: not network._stops)
     (stop,) = pepper.heard("stop")
-    answer = node.new_pub("/Pepper/answer", "robot/answer")
+    answer = pepper._answer
     for state in ("succeeded", "failed", "succeeded"):
         answer.publish({"id": stop["id"], "op": "stop", "state": state})
     call = network.invoke("Pepper", "say", {"text": "Hi"})
@@ -142,7 +142,8 @@ def test_a_robot_that_answers_a_stop_for_another_proves_nothing(network, pepper)
 
     def lies(robot, command):
         heard(robot, command)
-        network._answer("/Other/answer", {"id": command["id"], "op": command["op"], "state": "succeeded"})
+        told = {"id": command["id"], "op": command["op"], "state": "succeeded"}
+        network._answer("/Other/answer", told, pepper._node.id)
 
     network._send = lies
     assert network.stop_robots(0.3) == ("Pepper",)
@@ -176,8 +177,10 @@ def test_robots_are_found_by_their_type(master, node, pepper):
     turtle = WireRobot(master.address, "Turtle 2")
     try:
         found = find_robots(node, 5.0, wanted=["Pepper", "Turtle 2"])
-        assert [robot.name for robot in found] == ["Pepper", "Turtle 2"]
-        assert [robot.name for robot in find_robots(node, 5.0)] == ["Pepper", "Turtle 2"]
-        assert [robot.name for robot in find_robots(node, 0.2, wanted=["NAO"])] == ["Pepper", "Turtle 2"]
+        assert [robot.name for robot in found.robots] == ["Pepper", "Turtle 2"]
+        assert found.owners["Pepper"].node_id == pepper._node.id
+        assert [robot.name for robot in find_robots(node, 5.0).robots] == ["Pepper", "Turtle 2"]
+        wanted = find_robots(node, 0.2, wanted=["NAO"])
+        assert ([robot.name for robot in wanted.robots], wanted.claims) == (["Pepper", "Turtle 2"], ())
     finally:
         turtle.close()

@@ -205,12 +205,8 @@ def test_a_robot_may_not_name_the_topics_of_another_its_own(
 ) -> None:
     the_link(session)
     announce(evil, "/Evil/description", description("Evil", **{leaf: f"/Pepper/{leaf}"}))
-    assert "it belongs to Pepper" in claimed_of(session, "/Evil/description")
+    assert "which belongs to Pepper" in claimed(session, "/Evil/description")
     assert session.fleet.link("Evil") is None
-
-
-def claimed_of(session: Session, topic: str) -> str:
-    return claimed(session, topic)
 
 
 def test_nor_before_the_other_is_there(session: Session, master: Master, evil: nep.Node) -> None:
@@ -220,7 +216,7 @@ def test_nor_before_the_other_is_there(session: Session, master: Master, evil: n
     try:
         link = the_link(session)
         tick_until(session, lambda: not evil_link.connected)
-        assert "it belongs to Pepper" in claimed(session, "/Evil/description")
+        assert "which belongs to Pepper" in claimed(session, "/Evil/description")
         assert link.connected
     finally:
         pepper.close()

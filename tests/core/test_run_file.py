@@ -9,12 +9,15 @@ import os
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import nep
 from app import resources
+from app.robots import turtle
+from app.robots.driver import Driver
 from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, robot, say, started, text, workspace, write
@@ -47,6 +50,9 @@ def saved(tmp_path):
         return path
 
     return write_file
+
+
+REAL = replace(turtle.ROBOT, virtual=False)
 
 
 def run(path, **more) -> tuple[int, str]:
@@ -155,6 +161,31 @@ def test_a_real_robot_moves_only_when_it_may(master, tmp_path):
         assert rosie.commands[0]["primitives"]["primitive"] == "walk"
     finally:
         rosie.close()
+
+
+def test_publishing_on_a_robots_topic_is_moving_it(master, tmp_path):
+    with nep.node("rover", master=master.address) as node, Driver(REAL, "Rover", node):
+        publish = block("messages_publish", TOPIC="/Rover/command", VALUE=text("drive"))
+        content = {"format": "nep-behaviour", "version": 1, "name": "Sly", "robots": {}}
+        path = tmp_path / "sly.nepb"
+        path.write_text(json.dumps(content | {"workspace": workspace(started(publish))}))
+        code, out = run(path)
+        assert code == MAY_NOT_MOVE, out
+        assert "Rover would move (" in out
+        code, out = run(path, allow_moving=True)
+        assert code == OK, out
+        assert "Rover stopped (" in out
+
+
+def test_a_second_program_of_a_robots_name_is_told_and_changes_nothing(master, pepper, saved):
+    with nep.node("evil", master=master.address) as evil:
+        described = dict(robot().source)
+        announcement = evil.new_pub("/Pepper/description", "robot/description", latched=True)
+        announcement.publish(described | {"rb:topics": {"command": "/Evil/command"}})
+        code, out = run(saved(workspace(started(say("Hi")))))
+    assert code == OK, out
+    assert "warning: 2 programs say that they are Pepper" in out
+    assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
 
 
 @pytest.fixture

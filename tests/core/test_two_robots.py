@@ -101,6 +101,50 @@ def test_nothing_moves_a_real_robot_before_the_answer(session: Session, node: ne
         assert session.runs.view().result_ok
 
 
+@pytest.mark.parametrize("topic", ["/Turtle/command", "robot_action"])
+def test_a_behaviour_that_publishes_on_a_robots_topic_asks_and_is_stopped_too(
+    session: Session, node: nep.Node, topic: str
+) -> None:
+    """A command in the robot's own words: the block is not the robot's, and moves it all the same."""
+    with Driver(REAL, "Turtle", node):
+        there(session, "Turtle")
+        heard: list[object] = []
+        node.new_sub("/Turtle/command", sink=lambda messages: heard.extend(m.payload for m in messages))
+        publish = block("messages_publish", "p", TOPIC=topic, VALUE=text("drive"))
+        session.document.edited(workspace(started(publish, wait(600))))
+        session.runs.run()
+        moving = session.fleet.moving
+        assert not session.runs.active
+        assert moving.question is not None
+        assert moving.question.title == "Let Turtle move?"
+        assert "“move”" in moving.question.sentence
+        session.tick()
+        assert "drive" not in heard
+        moving.answer(let=True)
+        tick_until(session, lambda: session.runs.running_blocks == ("w",), FOUND_S)
+        assert "Turtle" in session.runs.kept
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "proven")
+        assert str(session.runs.view().result).startswith("Turtle stopped (")
+
+
+def test_a_robot_that_comes_while_a_program_runs_is_not_moved_by_what_that_publishes(
+    session: Session, node: nep.Node
+) -> None:
+    publish = block("messages_publish", "p", TOPIC="/Turtle/command", VALUE=text("drive"))
+    again = block(
+        "control_repeat", TIMES=number(10_000), BODY=[publish, block("control_wait", SECONDS=number(0.05))]
+    )
+    session.document.edited(workspace(started(again)))
+    session.runs.run()  # nobody is there: nothing to ask about
+    tick_until(session, lambda: session.runs.running_blocks, FOUND_S)
+    with Driver(REAL, "Turtle", node):
+        tick_until(session, lambda: session.runs.block_errors, FOUND_S)
+        said = session.runs.block_errors["p"]
+        assert said.startswith("Publishing on /Turtle/command would move Turtle, and nobody was asked")
+        tick_until(session, lambda: session.runs.view().state != "stopping")
+
+
 def test_let_it_move_runs_what_was_wanted_and_asks_no_more(session: Session, node: nep.Node) -> None:
     with Driver(REAL, "Turtle", node) as driver:
         there(session, "Turtle")

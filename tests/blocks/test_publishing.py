@@ -1,0 +1,77 @@
+"""Publishing on a robot's own topics is moving that robot: told before Run, and refused in the program."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import nep
+from app.blocks.compiler import compile_behaviour
+from app.blocks.explain import BehaviourError
+from app.blocks.network import Network
+from app.blocks.program import Program
+from app.blocks.publishing import PublishGuard, guarded, moved_by
+from app.robots import rize
+from nep.masters import Master
+from tests.blocks.samples import block, robot, started, text, workspace
+from tests.blocks.wire_robot import WireRobot
+
+PEPPER, ROVER = robot(), replace(robot("Rover"), virtual=False)
+
+
+def publish(topic: str) -> dict[str, object]:
+    return block("messages_publish", "p", TOPIC=topic, VALUE=text("hello"))
+
+
+@pytest.mark.parametrize("topic", ["/Rover/command", "robot_action"])
+@pytest.mark.parametrize("kind", ["messages_publish", "messages_publish_field"])
+def test_a_program_that_publishes_on_a_robots_topic_uses_and_moves_it(topic: str, kind: str) -> None:
+    content = workspace(started(block(kind, "p", TOPIC=topic, VALUE=text("hello"))))
+    program = compile_behaviour(content, [ROVER])
+    assert (program.robots, program.moves) == (("Rover",), ("Rover",))
+    (problem,) = program.problems
+    assert (problem.severity, problem.block_id) == ("info", "p")
+    assert f"on {topic} moves Rover" in problem.sentence
+    assert Program.from_json(program.to_json()).moves == ("Rover",)
+
+
+def test_other_topics_move_nobody() -> None:
+    program = compile_behaviour(workspace(started(publish("/weather"))), [ROVER])
+    assert (program.robots, program.moves, program.problems) == ((), (), ())
+
+
+def test_nobody_is_asked_about_a_virtual_robot() -> None:
+    virtual = replace(ROVER, virtual=True)
+    program = compile_behaviour(workspace(started(publish("/Rover/command"))), [virtual])
+    assert (program.moves, program.problems) == (("Rover",), ())
+
+
+def test_who_is_moved_by_which_topic() -> None:
+    far = replace(ROVER, topics=replace(ROVER.topics, command="/far", world="/far/world"))
+    assert moved_by("/far", [PEPPER, far]) == ("Rover",)
+    assert moved_by("/far/world", [PEPPER, far]) == ("Rover",)
+    assert moved_by(rize.COMMANDS, [PEPPER, far]) == ("Pepper", "Rover")
+    assert moved_by("/Rover/answer", [PEPPER, far]) == ()
+    topics = guarded([PEPPER, far])
+    assert (topics["/Pepper/command"], topics["/far"]) == (("Pepper",), ("Rover",))
+
+
+def test_a_computed_topic_is_refused_when_the_program_runs(master: Master) -> None:
+    """The compiler did not see it: a program's process looks again, also at robots that came later."""
+    rover = WireRobot(master.address, "Rover")
+    try:
+        with nep.node("program", master=master.address) as node:
+            network = Network(node, "program-1", [PEPPER])
+            network.guard = PublishGuard(guarded([PEPPER]), ["Pepper"])
+            network.publish("/Pepper/command", {})  # a person was asked
+            network.publish("/Rover/command", {"op": "alive"})  # it was not there yet
+            network.guard.know(guarded([PEPPER, rover.described]))
+            with pytest.raises(BehaviourError, match="Publishing on /Rover/command would move Rover"):
+                network.publish("/Rover/command", {"id": "1", "op": "invoke", "action": "turn", "input": {}})
+            with pytest.raises(BehaviourError, match="would move Rover, and nobody was asked"):
+                network.publish(rize.COMMANDS, {})
+            network.close()
+        assert rover.heard("invoke") == []
+    finally:
+        rover.close()

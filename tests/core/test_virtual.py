@@ -1,0 +1,169 @@
+"""Virtual is what Studio started, or another virtual robot of this person on this computer; nobody else."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import psutil
+import pytest
+
+from app.core.fleet import Fleet
+from app.core.moving import MayNotMoveError, Moving
+from app.core.processes import Processes
+from app.core.session import Session
+from app.core.settings import Settings
+from app.core.watches import Watches
+from app.robots.description import Robot, parse, td_for
+from app.robots.identity import Identity
+from app.robots.turtle import ROBOT
+from nep.masters import Master
+from tests.core.waiting import tick_until
+
+HERE = platform.node()
+MODULES = ("app.robots.turtle",)
+STRANGER = """
+import json, sys
+import nep
+from app.robots.description import td_for
+from app.robots.turtle import ROBOT
+with nep.node("stranger") as node:
+    publisher = node.new_pub("/Turtle/description", "robot/description", latched=True)
+    publisher.publish(td_for(ROBOT.thing_model, "Turtle"))
+    sys.stdin.read()
+"""
+
+
+def waits(*more: str) -> subprocess.Popen[bytes]:
+    """A process that does nothing until its input ends."""
+    command = [sys.executable, "-c", "import sys; sys.stdin.read()", *more]
+    return subprocess.Popen(command, stdin=subprocess.PIPE)
+
+
+@pytest.fixture
+def process() -> Iterator[subprocess.Popen[bytes]]:
+    made = waits("-m", MODULES[0])
+    yield made
+    made.kill()
+    made.communicate()
+
+
+def test_a_process_that_was_started_here_is_ours(process: subprocess.Popen[bytes]) -> None:
+    known = Processes(MODULES, lambda: [process.pid])
+    assert known.is_ours(Identity("n", "Turtle", HERE, process.pid))
+    assert known.is_ours(Identity("n", "Turtle", HERE, os.getpid()))
+
+
+def test_a_process_that_only_names_the_module_is_not(process: subprocess.Popen[bytes]) -> None:
+    assert not Processes(MODULES).is_ours(Identity("n", "Turtle", HERE, process.pid))
+
+
+def test_who_is_elsewhere_or_nowhere_is_not(process: subprocess.Popen[bytes]) -> None:
+    known = Processes(MODULES, lambda: [process.pid])
+    assert not known.is_ours(Identity("n", "Turtle", "another-computer", process.pid))
+    assert not known.is_ours(Identity("n", "Turtle", HERE, None))
+    assert not known.is_ours(Identity("n", "Turtle", HERE, 2**31 - 1))
+    assert not known.is_ours(Identity("n", "Turtle", HERE, 1))
+
+
+def test_a_virtual_robot_of_another_studio_of_this_person_is_ours(master: Master) -> None:
+    command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle", "--owner-pid", str(os.getpid())]
+    made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
+    try:
+        assert Processes(MODULES).is_ours(Identity("n", "Turtle", HERE, made.pid))
+        assert not Processes(("app.robots.simulated",)).is_ours(Identity("n", "Turtle", HERE, made.pid))
+    finally:
+        made.terminate()
+        made.wait(10)
+
+
+def test_whether_a_process_has_ended_is_known_of_this_computer_only(
+    process: subprocess.Popen[bytes],
+) -> None:
+    known = Processes(MODULES)
+    identity = Identity("n", "Turtle", HERE, process.pid)
+    assert not known.has_ended(identity)
+    process.kill()
+    psutil.Process(process.pid).wait(10)
+    assert known.has_ended(identity)
+    assert not known.has_ended(replace(identity, host="another-computer"))
+    assert not known.has_ended(replace(identity, pid=None))
+
+
+# ---- the question --------------------------------------------------------------------------------------
+
+STRANGE = Identity("1", "rover driver", "lab-2", 7)
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Fleet:
+    watches = Watches(lambda _topic: None, lambda _topic: None)
+    return Fleet(watches, lambda _what, _job: None, settings=Settings(tmp_path), processes=Processes(MODULES))
+
+
+def turtle(*, virtual: bool = True) -> Robot:
+    return replace(parse(td_for(ROBOT.thing_model, "Turtle")), virtual=virtual)
+
+
+def asks(fleet: Fleet) -> bool:
+    """Whether a person is asked before it moves."""
+    try:
+        fleet.invoke("Turtle", "move", {"distance": 0.1})
+    except MayNotMoveError:
+        return True
+    return False
+
+
+def test_a_stranger_that_says_that_it_is_virtual_is_asked_about(fleet: Fleet) -> None:
+    fleet.join(turtle(), "/Turtle/description", STRANGE)
+    link = fleet.link("Turtle")
+    assert link is not None
+    assert (link.virtual, link.robot.virtual, link.chip) == (False, False, "ready")
+    assert asks(fleet)
+
+
+def test_a_real_robot_that_says_that_it_is_virtual_now_is_asked_about(fleet: Fleet) -> None:
+    mine = Identity("1", "Turtle", HERE, os.getpid())
+    fleet.join(turtle(), "/Turtle/description", mine)
+    assert not asks(fleet)
+    fleet.join(turtle(virtual=False), "/Turtle/description", mine)
+    assert asks(fleet)
+    fleet.join(turtle(virtual=True), "/Turtle/description", mine)
+    assert asks(fleet)
+
+
+def test_a_yes_is_for_this_program_and_always_for_its_computer(fleet: Fleet, tmp_path: Path) -> None:
+    fleet.join(turtle(virtual=False), "/Turtle/description", STRANGE)
+    assert asks(fleet)
+    fleet.moving.answer(let=True)
+    assert not asks(fleet)
+    fleet.join(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # started anew
+    assert asks(fleet)
+    fleet.moving.answer(let=True, always=True)
+    fleet.join(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="3"))
+    assert not asks(fleet)
+    for other in (replace(STRANGE, host="evil"), replace(STRANGE, node="evil")):
+        fleet.join(turtle(virtual=False), "/Turtle/description", other)
+        assert asks(fleet)
+    kept = Moving(Settings(tmp_path), lambda _name: STRANGE)
+    assert kept.allowed(turtle(virtual=False))
+    assert not Moving(Settings(tmp_path)).allowed(turtle(virtual=False))
+
+
+def test_a_strangers_virtual_robot_on_the_network_is_asked_about(session: Session, master: Master) -> None:
+    environment = {**os.environ, "NEP_MASTER": master.address}
+    made = subprocess.Popen([sys.executable, "-c", STRANGER], stdin=subprocess.PIPE, env=environment)
+    try:
+        tick_until(session, lambda: session.fleet.link("Turtle"), 30.0)
+        link = session.fleet.link("Turtle")
+        assert link is not None
+        assert not link.virtual
+        assert asks(session.fleet)
+        assert session.fleet.moving.question is not None
+    finally:
+        made.communicate()
