@@ -211,7 +211,7 @@ class Fleet:
         """A person says that these robots stand still."""
         for link in map(self._links.get, names):
             if link is not None:
-                link.not_stopped = ""
+                link.not_stopped, link.earlier = "", ()
 
     def take_settled(self) -> tuple[str, ...]:
         """The robots that were not stopped and have ended now, as they say, what would not end; once each."""
