@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import select
+import selectors
 import sys
 import threading
 from pathlib import Path
@@ -268,3 +270,89 @@ def test_the_largest_gap_that_can_be_is_counted() -> None:
     assert sources.arrived(1, 1, is_alone=False)
     assert sources.arrived(1, 1 + 2**32, is_alone=False)
     assert sources.lost == 2**32 - 1
+
+
+class Trap(selectors.DefaultSelector):
+    """Polls, until somebody breaks it: then it says what a system says of a descriptor that was closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_broken = False
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        if self.is_broken:
+            raise OSError(errno.EBADF, "Bad file descriptor")
+        return super().select(timeout)
+
+
+def test_the_io_thread_outlives_errors_of_its_poll(caplog: pytest.LogCaptureFixture) -> None:
+    made: list[Trap] = []
+
+    def new_selector() -> Trap:
+        if len(made) == 1:
+            made.append(Trap())
+            raise OSError(errno.EMFILE, "Too many open files")
+        made.append(Trap())
+        return made[-1]
+
+    io = IoThread("nep-io-test", new_selector)
+    io.start()
+    bell = Bell([])
+    io.add(bell)
+    assert bell.served.acquire(timeout=5.0)
+    made[0].is_broken = True
+    io.serve_soon(bell)
+    assert bell.served.acquire(timeout=5.0)
+    assert bell.served.acquire(timeout=5.0)  # by the new poll, the second that was tried
+    bell.waker.wake()
+    assert bell.served.acquire(timeout=5.0)
+    io.remove(bell)
+    io.close()
+    bell.waker.close()
+    assert "could not be polled; they are polled anew" in caplog.text
+    for each in made:
+        each.close()
+
+
+def test_what_cannot_be_polled_is_served_each_second_and_the_others_at_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    io = IoThread("nep-io-test")
+    io.start()
+    bad, fine = Bell([]), Bell([])
+    bad.fd = 1_000_000
+    io.add(bad)
+    io.add(fine)
+    for _ in range(2):
+        assert bad.served.acquire(timeout=5.0)
+    assert fine.served.acquire(timeout=5.0)
+    fine.waker.wake()
+    assert fine.served.acquire(timeout=5.0)
+    io.close()
+    assert "a socket cannot be polled" in caplog.text
+    for each in (bad, fine):
+        each.waker.close()
+
+
+def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
+    io = IoThread("nep-io-test")
+    held, let_go = threading.Event(), threading.Event()
+
+    class Slow(Bell):
+        def serve(self, now: float) -> Rest:
+            held.set()
+            let_go.wait(20.0)
+            return super().serve(now)
+
+    io.start()
+    slow = Slow([])
+    io.add(slow)
+    assert held.wait(5.0)
+    others = [Bell([]) for _ in range(100)]
+    io.remove(others[0], 0.05)
+    for other in others[1:]:
+        io.remove(other, 30.0)  # pytest's time-out would end the test
+    let_go.set()
+    io.close()
+    for each in (slow, *others):
+        each.waker.close()
