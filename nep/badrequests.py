@@ -13,6 +13,8 @@ __all__ = ["BadRequests", "who_sends"]
 
 _logger = logging.getLogger("nep.master")
 _LOGGED = frozenset(10**n for n in range(20))
+_LINES, _LINES_A_S = 10.0, 0.2
+"""So many lines of log at once, and so many a second after them: each connection may be another sender."""
 _SENDERS = 100
 """So many senders are remembered; beyond that the one that was quiet for longest is forgotten."""
 _SHOWN = 5
@@ -41,14 +43,18 @@ class BadRequests:
         self._senders: OrderedDict[str, _Sender] = OrderedDict()
         self._alerts: tuple[Alert, ...] = ()
         self._told_at = 0.0
+        self._may_log, self._counted_at = _LINES, 0.0
 
     def add(self, sender: str, name: str, reason: str, now: float) -> None:
-        """One more of `sender`, in words `name`. Logged: the first, the tenth, the hundredth, ..."""
+        """One more of `sender`, in words `name`. Logged: the first, the tenth, ... of each."""
         known = self._senders.pop(sender, None) or _Sender(name)
         self._senders[sender] = known
         known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _LONGEST)), now
         known.count += 1
-        if known.count in _LOGGED:
+        self._may_log = min(_LINES, self._may_log + (now - self._counted_at) * _LINES_A_S)
+        self._counted_at = now
+        if known.count in _LOGGED and self._may_log >= 1.0:
+            self._may_log -= 1.0
             _logger.warning("%s", _sentence(known))
         while len(self._senders) > _SENDERS:
             self._senders.popitem(last=False)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from nep.collecting import collecting_later
 from nep.errors import WireError
-from nep.packing import pack_surely, unpack
+from nep.packing import pack_surely, unpack, unpack_first
 from nep.plain import read, write
 from nep.requests import (
     Added,
@@ -67,6 +67,8 @@ _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
 _ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
 
 _LARGE_BYTES = 50_000
+_VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
+"""How an answer with a graph begins that `ViewPacker` made."""
 
 
 class Asked(NamedTuple):
@@ -101,6 +103,20 @@ def decode_request(body: bytes) -> Asked:
 def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
     """The body of a reply to `call`, or of a push."""
     return pack_surely({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
+
+
+def call_of_view(body: bytes) -> int | None:
+    """The number of the call that a body answers with a graph; None when it is another answer, or unusual.
+
+    It takes no time, while decoding a graph of thousands of topics takes a tenth of a second.
+    """
+    if not body.startswith(_VIEW_BEGINS):
+        return None
+    try:
+        number = unpack_first(body[len(_VIEW_BEGINS) : len(_VIEW_BEGINS) + 9])
+    except ValueError:
+        return None
+    return number if isinstance(number, int) and number > 0 else None
 
 
 def decode_answer(body: bytes) -> tuple[int, Reply | Push]:

@@ -90,7 +90,10 @@ class Census:
         self.publishers_revision = 0
         """The revision at which the publishers of some topic changed last."""
         self.touched: set[str] = set()
-        """Topics of which something has changed, also a count, since whoever looks emptied this."""
+        """Topics of which something has changed, also a count, since whoever looks emptied this.
+
+        Names that nobody uses any more leave nothing behind: a program may use a new one every second.
+        """
         self._topic_revisions: dict[str, int] = {}
         self._publishing: dict[str, dict[int, Member]] = {}
         self._subscribing: dict[str, dict[int, Member]] = {}
@@ -206,6 +209,7 @@ class Census:
         self.publisher_owners.pop(publisher, None)
         _take_out(self._publishing, gone.record.topic, publisher)
         self._changed(gone.record.topic)
+        self._forget_unused(gone.record.topic)
         return gone.record
 
     def remove_subscriber(self, node_id: str, subscriber: int) -> None:
@@ -217,6 +221,13 @@ class Census:
             _take_out(self._subscribing, gone.record.topic, subscriber)
             self.touched.add(gone.record.topic)
             self.revision += 1
+            self._forget_unused(gone.record.topic)
+
+    def _forget_unused(self, topic: str) -> None:
+        """Forget what was noted of a topic that nobody publishes or subscribes: who comes is told all."""
+        if topic not in self._publishing and topic not in self._subscribing:
+            self.touched.discard(topic)
+            self._topic_revisions.pop(topic, None)
 
     def forget(self, node_id: str) -> None:
         """Unlist a node with all that it has."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import time
 from collections.abc import Callable
+from typing import cast
 
 import zmq
 
@@ -16,6 +17,9 @@ __all__ = ["MasterPort"]
 
 REQUEST_MAX_BYTES = 8 * 2**20
 """Whoever sends more in one part is disconnected."""
+UNREAD_MAX_BYTES = 32 * 2**20
+"""So much is kept for a program that asks for graphs and does not read them, in bodies of 4 kB and more."""
+_LARGE_BYTES = 4096
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
 _FILES = 16
 _RETURN_S = 0.5
@@ -45,6 +49,7 @@ class MasterPort:
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
         self.socket.setsockopt(zmq.SNDHWM, 10_000)
+        self.socket.copy_threshold = _LARGE_BYTES
         self.socket.setsockopt(zmq.MAXMSGSIZE, REQUEST_MAX_BYTES)
         try:
             self.socket.bind(endpoint_of(address))
@@ -58,6 +63,8 @@ class MasterPort:
         self._ended: dict[bytes, float] = {}
         """Whose connection has ended, and when."""
         self._newest: zmq.Frame | None = None
+        self._unread: dict[bytes, list[tuple[zmq.MessageTracker, int]]] = {}
+        """The large bodies on their way to each connection."""
 
     def receive(self) -> list[bytes]:
         """The parts of a request, who asks first. Raises `zmq.Again` when there is none."""
@@ -90,6 +97,9 @@ class MasterPort:
 
     def ended(self, now: float) -> list[bytes]:
         """Whose connection ended a moment ago, each once; they may have another one by now."""
+        sent = [each for each, unread in self._unread.items() if all(one.done for one, _size in unread)]
+        for route in sent:
+            del self._unread[route]
         while self._monitor is not None:
             try:
                 event = self._monitor.recv_multipart(_DONTWAIT)[0]
@@ -104,10 +114,21 @@ class MasterPort:
         return ended
 
     def send(self, to: bytes, body: bytes) -> bool:
-        """Send a body; False when its node has no connection any more."""
+        """Send a body; False when its node has no connection any more.
+
+        Large ones are left out while `UNREAD_MAX_BYTES` of them have not been read.
+        """
         try:
+            if len(body) < _LARGE_BYTES:
+                self._send(to, _SNDMORE | _DONTWAIT)
+                self._send(body, _DONTWAIT)
+                return True
+            unread = [each for each in self._unread.get(to, ()) if not each[0].done]
+            if sum(size for _tracker, size in unread) + len(body) > UNREAD_MAX_BYTES and unread:
+                return True
             self._send(to, _SNDMORE | _DONTWAIT)
-            self._send(body, _DONTWAIT)
+            tracker = cast("zmq.MessageTracker", self._send(body, _DONTWAIT, False, True))
+            self._unread[to] = [*unread, (tracker, len(body))]
         except zmq.Again:
             pass  # it does not read; its next renewal tells it what it missed
         except zmq.ZMQError as error:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import msgpack  # type: ignore[import-untyped]
 
-__all__ = ["pack", "pack_surely", "saturated", "unpack"]
+__all__ = ["pack", "pack_surely", "saturated", "unpack", "unpack_first"]
 
 _LEAST, _MOST = -(2**63), 2**64 - 1
 
@@ -75,3 +75,14 @@ def _map(pairs: list[tuple[object, object]]) -> dict[object, object]:
 
 def _hashable(key: object) -> object:
     return tuple(map(_hashable, key)) if isinstance(key, list) else key
+
+
+def unpack_first(data: bytes) -> object:
+    """The first of the values in `data`. Raises `ValueError` when there is no whole one."""
+    unpacker = msgpack.Unpacker(raw=False, strict_map_key=False)
+    unpacker.feed(data)
+    try:
+        value: object = unpacker.unpack()
+    except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
+        raise ValueError(str(error) or "the bytes end too early") from error
+    return value

@@ -33,6 +33,10 @@ class Viewer:
             self._alerts.pop(name, None)
         touched.clear()
         known = self._topics
+        if len(known) > len(names) or not known.keys() <= set(names):
+            for gone in known.keys() - set(names):
+                del known[gone]
+                self._alerts.pop(gone, None)
         for name in names:
             if name not in known:
                 publishing, subscribing = census.publishing(name), census.subscribers_of(name)

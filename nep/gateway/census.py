@@ -67,13 +67,24 @@ class Census:
     def forget_the_gone(self) -> bool:
         """Take out who is no more: its process ended, or it was joined and closed its connections."""
         gone = {registration for registration in self._known.registrations if self._is_gone(registration)}
+        self._forget(gone)
+        return bool(gone)
+
+    def _forget(self, gone: set[Registration]) -> None:
         if gone:
             self._known.remove(gone)
             self._was_joined -= gone
             for registration in gone:
                 self._roles.pop(registration, None)
                 self._openings.pop(registration, None)
-        return bool(gone)
+
+    def make_room(self) -> bool:
+        """Forget the oldest program that asked and never came; whether there was one."""
+        for registration in self._known.registrations:
+            if not self._roles.get(registration):
+                self._forget({registration})
+                return True
+        return False
 
     def programs(self) -> tuple[Program, ...]:
         """The original nodes that are there, each with what it does."""

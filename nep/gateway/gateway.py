@@ -25,6 +25,8 @@ _LOOK_S = 1.0
 """How often programs that ended are looked for, and taken ports are tried again."""
 _MAX_SOCKETS = 8192
 _PAUSE_S = 0.2
+_PROGRAMS_MAX = 2000
+"""So many programs and topics are remembered: everything asked is written to the file again."""
 _logger = logging.getLogger("nep.gateway")
 
 
@@ -206,6 +208,8 @@ class Gateway:
         if line.is_service:
             line = Line(request.topic, "bare", codec, "many2many")
         base = self._port_for(line)
+        if len(self._known.registrations) >= _PROGRAMS_MAX and not self._census.make_room():
+            raise RequestError(f"{_PROGRAMS_MAX} programs have asked already", line.topic)
         registration = self._registration(request, line)
         self._known.add(registration)
         self._census.expect(registration)

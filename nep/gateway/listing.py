@@ -15,6 +15,7 @@ from nep.gateway.relay import Key
 from nep.load import CpuLoad
 from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
 from nep.requests import Join, Leave, Renew, Reply, Request
+from nep.text import escaped, shortened
 from nep.wire import check_topic
 
 _LANGUAGES = {
@@ -24,6 +25,7 @@ _LANGUAGES = {
     "java": "Java",
     "matlab": "MATLAB",
 }
+_NAME_MAX = 100
 
 
 @dataclass
@@ -103,10 +105,12 @@ class Listing:
         language = program.language or ""
         node = NodeRecord(
             program.node_id,
-            program.name,
+            shortened(
+                escaped(program.name), _NAME_MAX
+            ),  # cleaned, for an original cannot be told to change it
             socket.gethostname(),
             program.pid,
-            _LANGUAGES.get(language, language),
+            _LANGUAGES.get(language, escaped(language)),
             program.generation,
             since_ns,
         )
@@ -150,7 +154,8 @@ def _type(link: Link) -> str:
 def _id(program: Program, link: Link) -> int:
     """A number for a publisher or subscriber that has none of its own; the same after a restart."""
     text = f"{program.node_id}\0{link.role}\0{link.topic}\0{link.codec}"
-    return int.from_bytes(blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest(), "big")
+    digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest()
+    return int.from_bytes(digest, "big") >> 1 or 1
 
 
 def _is_topic(name: str) -> bool:

@@ -17,9 +17,11 @@ from nep.image_files import examine
 from nep.message import Message
 from nep.nodes import Node
 from nep.pubsub import Publisher, Subscriber
+from nep.text import escaped
 
 _AGAIN_S = 1.0
 """A topic that could not be joined is tried again after this: trying costs the gateway's thread time."""
+_ALERTS_MAX = 200
 _Made = TypeVar("_Made", Publisher, Subscriber)
 
 
@@ -121,7 +123,9 @@ class Native:
                 self._node = self._make_node()
             made = make(self._node)
         except NepError as error:
-            self._again_at[topic] = time.monotonic() + _AGAIN_S
+            now = time.monotonic()
+            self._again_at = {each: at for each, at in self._again_at.items() if at > now}
+            self._again_at[topic] = now + _AGAIN_S
             why, hint = str(error), ""
             if isinstance(error, BadTopicError):
                 why, hint = error.reason, "Give the topic another name."
@@ -149,8 +153,8 @@ class Native:
 
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
         """See `Alerts`."""
-        alert = Alert(id, sentence, hint)
-        if self._alerts.get(id) != alert:
+        alert = Alert(escaped(id), escaped(sentence), escaped(hint))
+        if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _ALERTS_MAX):
             self._alerts[id] = alert
             self._report(tuple(self._alerts.values()))
 

@@ -22,6 +22,8 @@ _QUEUE_OF_PICTURES = 20
 _LINGER_MS = 200
 _LARGEST_BYTES = 2**28
 _LARGEST_FILTER_BYTES = 2**16
+_FILTERS_MAX = 1000
+"""An original sets one or two; more than these are not looked at."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ class Pair:
                 note = self.outgoing.recv(zmq.NOBLOCK)
             except zmq.Again:
                 return before != self.filters
-            if note[:1] == b"\x01":
+            if note[:1] == b"\x01" and len(self.filters) < _FILTERS_MAX:
                 self.filters.add(note[1:])
             elif note[:1] == b"\x00":
                 self.filters.discard(note[1:])

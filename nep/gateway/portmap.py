@@ -14,6 +14,7 @@ from typing import get_args
 from nep.gateway.framing import Framing
 from nep.gateway.requests import Mode
 from nep.replacing import replace_file
+from nep.text import escaped
 
 FIRST_PORT = 9000
 LAST_PORT = 9998
@@ -55,7 +56,7 @@ class Registration:
     @property
     def node_id(self) -> str:
         """Tells nodes apart, also those of one name."""
-        return f"original:{self.node}:{self.pid if self.pid is not None else '-'}"
+        return f"original:{escaped(self.node)}:{self.pid if self.pid is not None else '-'}"
 
 
 class PortMap:

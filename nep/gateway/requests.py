@@ -153,6 +153,8 @@ def _choice(
     value = fields.get(key, default)
     if not isinstance(value, str):
         raise RequestError(f"the request has no '{key}'", topic)
+    if len(value) > MAX_NAME_BYTES:
+        raise RequestError(f"the '{key}' of the request has {len(value)} letters", topic)
     if known is not None and value not in known:
         raise RequestError(f"no {key} '{value[:40]}'; one of {', '.join(sorted(known))}", topic)
     return value

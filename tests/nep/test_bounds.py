@@ -1,173 +1,240 @@
-"""Bounds in bytes of real processes: what one does not read grows nowhere, and every loss is counted."""
+"""What the network can make grow has a bound: tables of the master, of a node's link and of the gateway."""
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
+import logging
+import threading
 from collections.abc import Iterator
+from types import SimpleNamespace
 
-import psutil
 import pytest
 import zmq
 
-import nep
-from nep.backends.native.window import WINDOW_BYTES
-from nep.masters import Master
-from tests.nep.programs import Program, eventually, running
+from nep import bodies
+from nep.backends.native.calls import Calls
+from nep.badrequests import BadRequests
+from nep.census import Census
+from nep.gateway.census import Census as GatewayCensus
+from nep.gateway.census import Link, Program
+from nep.gateway.framing import PORT_A
+from nep.gateway.listing import Listing
+from nep.gateway.native import Native
+from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.requests import RequestError, read_request
+from nep.graph import Graph
+from nep.masterport import MasterPort
+from nep.records import NodeRecord, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.requests import AddPublisher, Done, Join, Look, Ping, Renew, Renewed, Seen, TopicPublishers
+from nep.text import control_in
+from nep.viewing import Viewer
+from nep.views import GraphView, TopicInfo
+from tests.nep.programs import eventually
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot stop a process")
 
-HUGE = 6_220_800
-"""A picture of 1920 x 1080."""
-MB = 2**20
-MOST = WINDOW_BYTES + 64 * MB
-"""What a process may grow by; the second part is for one batch of a sink, or what Python does beside."""
+def census_with_node() -> Census:
+    census = Census()
+    census.meet(NodeRecord("n", "N", "host", 1), 0.0)
+    return census
 
-SUBSCRIBER = """
-import sys, threading, nep
-is_over = threading.Event()
-def busy(messages):
-    is_over.wait()
-with nep.node("subscriber", master=sys.argv[1]) as node:
-    sinks = {"busy": busy, "quick": lambda messages: None}
-    sub = node.new_sub("t", "bytes", sink=sinks.get(sys.argv[2]))
-    print("ready")
-    for line in sys.stdin:
-        if line == "on\\n":
-            is_over.set()
-        elif line == "take\\n":
-            print(sum(1 for _ in iter(lambda: sub.receive(1.0), None)))
-        print(sub.received, sub.lost)
-"""
+
+def test_names_of_topics_that_nobody_uses_leave_nothing_behind() -> None:
+    census = census_with_node()
+    member, viewer = census.members["n"], Viewer(census)
+    for n in range(20_000):
+        census.add_publisher(member, PublisherRecord(1, f"/p{n}", "json", "json", ("tcp://h:1",)))
+        census.add_subscriber(member, SubscriberRecord(2, f"/s{n}", "json"))
+        if n % 1000 == 500:
+            assert set(viewer.view(7).topics) == {f"/p{n}", f"/s{n}"}
+            assert len(viewer._topics) == 2
+        census.remove_publisher("n", 1)
+        census.remove_subscriber("n", 2)
+    assert (census.touched, census._topic_revisions) == (set(), {})
+    assert (census.publisher_owners, census.subscriber_owners) == ({}, {})
+    assert viewer.view(7).topics == {}
+    assert (viewer._topics, viewer._alerts) == ({}, {})
+
+
+def test_a_topic_that_comes_again_between_two_looks_is_looked_at_again() -> None:
+    census = census_with_node()
+    member, viewer = census.members["n"], Viewer(census)
+    census.add_publisher(member, PublisherRecord(1, "/t", "json", "json"))
+    assert viewer.view(7).topics["/t"].msg_type == "json"
+    census.remove_publisher("n", 1)
+    census.add_publisher(member, PublisherRecord(1, "/t", "image", "image"))
+    assert viewer.view(7).topics["/t"].msg_type == "image"
+
+
+def test_who_renews_is_told_of_a_topic_whose_last_publisher_went() -> None:
+    graph = Graph(epoch=7, now=0.0, learn_s=0.0)
+    subscriber, publisher = SubscriberRecord(2, "/t", "json"), PublisherRecord(1, "/t", "json", "json")
+    graph.apply(Join(NodeRecord("s", "S", "h", 1), 0, (), (subscriber,)), 1, 0.0, "s")
+    revision = graph.revision
+    graph.apply(AddPublisher(NodeRecord("p", "P", "h", 1), publisher), 1, 0.0, "p")
+    graph.drop(["p"])
+    (reply,) = graph.apply(Renew("s", 7, revision, (), (SubscriberCount(2, 0, 0),)), 1, 0.5, "s")
+    assert isinstance(reply.answer, Renewed)
+    assert reply.answer.topics == (TopicPublishers("/t", ()),)
+
+
+def test_a_flood_of_new_senders_is_logged_rarely(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.WARNING, "nep.master")
+    bad = BadRequests()
+    for n in range(10_000):
+        bad.add(f"{n}", f"S{n}", "reason", 100.0 + n / 1000)
+    assert len(caplog.records) <= 13
 
 
 @pytest.fixture
-def node(master: Master) -> Iterator[nep.Node]:
-    with nep.node("publisher", master=master.address) as made:
-        yield made
-
-
-@pytest.fixture
-def publisher(node: nep.Node) -> nep.Publisher:
-    return node.new_pub("t", "bytes")
-
-
-def rss(pid: int) -> int:
-    return int(psutil.Process(pid).memory_info().rss)
-
-
-def subscribed(program: Program) -> Program:
-    assert program.line() == "ready"
-    return program
-
-
-def publish_huge(publisher: nep.Publisher, count: int) -> int:
-    """Publish so many, each in memory of its own; the most that this process grew by."""
-    before = most = rss(os.getpid())
-    for number in range(count):
-        publisher.publish(bytes([number % 256]) * HUGE)
-        most = max(most, rss(os.getpid()))
-    return most - before
-
-
-def told(program: Program) -> tuple[int, int]:
-    """What it received, and what it lost."""
-    program.say("tell")
-    received, lost = program.line().split()
-    return int(received), int(lost)
-
-
-def is_all_counted(program: Program, count: int) -> bool:
-    return sum(told(program)) == count
-
-
-def test_a_stopped_subscriber_costs_its_publisher_no_more_and_counts_what_it_missed(
-    publisher: nep.Publisher, master: Master
-) -> None:
-    with running(SUBSCRIBER, master.address, "idle") as stopped:
-        subscribed(stopped)
-        for _ in range(1000):
-            publisher.publish(b"small")
-        stopped.stop()
-        assert publish_huge(publisher, 80) < MOST
-        stopped.signal(signal.SIGCONT)
-        eventually(lambda: is_all_counted(stopped, 1080), 20.0)
-
-
-def test_a_busy_sink_costs_its_own_program_no_more(publisher: nep.Publisher, master: Master) -> None:
-    with running(SUBSCRIBER, master.address, "busy") as busy:
-        subscribed(busy)
-        before = rss(busy.process.pid)
-        for _ in range(100):  # fewer than its socket takes: the huge ones go there, too
-            publisher.publish(b"small")
-        grown = []
-
-        def has_settled() -> bool:  # a second without growing
-            grown.append(rss(busy.process.pid) - before)
-            return len(grown) > 100 and max(grown[-100:]) - min(grown[-100:]) < MB
-
-        publish_huge(publisher, 80)
-        eventually(has_settled, 20.0)
-        assert 100 * MB < max(grown) < MOST
-        busy.say("on")
-        busy.line()
-        eventually(lambda: is_all_counted(busy, 180), 20.0)
-        assert rss(busy.process.pid) - before < MOST
-
-
-def test_one_that_is_stopped_takes_nothing_from_the_others(publisher: nep.Publisher, master: Master) -> None:
-    with (
-        running(SUBSCRIBER, master.address, "idle") as stopped,
-        running(SUBSCRIBER, master.address, "quick") as quick,
-    ):
-        subscribed(stopped)
-        subscribed(quick)
-        stopped.stop()
-        for number in range(80):
-            publisher.publish(bytes([number]) * HUGE)
-            if number % 10 == 9:
-                eventually(lambda: is_all_counted(quick, publisher.count), 20.0)
-        assert told(quick) == (80, 0)
-        stopped.signal(signal.SIGCONT)
-        eventually(lambda: is_all_counted(stopped, 80), 20.0)
-        assert told(stopped)[1] >= 80 - WINDOW_BYTES // HUGE - 1  # its own were bounded
-        publisher.publish(b"for both again")
-        for each in (quick, stopped):
-            eventually(lambda each=each: is_all_counted(each, 81), 20.0)  # type: ignore[misc]
-
-
-def test_a_burst_of_thirty_pictures_is_not_lost_even_if_its_reader_is_late(
-    publisher: nep.Publisher, master: Master
-) -> None:
-    with running(SUBSCRIBER, master.address, "idle") as late:
-        subscribed(late)
-        publisher.publish(b"x" * 8_000_000)  # what came first decides nothing
-        eventually(lambda: is_all_counted(late, 1), 20.0)
-        late.stop()
-        publish_huge(publisher, 30)
-        late.signal(signal.SIGCONT)
-        late.say("take")
-        assert late.line() == "31"
-        assert late.line() == "31 0"
-
-
-def test_who_says_no_hello_and_reads_nothing_takes_nothing_from_those_who_do(
-    node: nep.Node, publisher: nep.Publisher, master: Master
-) -> None:
-    """It could be asked nothing: what libzmq holds for it is counted."""
+def pair() -> Iterator[SimpleNamespace]:
+    """A node's calls, and the socket of its master."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    with context.socket(zmq.SUB) as other, running(SUBSCRIBER, master.address, "quick") as quick:
-        subscribed(quick)
-        other.linger, other.rcvhwm = 0, 1
-        other.setsockopt(zmq.SUBSCRIBE, b"t\0")
-        other.connect(node.graph().topics["t"].publishers[0].endpoints[0])
-        eventually(lambda: publisher.publish(b"small") is None and bool(other.poll(10)))
-        grown, before = 0, rss(os.getpid())
-        for _ in range(8):
-            publish_huge(publisher, 10)
-            grown = max(grown, rss(os.getpid()) - before)
-            eventually(lambda: is_all_counted(quick, publisher.count), 20.0)
-        assert grown < MOST
-        assert told(quick)[1] == 0
+    router = context.socket(zmq.ROUTER)
+    port = router.bind_to_random_port("tcp://127.0.0.1")
+    calls = Calls(context.socket(zmq.DEALER), f"127.0.0.1:{port}", lambda: None)
+    yield SimpleNamespace(router=router, calls=calls)
+    calls.release()
+    router.close(0)
     context.term()
+
+
+def test_who_asks_for_a_graph_decodes_it_and_not_the_nodes_thread(pair: SimpleNamespace) -> None:
+    asked = pair.calls.begin(Look())
+    eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
+    sender, body = pair.router.recv_multipart()
+    topics = {f"/t{n}": TopicInfo(f"/t{n}", "json", "json") for n in range(3)}
+    seen = Seen(7, 1, GraphView(7, 1, {}, topics))
+    pair.router.send_multipart([sender, bodies.encode_answer(seen, bodies.decode_request(body).call)])
+    eventually(lambda: pair.calls.read() == [] and asked.view is not None)
+    assert asked.reply is None  # nothing was decoded yet
+    assert pair.calls.wait(asked, 1.0) == seen
+
+
+def test_a_graph_that_nobody_waits_for_any_more_is_not_decoded(pair: SimpleNamespace) -> None:
+    pair.calls.begin(Ping())
+    eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
+    sender, _body = pair.router.recv_multipart()
+    pair.router.send_multipart([sender, bodies.encode_answer(Seen(7, 1, GraphView(7, 1)), 12345)])
+    pair.router.send_multipart([sender, bodies.encode_answer(Done(7, 1), 1)])
+    answers: list[object] = []
+    eventually(lambda: bool(answers.extend(pair.calls.read()) or answers))
+    assert [type(each.what) for each in answers] == [Done]  # type: ignore[attr-defined]
+
+
+def test_many_pushes_are_read_in_slices(pair: SimpleNamespace) -> None:
+    pair.calls.begin(Ping())
+    eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
+    sender, _body = pair.router.recv_multipart()
+    for _ in range(120):
+        pair.router.send_multipart([sender, bodies.encode_answer(Renewed(7, 1))])
+    sizes: list[int] = []
+
+    def read() -> bool:
+        sizes.append(len(pair.calls.read()))
+        assert pair.calls.has_more == (sizes[-1] == 50)
+        return sum(sizes) == 120
+
+    eventually(read)
+    assert max(sizes) <= 50
+
+
+def test_who_asks_for_graphs_and_reads_none_costs_the_master_no_memory_without_end() -> None:
+    port = MasterPort("127.0.0.1:0")
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    with context.socket(zmq.DEALER) as socket:
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.setsockopt(zmq.RCVHWM, 1)
+        socket.connect(f"tcp://{port.address}")
+        socket.send(b"look")
+        assert port.socket.poll(5000)
+        sender, _body = port.receive()
+        graph = b"x" * 2**20
+        for _ in range(500):
+            assert port.send(sender, graph)
+        assert len(port._unread[sender]) <= 32
+        assert port.send(sender, b"small")  # the rest of its answers still go out
+        got = 0
+        while socket.poll(500):
+            got += len(socket.recv()) == len(graph)
+        assert 32 <= got < 200
+        eventually(lambda: port.ended(0.0) == [] and not port._unread)
+        assert port.send(sender, graph)
+        assert socket.poll(5000)
+    context.term()
+    port.close()
+
+
+CONTROLS = "Arm\x1b[2J\u202e\n\u2028"
+
+
+def test_names_of_originals_are_cleaned_and_cut_for_they_cannot_be_told_to_change_them() -> None:
+    graph = Graph(epoch=7, now=0.0, learn_s=0.0)
+    listing = Listing(lambda request: graph.apply(request, -1, 0.0, "")[-1].answer, 7)  # type: ignore[arg-type, return-value]
+    line = Line("t", "bare", "json", "many2many")
+    registration = Registration(line, CONTROLS, "publisher", "json", "A", None, None, None)
+    link = Link("t", "json", "json", "publisher")
+    listing.show((Program(registration.node_id, CONTROLS * 100, None, "A", "\x1b]0;x\x07", (link,)),))
+    (node,) = graph.view().nodes.values()
+    assert not any(map(control_in, (node.id, node.name, node.language)))
+    assert node.name.startswith("Arm\\x1b[2J\\u202e\\n\\u2028Arm")
+    assert len(node.name) < 200
+    assert all(0 < each.id < 2**63 for each in graph.view().topics["t"].publishers)
+
+
+def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
+    told: list[int] = []
+    shown: list[str] = []
+
+    def report(alerts: tuple[object, ...]) -> None:
+        told.append(len(alerts))
+        shown.extend(each.sentence for each in alerts[-1:])  # type: ignore[attr-defined]
+
+    native = Native(lambda: pytest.fail("no node is needed"), Listing(lambda _request: None, 7), report)  # type: ignore[arg-type, return-value]
+    for n in range(1000):
+        native.tell(f"topic:{n}", f"“{n}{CONTROLS}” stays")
+    assert max(told) == 200
+    assert not any(map(control_in, shown))
+    for n in range(1000):
+        native.cure(f"topic:{n}")
+    assert told[-1] == 0
+
+
+def test_who_asked_and_never_came_makes_room() -> None:
+    known = PortMap(None)
+    line = Line("t", "bare", "json", "many2many")
+    processes = SimpleNamespace(started=lambda _pid: None, is_joined=lambda *_a, **_k: None)
+    census = GatewayCensus(known, processes, lambda _line: None)  # type: ignore[arg-type]
+    for n in range(3):
+        known.add(Registration(line, f"n{n}", "publisher", "json", "A", None, None, None))
+    census.look()
+    assert census.make_room()
+    assert [each.node for each in known.registrations] == ["n1", "n2"]
+    assert census.make_room()
+    assert census.make_room()
+    assert not census.make_room()
+
+
+def test_an_original_with_endless_words_is_refused() -> None:
+    request = b'{"node":"n","topic":"t","socket":"publisher","msg_type":"%s"}' % (b"x" * 10_000)
+    with pytest.raises(RequestError, match="has 10000 letters"):
+        read_request(request, PORT_A)
+
+
+def test_a_thread_that_waits_for_a_graph_is_told_when_it_is_unreadable(pair: SimpleNamespace) -> None:
+    asked = pair.calls.begin(Look())
+    eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
+    sender, body = pair.router.recv_multipart()
+    good = bodies.encode_answer(Seen(7, 1, GraphView(7, 1)), bodies.decode_request(body).call)
+    pair.router.send_multipart([sender, good[:-3]])
+    failed: list[str] = []
+
+    def wait() -> None:
+        try:
+            pair.calls.wait(asked, 5.0)
+        except Exception as error:  # noqa: BLE001 - what it raises is what is looked at
+            failed.append(type(error).__name__ + str(error))
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    eventually(lambda: pair.calls.read() == [] and asked.view is not None)
+    thread.join(5.0)
+    assert failed[0].startswith("RequestRefusedErrorthe master's answer cannot be read")

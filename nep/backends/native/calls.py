@@ -15,7 +15,7 @@ import zmq
 from nep.addresses import endpoint_of, is_loopback
 from nep.backends.native.refusals import Refusals
 from nep.backends.native.sockets import Socket, wait_until
-from nep.bodies import decode_answer, encode_request
+from nep.bodies import call_of_view, decode_answer, encode_request
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.requests import Push, Refused, Reply, Request
 
@@ -23,6 +23,8 @@ __all__ = ["Answer", "Asking", "Calls", "Then"]
 
 _logger = logging.getLogger("nep")
 
+_READ_MAX = 50
+"""So many answers are read in one go, then the node's other sockets have their turn."""
 _AGAIN_S = 0.5
 """A request without an answer is sent again after this: it may have gone to a master that ended just then."""
 _MOST_CALLS = 256
@@ -39,6 +41,8 @@ class Asking:
     then: Then | None = None
     reply: Reply | None = None
     is_sent: bool = False
+    view: bytes | None = None
+    """The body of its answer, when that is a graph: who waits for it decodes it."""
 
 
 class Answer(NamedTuple):
@@ -59,6 +63,8 @@ class Calls:
         self._numbers = itertools.count(1)
         self._is_closed = False
         self.refusals = Refusals()
+        self.has_more = False
+        """Whether there was more than `read` returned."""
         self.is_connected = False
         """Whether a master was there when the socket was read last."""
         self._changed = threading.Condition(threading.Lock())
@@ -90,7 +96,7 @@ class Calls:
         with self._changed:
             while not wait_until(
                 self._changed,
-                lambda: call.reply is not None or self._is_closed,
+                lambda: call.reply is not None or call.view is not None or self._is_closed,
                 _left(started, timeout_s),
             ):
                 if timeout_s is not None and time.monotonic() - started >= timeout_s:
@@ -99,21 +105,34 @@ class Calls:
                 call.is_sent = False  # asking twice does no harm
                 self._flush()
                 self._after_use()
+        if call.view is not None:
+            return self._decoded(call.view)
         if call.reply is None:
             raise ClosedError("the node")
         if isinstance(call.reply, Refused):
             raise RequestRefusedError(call.reply.reason)
         return call.reply
 
+    def _decoded(self, view: bytes) -> Reply:
+        """The reply in a body, in the thread of who asked: a graph of thousands of topics takes its time."""
+        try:
+            reply = decode_answer(view)[1]
+        except WireError as error:
+            self._refuse(error)
+            raise RequestRefusedError(f"the master's answer cannot be read: {error.reason}") from error
+        if isinstance(reply, Push):
+            raise RequestRefusedError("the master's answer is none")
+        return reply
+
     def tell(self, request: Request, then: Then | None = None) -> None:
         """Send and do not wait; `then` gets the reply, in the node's thread. Lost when there is no master."""
         self._send(request, is_waited=False, then=then)
 
     def read(self) -> list[Answer]:
-        """All that came; also sends what is still to be sent. For the node's thread."""
+        """What came, `_READ_MAX` at most; also sends what is still to be sent. For the node's thread."""
         answers: list[Answer] = []
         with self._changed:
-            while True:
+            while not (many := len(answers) >= _READ_MAX):
                 events = self._events()
                 if events & zmq.POLLIN:
                     answer = self._read_one()
@@ -121,7 +140,8 @@ class Calls:
                         answers.append(answer)
                 elif not self._flush():  # sending may take in what came meanwhile
                     break
-            self.is_connected = bool(events & zmq.POLLOUT)
+            self.has_more = many
+            self.is_connected = bool(self._events() & zmq.POLLOUT)
         return answers
 
     def stop(self) -> None:
@@ -175,16 +195,18 @@ class Calls:
         return has_sent
 
     def _read_one(self) -> Answer | None:
+        body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
+        asked = call_of_view(body)
+        if asked is not None:
+            looking = self._calls.pop(asked, None)
+            if looking is not None:  # else nobody waits for it any more
+                looking.view = body
+                self._changed.notify_all()
+            return None
         try:
-            number, answer = decode_answer(self._socket.recv_multipart(zmq.DONTWAIT)[-1])
+            number, answer = decode_answer(body)
         except WireError as error:
-            if self.refusals.add(error.reason):
-                _logger.warning(
-                    "the master at '%s' says what nobody understands (%d times so far): %s",
-                    self.address,
-                    self.refusals.count,
-                    error,
-                )
+            self._refuse(error)
             return None
         call = self._calls.pop(number, None)
         if call is None or isinstance(answer, Push):
@@ -192,6 +214,15 @@ class Calls:
         call.reply = answer
         self._changed.notify_all()
         return Answer(answer, call.then)
+
+    def _refuse(self, error: WireError) -> None:
+        if self.refusals.add(error.reason):
+            _logger.warning(
+                "the master at '%s' says what nobody understands (%d times so far): %s",
+                self.address,
+                self.refusals.count,
+                error,
+            )
 
     def _events(self) -> int:
         return 0 if self._socket.closed else int(self._socket.getsockopt(zmq.EVENTS))

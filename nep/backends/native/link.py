@@ -213,7 +213,8 @@ class MasterLink:
         if is_due:
             self._pace.renews(now)
             self._renew()
-        return Rest(due=min(self._pace.due_at, self._follow_at))
+        due = min(self._pace.due_at, self._follow_at)
+        return Rest(due=now if self._calls.has_more else due)
 
     def _follow_addresses(self) -> None:
         """Move publishers when this computer or the master has another address, or files are short."""
