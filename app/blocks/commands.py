@@ -13,6 +13,7 @@ from app.blocks.fleet_search import find_robots
 from app.blocks.network import Network
 from app.blocks.runtime import Runtime
 from nep import node as new_node
+from nep.streams import prepare_streams
 
 __all__ = [
     "add_item", "contains", "each", "fail", "insert_item", "is_known", "item", "join", "join_items", "length",
@@ -69,6 +70,7 @@ STOP_ANSWER_S = 1.0
 
 def run(name: str) -> None:
     """Run all scripts until they end or Ctrl+C; SystemExit with a sentence when a block fails."""
+    prepare_streams()  # what a script writes may have letters that a pipe of Windows has not
     with new_node(f"program {name}") as node:
         found = find_robots(node, LOOK_S)
         for claim in found.claims:

@@ -9,6 +9,7 @@ import typer
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, show_json
 from nep.later import later
+from nep.text import escaped
 
 if TYPE_CHECKING:
     from nep import doctor as doctors
@@ -41,8 +42,8 @@ def _show(found: tuple[doctors.Finding, ...]) -> None:
     is_unicode = (out.encoding or "").lower().startswith("utf")
     signs, arrow = (_SIGNS, "→") if is_unicode else (_PLAIN_SIGNS, "->")
     for each in found:
-        out.print(Text.assemble((f"{signs[each.severity]} ", _STYLES[each.severity]), each.sentence))
+        out.print(Text.assemble((f"{signs[each.severity]} ", _STYLES[each.severity]), escaped(each.sentence)))
         if each.mend:
-            out.print(Text.assemble(f"  {arrow} ", each.mend))
+            out.print(Text.assemble(f"  {arrow} ", escaped(each.mend)))
         if each.command:
-            out.print(Text.assemble("    ", (each.command, "cyan")))
+            out.print(Text.assemble("    ", (escaped(each.command), "cyan")))

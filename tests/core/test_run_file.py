@@ -338,3 +338,33 @@ def test_a_master_whose_name_nobody_knows(saved):
     code, out = run(saved(workspace(started(say("Hi")))), master="nosuchhost.invalid:7781")
     assert code == UNUSABLE
     assert out.startswith("no computer is called 'nosuchhost.invalid' here; ")
+
+
+PROGRAM = """
+from app.blocks.commands import on_start, run, write
+
+@on_start
+def greet():
+    write("\u2013 “😀”")
+
+run("greeting")
+"""
+
+
+def test_a_program_file_writes_into_every_pipe(master, tmp_path):
+    file = tmp_path / "greeting.py"
+    file.write_text(PROGRAM, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, str(file)],
+        capture_output=True,
+        env={
+            **os.environ,
+            "PYTHONPATH": str(Path(__file__).resolve().parents[2]),
+            "PYTHONIOENCODING": "ascii",
+            "PYTHONUTF8": "0",
+        },
+        timeout=30,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.splitlines() == [b'- "?"']
