@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 Check = Literal["Number", "String", "Boolean", "List"]
@@ -296,4 +297,9 @@ def _number(saved: object) -> int | float:
 
 def robot_field(model: str, names: Sequence[str]) -> ChoiceField:
     """The drop-down with which a robot's block starts: all robots of its model."""
+    return _robot_field(model, tuple(names))
+
+
+@lru_cache(maxsize=64)  # all blocks of all robots of a model have the same one
+def _robot_field(model: str, names: tuple[str, ...]) -> ChoiceField:
     return ChoiceField("ROBOT", tuple((name, name) for name in names), source=f"robots:{model}")

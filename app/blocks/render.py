@@ -14,10 +14,11 @@ Marks = Mapping[ast.AST, str]
 
 def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str]]:
     """The text for people, and the block of each of its lines that begins one."""
-    text = ""
+    parts: list[str] = []
     for before, statement in zip((None, *body[:-1]), body, strict=True):
         ast.fix_missing_locations(statement)
-        text += _gap(before, statement) + ast.unparse(statement).strip("\n") + "\n"
+        parts += (_gap(before, statement), ast.unparse(statement).strip("\n"), "\n")
+    text = "".join(parts)
     lines: dict[int, str] = {}
     for ours, theirs in _together(body, ast.parse(text).body):
         if ours in marks:

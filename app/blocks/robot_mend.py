@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from app.blocks.categories.robot import robot_blocks
 from app.blocks.robot_text import type_of
@@ -16,11 +16,28 @@ def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, ob
     return tuple(block for block in saved_blocks(workspace) if _robot_of(block) == robot)
 
 
-def can_do(workspace: Mapping[str, object], missing: str, model: str, robot: Robot) -> bool:
-    """Whether a robot can do everything that the blocks ask of the missing one, which is of this model."""
-    asked = blocks_of(workspace, missing)
-    known = {block.type for block in robot_blocks(robot, [robot])}
-    return bool(asked) and all(_translated(str(each.get("type")), model, robot) in known for each in asked)
+def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
+    """The types of the blocks that name each robot."""
+    found: dict[str, set[str]] = {}
+    for block in saved_blocks(workspace):
+        robot = _robot_of(block)
+        if isinstance(robot, str):
+            found.setdefault(robot, set()).add(str(block.get("type")))
+    return {robot: frozenset(types) for robot, types in found.items()}
+
+
+def types_of(robot: Robot) -> frozenset[str]:
+    """The types of all blocks of a robot."""
+    return frozenset(block.type for block in robot_blocks(robot, [robot]))
+
+
+def can_do(asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None) -> bool:
+    """Whether a robot can do everything that blocks of these types ask of one of this model.
+
+    `known` are the types of its own blocks, when they are at hand.
+    """
+    known = types_of(robot) if known is None else known
+    return bool(asked) and all(_translated(each, model, robot) in known for each in asked)
 
 
 def use_robot(workspace: Mapping[str, object], missing: str, model: str, robot: Robot) -> dict[str, object]:

@@ -87,12 +87,14 @@ class _Numbers:
 
     def __init__(self) -> None:
         self._seen: set[str] = set()
+        self._next: dict[str, int] = {}  # the number to go on with: all blocks of a file may have one id
 
     def id(self, saved: object) -> str:
-        made, number = (saved if isinstance(saved, str) and saved else "block"), 2
-        stem = made
+        made = stem = saved if isinstance(saved, str) and saved else "block"
+        number = self._next.get(stem, 2)
         while made in self._seen:
             made, number = f"{stem}~{number}", number + 1
+        self._next[stem] = number
         self._seen.add(made)
         return made
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from app.blocks import Problem
-from app.blocks.robot_mend import can_do
+from app.blocks.robot_mend import asked_of, can_do, types_of
 from app.robots.description import Robot
 
 CONNECT = "connect:"
@@ -50,6 +50,8 @@ def listed(
     found: list[Listed] = []
     place: dict[str, int] = {}
     known = {robot.name: robot for robot in missing}
+    asked = asked_of(workspace)
+    types = {robot.name: types_of(robot) for robot in connected} if known else {}
     for problem in problems:
         name = _missing(problem)
         if name is None:
@@ -60,7 +62,12 @@ def listed(
             found[at] = replace(found[at], blocks=found[at].blocks + 1)
         else:
             place[name] = len(found)
-            mends = robot_mends(name, known.get(name), workspace, connected, virtual_models)
+            robot = known.get(name)
+            able: list[Robot] = []
+            if robot is not None:
+                blocks = asked.get(name, frozenset())
+                able = [each for each in connected if can_do(blocks, robot.model, each, types[each.name])]
+            mends = robot_mends(name, robot, able, virtual_models)
             found.append(Listed(problem, mends))
     return tuple(_counted(each) for each in found)
 
@@ -68,14 +75,12 @@ def listed(
 def robot_mends(
     name: str,
     robot: Robot | None,
-    workspace: Mapping[str, object],
-    connected: Sequence[Robot],
+    able: Sequence[Robot],
     virtual_models: Collection[str],
 ) -> tuple[Mend, ...]:
-    """What can be done about a missing robot, the best first."""
+    """What can be done about a missing robot, the best first; `able` can do what is asked of it."""
     if robot is None:
         return (Mend(f"Connect {name}", f"{CONNECT}{name}"),)
-    able = [other for other in connected if can_do(workspace, name, robot.model, other)]
     alike = [other for other in able if other.model == robot.model] or able
     mends = [Mend(f"Use {other.name}", f"robot.use:{name}:{other.name}") for other in alike[:MOST_MENDS]]
     if robot.model in virtual_models and len(mends) < MOST_MENDS:

@@ -6,7 +6,7 @@ import pytest
 
 from app.blocks.compiler import compile_behaviour
 from app.blocks.mend import mend
-from app.blocks.robot_mend import blocks_of, can_do
+from app.blocks.robot_mend import asked_of, blocks_of, can_do
 from tests.blocks.samples import block, robot, say, started, workspace
 
 
@@ -66,4 +66,4 @@ def test_nothing_is_mended_in_what_is_no_workspace_and_nothing_raises(blocks):
     assert mend(saved, "limit:w") is None
     assert mend(saved, "define:w") is None
     assert blocks_of(saved, "Pepper") == ()
-    assert not can_do(saved, "Pepper", "pepper", robot())
+    assert not can_do(asked_of(saved).get("Pepper", ()), "pepper", robot())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.blocks import compile_behaviour
-from app.blocks.robot_mend import can_do, use_robot
+from app.blocks.robot_mend import asked_of, can_do, use_robot
 from app.core.document import Document
 from app.core.journal import Journal
 from app.core.problem_list import Mend, listed
@@ -95,11 +95,11 @@ def test_another_model_does_it_when_it_knows_every_block() -> None:
     other = sample("Rosie")
     said = workspace(started(block("robot_pepper_do_say", ROBOT="Pepper", TEXT=text("x"))))
     walks = workspace(started(block("robot_pepper_do_walk", ROBOT="Pepper")))
-    assert can_do(said, "Pepper", "pepper", other)
-    assert not can_do(walks, "Pepper", "pepper", other)
+    assert can_do(asked_of(said).get("Pepper", ()), "pepper", other)
+    assert not can_do(asked_of(walks).get("Pepper", ()), "pepper", other)
     both = workspace(started(*said_and_walks()))
-    assert not can_do(both, "Pepper", "pepper", other), "one of two is not enough"
-    assert not can_do(said, "Nobody", "pepper", other), "nothing asks it"
+    assert not can_do(asked_of(both).get("Pepper", ()), "pepper", other), "one of two is not enough"
+    assert not can_do(asked_of(said).get("Nobody", ()), "pepper", other), "nothing asks it"
     made = use_robot(said, "Pepper", "pepper", other)
     program = compile_behaviour(made, [other], name="Test")
     assert (program.problems, program.robots) == ((), ("Rosie",))

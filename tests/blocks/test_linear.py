@@ -1,0 +1,98 @@
+"""Compiling takes work in proportion to the blocks: four times the blocks, about four times the steps."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from functools import partial
+from types import FrameType
+
+import pytest
+
+from app.blocks.compiler import compile_behaviour
+from app.blocks.names import Names
+from app.blocks.workspace import parse_workspace
+from app.core.problem_list import listed
+from tests.blocks.samples import block, call, define, number, robot, say, started, workspace
+
+Saved = dict[str, object]
+FEW = 60
+
+
+def steps(work: Callable[[], object]) -> int:
+    """The lines of Python that some work runs: no clock, so that a busy machine changes nothing."""
+    count = 0
+
+    def trace(_frame: FrameType, event: str, _argument: object) -> object:
+        nonlocal count
+        count += event == "line"
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        work()
+    finally:
+        sys.settrace(before)
+    return count
+
+
+def copied(saved: Saved) -> Saved:
+    made: Saved = json.loads(json.dumps(saved))
+    return made
+
+
+def scripts(count: int) -> Saved:
+    return workspace(*[copied(started(say("hi"))) for _ in range(count)])
+
+
+def variables(count: int) -> Saved:
+    names = [{"id": f"v{n}", "name": "the same"} for n in range(count)]
+    sets = [block("variables_set", VAR={"id": f"v{n}"}, VALUE=number(1)) for n in range(count)]
+    return {**workspace(started(*sets)), "variables": names}
+
+
+def functions(count: int) -> Saved:
+    made = [define(f"f{n}", "same", ("a",), say("x")) for n in range(count)]
+    return workspace(*made, started(*[call("same", id=f"c{n}") for n in range(count)]))
+
+
+def strangers(count: int) -> Saved:
+    return workspace(started(*[say("hi", f"R{n}") for n in range(count)]))
+
+
+@pytest.mark.parametrize("make", [scripts, variables, functions, strangers])
+def test_four_times_the_blocks_are_four_times_the_work(make: Callable[[int], Saved]) -> None:
+    robots = (robot(),)
+    compile_behaviour(make(2), robots)  # what is made once is made
+    few, many = (steps(partial(compile_behaviour, make(count), robots)) for count in (FEW, 4 * FEW))
+    assert many < 5 * few
+
+
+def test_names_and_ids_that_are_all_the_same_are_no_more_work() -> None:
+    def name(count: int) -> None:
+        names = Names(frozenset())
+        assert len({names.new("when started", "script") for _ in range(count)}) == count
+
+    def parse(count: int) -> None:
+        saved = workspace(*[block("x", "one id") for _ in range(count)])
+        assert len({script[0].id for script in parse_workspace(saved).scripts}) == count
+
+    for work in (name, parse):
+        work(2)
+        few, many = (steps(lambda work=work, count=count: work(count)) for count in (100, 400))
+        assert many < 5 * few
+
+
+def test_a_line_for_each_missing_robot_is_no_more_work() -> None:
+    here = robot()
+
+    def work(count: int) -> int:
+        saved = strangers(count)
+        missing = [robot(f"R{n}") for n in range(count)]
+        problems = compile_behaviour(saved, (here,), absent=missing).problems
+        return steps(lambda: listed(problems, saved, missing, (here,), ()))
+
+    work(2)
+    assert work(4 * 20) < 5 * work(20)
