@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from nep import images
-from nep.errors import NepError
+from nep.errors import EncodeError, NepError
 from nep.image_files import examine
 from nep.message import Message
 
@@ -99,7 +99,7 @@ def png_of(message: Message) -> bytes:
             return bytes(file.data)
     frame, _size = _frame(message, None)
     if frame.dtype not in PNG_NUMBERS:
-        raise OSError(f"a PNG has no numbers of the type {frame.dtype}")
+        raise EncodeError("png", f"picture of {frame.dtype}", "it has whole numbers of 8 or 16 bits alone")
     good, data = cv2.imencode(".png", frame)
     if not good:
         raise OSError(f"a picture of {frame.shape} can't be written as PNG")

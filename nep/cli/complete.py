@@ -63,7 +63,7 @@ def _master(ctx: typer.Context) -> str:
 def _view(ctx: typer.Context) -> GraphView | None:
     try:
         return look(_master(ctx), _ANSWER_S)
-    except (NepError, OSError):
+    except (NepError, OSError, UnicodeError):
         return None
 
 
@@ -78,5 +78,5 @@ def _fields(ctx: typer.Context, topic: str) -> Iterator[str]:
                 message = subscriber.receive(_MESSAGE_S)
             if message is not None:
                 yield from leaves(message.payload)
-    except (NepError, OSError):
+    except (NepError, OSError, UnicodeError):
         return

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.pictures import decode, png_of
-from nep.errors import DecodeError, NepError
+from nep.errors import DecodeError, EncodeError, NepError
 from nep.message import Message
 
 
@@ -157,7 +157,9 @@ def test_a_small_view_of_depth_is_as_bright_as_a_large_one() -> None:
 
 
 def test_a_picture_of_floats_is_no_png_and_says_so() -> None:
-    with pytest.raises(OSError, match="no numbers of the type float32"):
+    with pytest.raises(
+        EncodeError, match="cannot encode a 'picture of float32' as 'png'; it has whole numbers"
+    ):
         png_of(raw(np.zeros((4, 6), np.float32), "32FC1"))
 
 
