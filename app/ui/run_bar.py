@@ -96,7 +96,7 @@ class RunBar(Bar):
         self.step.setEnabled(view.can_step)
         self.pace.setChecked(view.slow)
         self.mark.show_state(view.state)
-        self.sentence.show_words(view.title, view.detail)
+        self.sentence.show_words(view.title, view.detail, is_alarm=view.state == "unanswered")
         self.result.show_view(view)
         self.confirm.set_word(view.confirm or "")
         paint.show_when(self.confirm, view.confirm is not None)

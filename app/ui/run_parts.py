@@ -70,14 +70,19 @@ class Sentence(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._title, self._detail = "", ""
+        self._title, self._detail, self._is_alarm = "", "", False
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         theme.changed.connect(self.updateGeometry)
 
-    def show_words(self, title: str, detail: str) -> None:
-        """Say something else."""
-        if (title, detail) != (self._title, self._detail):
-            self._title, self._detail = title, detail
+    @property
+    def colour_role(self) -> str:
+        """The colour of the title: that of errors when somebody must act."""
+        return self._theme.status("error").colour if self._is_alarm else "text"
+
+    def show_words(self, title: str, detail: str, *, is_alarm: bool = False) -> None:
+        """Say something else; `is_alarm`: somebody must act, so the title is red."""
+        if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
+            self._title, self._detail, self._is_alarm = title, detail, is_alarm
             self.setAccessibleName(f"{title}. {detail}")
             self.setToolTip(f"{title}\n{detail}")
             self.update()
@@ -100,7 +105,9 @@ class Sentence(QWidget):
         bold, plain = self._title_font(), theme.font("body")
         upper, lower = paint.height_of(bold), paint.height_of(plain)
         top = (self.height() - upper - lower) / 2
-        paint.words(painter, QRectF(0, top, self.width(), upper), self._title, bold, theme.colour("text"))
+        paint.words(
+            painter, QRectF(0, top, self.width(), upper), self._title, bold, theme.colour(self.colour_role)
+        )
         second = QRectF(0, top + upper, self.width(), lower)
         paint.words(painter, second, self._detail, plain, theme.colour("textSecondary"))
         painter.end()

@@ -78,6 +78,7 @@ def test_each_state_is_as_in_the_picture(bar: RunBar, state, run, pause, step, s
     assert bar.result.look == look
     assert bar.confirm.isVisible() == (state == "unanswered")
     assert bar.sentence.accessibleName() == f"{VIEWS[state].title}. {VIEWS[state].detail}"
+    assert (bar.sentence.colour_role == "text") == (state != "unanswered")  # else red
 
 
 def test_nothing_jumps_between_the_states(bar: RunBar) -> None:
