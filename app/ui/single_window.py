@@ -1,13 +1,21 @@
 """One window for one person: a second start hands its files to the Studio that runs already.
 
-Both meet at a local socket in Studio's folder, which only this user can reach. ``--new-window`` leaves it.
+Both meet at a local socket in a folder that only this user can reach, and each looks whose the other one is.
+``--new-window`` leaves it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
+import socket
+import stat
+import struct
+import sys
+import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +23,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
+from app.core.files import private_folder
 from nep.later import later
 
 if TYPE_CHECKING:
@@ -38,30 +47,89 @@ class Asked:
 
 
 def place(folder: Path) -> str:
-    """The name of the socket of Studio's folder."""
-    whole = folder.resolve()
-    path = str(whole / "window.socket")
-    if os.name == "posix" and len(os.fsencode(path)) < LONGEST_PATH:
-        return path
-    return "nep-studio-" + hashlib.sha256(os.fsencode(whole)).hexdigest()[:24]
+    """The name of the socket of Studio's folder; empty when there is no folder that only this user reaches.
+
+    It lies in the user's runtime folder, else in Studio's own folder, else in a private one for the time
+    being: where others can write, one of them could wait in the place of the window.
+    """
+    mark = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
+    if os.name != "posix":
+        return f"nep-studio-{mark}"  # a pipe that only this user may open
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    own = [Path(runtime) / "nep-studio"] if Path(runtime).is_absolute() and is_private(Path(runtime)) else []
+    for each in (*own, folder.resolve(), Path(tempfile.gettempdir()) / f"nep-studio-{os.geteuid()}"):
+        path = each / f"window-{mark}.socket"
+        if len(os.fsencode(path)) >= LONGEST_PATH:
+            continue
+        with contextlib.suppress(OSError):
+            private_folder(each)
+            if is_private(each):
+                return str(path)
+    return ""
+
+
+def is_private(folder: Path) -> bool:
+    """Whether it is a folder of this user into which nobody else gets; a link to one is none."""
+    try:
+        about = folder.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid() and not about.st_mode & 0o077
+
+
+def is_ours(name: str) -> bool:
+    """Whether the socket of this name is there and this user's own, in a folder that is nobody else's."""
+    if os.name != "posix":
+        return bool(name)
+    try:
+        about = Path(name).lstat()
+    except OSError:
+        return False
+    return stat.S_ISSOCK(about.st_mode) and about.st_uid == os.geteuid() and is_private(Path(name).parent)
+
+
+def peer_of(descriptor: int) -> int | None:
+    """The user at the other end of a local socket; None where the system does not tell."""
+    asked = getattr(socket, "SO_PEERCRED", None)
+    try:
+        with socket.socket(fileno=os.dup(descriptor)) as ours:
+            if asked is not None:  # Linux: pid, user, group
+                return int(struct.unpack("3i", ours.getsockopt(socket.SOL_SOCKET, asked, 12))[1])
+            if sys.platform == "darwin":  # xucred: version, user, ...; SOL_LOCAL is 0, LOCAL_PEERCRED 1
+                return int(struct.unpack_from("2I", ours.getsockopt(0, 1, 76))[1])
+    except (OSError, struct.error):
+        return None
+    return None
 
 
 def hand_over(name: str, asked: Asked) -> bool:
-    """Let the window that runs do it; False when none runs. Waits at most 3 s for its answer."""
-    if os.name == "posix" and Path(name).is_absolute() and not Path(name).exists():
-        return False  # without Qt's network, which takes its time to load
-    socket = QtNetwork.QLocalSocket()
-    socket.connectToServer(name)
-    if not socket.waitForConnected(CONNECT_MS):
+    """Let the window that runs do it; False when none runs. Waits at most 3 s for its answer.
+
+    What another user put there is not talked to.
+    """
+    if not is_ours(name):
+        return False  # on Unix without Qt's network, which takes its time to load
+    line = QtNetwork.QLocalSocket()
+    line.connectToServer(name)
+    if not line.waitForConnected(CONNECT_MS) or _is_others(line):
         return False
     files = [str(path.absolute()) for path in asked.files]
-    socket.write(json.dumps({"files": files, "demo": asked.demo}).encode() + b"\n")
-    socket.flush()
-    answer = b""
-    while not answer.endswith(b"\n") and socket.waitForReadyRead(ANSWER_MS):
-        answer += socket.readAll().data()
-    socket.disconnectFromServer()
+    line.write(json.dumps({"files": files, "demo": asked.demo}).encode() + b"\n")
+    line.flush()
+    answer, until = b"", time.monotonic() + ANSWER_MS / 1000
+    while len(answer) < len(OK) and (left_ms := int((until - time.monotonic()) * 1000)) > 0:
+        if not line.waitForReadyRead(left_ms):
+            break
+        answer += line.readAll().data()
+    line.disconnectFromServer()
     return answer == OK
+
+
+def _is_others(line: QtNetwork.QLocalSocket) -> bool:
+    if os.name != "posix":
+        return False
+    user = peer_of(int(line.socketDescriptor()))
+    return user is not None and user != os.geteuid()
 
 
 class Meeting(QObject):
@@ -79,6 +147,8 @@ class Meeting(QObject):
         """Whether later starts can find it; without, each has a window of its own."""
 
     def _listen(self, name: str) -> bool:
+        if not name:
+            return False
         # On Unix a second listener takes the first one's place without a word: look first who is there.
         probe = QtNetwork.QLocalSocket()
         probe.connectToServer(name)
@@ -92,6 +162,10 @@ class Meeting(QObject):
 
     def _come(self) -> None:
         while (socket := self._server.nextPendingConnection()) is not None:
+            if _is_others(socket):
+                socket.abort()
+                socket.deleteLater()
+                continue
             self._heard[socket] = b""
             socket.readyRead.connect(lambda socket=socket: self._read(socket))
             socket.disconnected.connect(lambda socket=socket: self._gone(socket))

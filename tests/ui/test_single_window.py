@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import socket as socket_module
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from PySide6.QtNetwork import QLocalSocket
 
-from app.ui.single_window import Asked, Meeting, hand_over, parse, place
+from app.ui import single_window
+from app.ui.single_window import Asked, Meeting, hand_over, is_ours, parse, peer_of, place
 
 WAIT_MS = 5000
 SECOND = """
@@ -97,10 +101,109 @@ def test_only_this_user_reaches_the_window(qtbot, name: str) -> None:
     meeting.close()
 
 
-def test_a_folder_with_a_long_name_has_a_place_too(tmp_path: Path) -> None:
-    deep = tmp_path / ("x" * 120)
-    assert place(deep).startswith("nep-studio-")
-    assert place(deep) != place(tmp_path / ("y" * 120))
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The user's runtime folder, as a login makes it: with a short name, for a socket's name is short."""
+    with tempfile.TemporaryDirectory(prefix="run") as made:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", made)
+        monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+        yield Path(made)
+
+
+needs_modes = pytest.mark.skipif(os.name != "posix", reason="Windows has pipes with rights")
+
+
+@needs_modes
+def test_it_lies_in_the_runtime_folder_one_for_each_folder_of_studio(runtime: Path, tmp_path: Path) -> None:
+    one, other = Path(place(tmp_path / "a")), Path(place(tmp_path / "b"))
+    assert one.parent == other.parent == runtime / "nep-studio"
+    assert one != other
+    assert one.parent.stat().st_mode & 0o777 == 0o700
+    deep = Path(place(tmp_path / ("x" * 120)))
+    assert deep.parent == one.parent
+
+
+@needs_modes
+@pytest.mark.parametrize("wrong", ["open", "linked", "missing", "relative"])
+def test_a_runtime_folder_that_others_reach_is_not_used(
+    runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: str
+) -> None:
+    home = tmp_path / "home"
+    if wrong == "open":
+        runtime.chmod(0o777)
+    elif wrong == "linked":
+        (tmp_path / "link").symlink_to(runtime)
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "link"))
+    else:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", "run" if wrong == "relative" else str(tmp_path / "none"))
+    found = Path(place(home))
+    assert found.parent == home
+    assert home.stat().st_mode & 0o777 == 0o700
+
+
+@needs_modes
+def test_no_private_folder_means_no_meeting_and_a_start_all_the_same(
+    runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stranger has made the folders before us."""
+    monkeypatch.setattr(os, "geteuid", lambda: 4242)
+    assert place(tmp_path) == ""
+    assert hand_over("", Asked()) is False
+    assert Meeting("", lambda _asked: None).open is False
+
+
+@needs_modes
+def test_what_is_no_socket_of_ours_is_not_talked_to(qtbot, runtime: Path, tmp_path: Path) -> None:
+    name = place(tmp_path)
+    os.mkfifo(name)
+    assert hand_over(name, Asked()) is False
+    meeting = Meeting(name, lambda _asked: None)
+    assert meeting.open, "what is left in our own folder is ours to take away"
+    assert is_ours(name)
+    Path(name).parent.chmod(0o777)
+    assert hand_over(name, Asked()) is False
+    meeting.close()
+
+
+@needs_modes
+def test_another_user_at_the_other_end_is_not_served(
+    qtbot, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Asked] = []
+    meeting = Meeting(name, asked.append)
+    monkeypatch.setattr(single_window, "peer_of", lambda _descriptor: os.geteuid() + 1)
+    assert hand_over(name, Asked()) is False
+    socket = QLocalSocket()
+    socket.connectToServer(name)
+    socket.waitForConnected(WAIT_MS)
+    socket.write(b'{"files": [], "demo": true}\n')
+    qtbot.waitUntil(lambda: socket.state() == socket.LocalSocketState.UnconnectedState, timeout=WAIT_MS)
+    assert asked == []
+    meeting.close()
+
+
+@pytest.mark.skipif(sys.platform not in {"linux", "darwin"}, reason="the system does not tell")
+def test_the_system_tells_who_is_at_the_other_end(tmp_path: Path) -> None:
+    ours, theirs = socket_module.socketpair()
+    with ours, theirs:
+        assert peer_of(ours.fileno()) == os.geteuid()
+    with (tmp_path / "file").open("wb") as file:
+        assert peer_of(file.fileno()) is None
+
+
+@needs_modes
+def test_one_that_never_answers_does_not_hold_a_start_up(qtbot, name: str, monkeypatch) -> None:
+    monkeypatch.setattr(single_window, "ANSWER_MS", 50)
+    code = "import socket, sys\ns = socket.socket(socket.AF_UNIX)\ns.bind(sys.argv[1])\ns.listen()\n"
+    code += "print('up', flush=True)\nc, _ = s.accept()\nsys.stdin.read()\n"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"up\n"
+    assert hand_over(name, Asked()) is False
+    process.kill()
+    process.communicate()
 
 
 def test_a_start_is_read() -> None:
