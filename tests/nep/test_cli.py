@@ -17,7 +17,7 @@ import pytest
 import nep
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-LONG_S = 20
+LONG_S = 60
 
 
 def environment():
@@ -61,7 +61,7 @@ class Running:
     def interrupt(self):
         """Ctrl+C; its exit code and what else it wrote on both streams."""
         self.process.send_signal(signal.CTRL_BREAK_EVENT if sys.platform == "win32" else signal.SIGINT)
-        out, err = self.process.communicate(timeout=5)
+        out, err = self.process.communicate(timeout=LONG_S)
         return self.process.returncode, out, err
 
     def close(self):
