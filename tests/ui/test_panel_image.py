@@ -325,6 +325,8 @@ def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(
 def test_a_pixel_is_said_as_colour_or_number_or_not_at_all() -> None:
     assert pixel_words(1, 2, (255, 0, 16)) == "(1, 2)  255 0 16  #FF0010"
     assert pixel_words(1, 2, 820) == "(1, 2)  820"
+    assert pixel_words(1, 2, 0.125) == "(1, 2)  0.125"
+    assert pixel_words(1, 2, float("nan")) == "(1, 2)  nan"
     assert pixel_words(1, 2, None) == "(1, 2)"
 
 
