@@ -139,11 +139,18 @@ class PluginsMissingError(NepError):
 
 
 class MasterUnreachable(NepError):  # noqa: N818 - the name that the specification of the wire gives it
-    """No master answered at `address` within `waited_s` seconds."""
+    """No master answered at `address` within `waited_s` seconds; not `is_known`: nobody knows that name."""
 
-    def __init__(self, address: str, waited_s: float) -> None:
+    def __init__(self, address: str, waited_s: float, *, is_known: bool = True) -> None:
         self.address = address
         self.waited_s = waited_s
+        self.is_known = is_known
+        if not is_known:
+            super().__init__(
+                f"no computer is called '{address.rpartition(':')[0]}' here (waited {waited_s:g} s); "
+                "look for a typing error, or write its address in numbers",
+            )
+            return
         super().__init__(
             f"no master answers at '{address}' (waited {waited_s:g} s); start one with 'nep master'",
         )

@@ -34,6 +34,8 @@ DIRECT_WAIT_S = 0.3
 """Without a master nobody knows whether there is another side: it gets so long to connect."""
 _LEAVE_S = 0.3
 _THREAD_FILES = 4
+_MOST_LINKS = 8
+"""So many masters' connections are kept though nothing is registered with them."""
 
 _Outlet = NativeOutlet | OriginalOutlet
 _Inlet = NativeInlet | OriginalInlet
@@ -69,6 +71,7 @@ class ZeromqCarrier:
         if isinstance(spec.configuration, Direct):
             return self._direct_publisher(spec, spec.configuration)
         link = self._link(spec.configuration.master)
+        link.wait_for_name(spec.wait_s)
         socket = self._xpub(spec)
         # Made before the socket is bound: what it sets applies to connections of later binds only.
         closer = self._outlet_closer(lambda: link.remove_publisher(spec.id, outlet.count))
@@ -148,6 +151,7 @@ class ZeromqCarrier:
         if isinstance(spec.configuration, Direct):
             return self._direct_subscriber(spec, spec.configuration)
         link = self._link(spec.configuration.master)
+        link.wait_for_name(spec.wait_s)
 
         def forget(subscriber: int) -> None:
             self._forget_inlet(subscriber)
@@ -313,6 +317,16 @@ class ZeromqCarrier:
             sinks.close(max(_LEAVE_S, deadline - time.monotonic()))
         self._shared.leave()
 
+    def _forget_links(self) -> None:
+        """With the lock held: close what leads to masters that nobody needs any more, when there are many."""
+        for address, link in list(self._links.items()):
+            if len(self._links) < _MOST_LINKS:
+                return
+            if link.is_idle:
+                del self._links[address]
+                link.begin_leave()
+                link.close()
+
     def forked(self) -> None:
         """In a child: its ports and connections are the parent's. See `nep.forks`."""
         give_up(*self._attached.values())
@@ -327,6 +341,7 @@ class ZeromqCarrier:
             self._check_open()
             link = self._links.get(address)
             if link is None:
+                self._forget_links()
                 socket = self._shared.socket(zmq.DEALER, f"a connection to the master at '{address}'")
                 with _closed_on_error(socket.close):
                     link = MasterLink(socket, self._io, self._node, address)

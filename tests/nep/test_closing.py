@@ -217,3 +217,13 @@ def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master)
     assert [(ok, data[:1]) for ok, data in got] == [(True, bytes([n])) for n in range(8)]  # type: ignore[index]
     assert "'hung' is closed before 1 subscriber(s) took everything: up to 8 messages not delivered" in error
     assert "pictures" not in error
+
+
+def test_connections_to_masters_that_nobody_needs_are_closed(master: Master) -> None:
+    with nep.node("n", wait_s=0.02) as node:
+        pub = node.new_pub("topic")
+        for port in range(1, 40):
+            with pytest.raises(nep.MasterUnreachable):
+                node.new_pub("topic", configuration=nep.Hybrid(f"127.0.0.1:{port}", "many2many"))
+        assert len(node._carrier._links) <= 8  # type: ignore[attr-defined]
+        assert node.graph().topics["topic"].publishers[0].id == pub.id

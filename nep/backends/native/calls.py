@@ -75,9 +75,26 @@ class Calls:
         if not is_loopback(address):  # a computer that vanishes does not close its connections
             socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
             socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
-        self.endpoint = endpoint_of(address)
-        socket.connect(self.endpoint)
+        self.endpoint = ""
+        """Where it is connected; "" before `lead_to`."""
         self.fd = int(socket.getsockopt(zmq.FD))
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether somebody waits for an answer."""
+        with self._changed:
+            return any(call.is_waited for call in self._calls.values())
+
+    def lead_to(self, address: str) -> None:
+        """Connect there, and no more to where the master was before. From any thread."""
+        with self._changed:
+            if self._is_closed or self.endpoint == endpoint_of(address):
+                return
+            if self.endpoint:
+                self._socket.disconnect(self.endpoint)
+            self.endpoint = endpoint_of(address)
+            self._socket.connect(self.endpoint)
+        self._after_use()
 
     def ask(self, request: Request, timeout_s: float | None) -> Reply:
         """The reply; `timeout_s` None waits for ever.

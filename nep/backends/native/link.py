@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from nep.addresses import is_loopback
@@ -16,6 +16,7 @@ from nep.backends.native.calls import Asking, Calls
 from nep.backends.native.inlet import NativeInlet
 from nep.backends.native.io import IoThread, Rest
 from nep.backends.native.local import in_reach, may_stay
+from nep.backends.native.names import MasterName, look_up
 from nep.backends.native.outlet import NativeOutlet
 from nep.backends.native.pace import Pace
 from nep.backends.native.sockets import LOOPBACK, Socket, host_towards
@@ -60,9 +61,19 @@ _JOIN_AGAIN_S = 0.5
 
 
 class MasterLink:
-    """The link of `node` to the master at `address`, over `socket` (a DEALER). `io` serves it."""
+    """The link of `node` to the master at `address`, over `socket` (a DEALER). `io` serves it.
 
-    def __init__(self, socket: Socket, io: IoThread, node: NodeRecord, address: str) -> None:
+    `look_up` tells the address behind a name.
+    """
+
+    def __init__(
+        self,
+        socket: Socket,
+        io: IoThread,
+        node: NodeRecord,
+        address: str,
+        look_up: Callable[[str], str] = look_up,
+    ) -> None:
         self.address = address
         self._node = node
         self._io = io
@@ -81,7 +92,11 @@ class MasterLink:
         self._left_at = 0.0
         self._is_near = is_loopback(address)
         self._served: tuple[str, ...] = ()
-        self._own_host = LOOPBACK if self._is_near else host_towards(address) or LOOPBACK
+        self._own_host = LOOPBACK
+        self._name = MasterName(address, self._found, look_up)
+        if self._name.known:
+            self._found(self._name.known)
+        self._name.look(time.monotonic())
         self._moved_to = self.hosts
         self._load = CpuLoad()
         self.fd = self._calls.fd
@@ -101,6 +116,23 @@ class MasterLink:
         return (LOOPBACK, *self._served) if self._is_near else (self._own_host,)
 
     # ---- for the carrier, in any thread
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing is registered by it, and nobody waits for an answer."""
+        with self._lock:
+            return not self._publishers and not self._subscribers and not self._calls.is_asked
+
+    def wait_for_name(self, wait_s: float | None) -> None:
+        """Wait until the master's address is known. Raises `MasterUnreachable`, None waits for ever."""
+        if not self._name.wait(wait_s) and wait_s is not None:
+            raise MasterUnreachable(self.address, wait_s, is_known=False)
+
+    def _found(self, known: str) -> None:
+        """The master's address is another one than before."""
+        if not self._is_near:
+            self._own_host = host_towards(known) or self._own_host
+        self._calls.lead_to(known)
 
     def add_publisher(self, record: PublisherRecord, outlet: NativeOutlet, wait_s: float | None) -> Added:
         """Register; the subscribers to expect. Raises as `Calls.ask` does."""
@@ -158,6 +190,7 @@ class MasterLink:
 
     def look(self, timeout_s: float) -> GraphView:
         """The graph. Raises as `Calls.ask` does."""
+        self.wait_for_name(timeout_s)
         reply = self._calls.ask(Look(), timeout_s)
         if not isinstance(reply, Seen):
             raise RequestRefusedError(f"the master at '{self.address}' shows no graph")
@@ -206,6 +239,8 @@ class MasterLink:
         if is_connected and not self._was_connected:
             self._pace.due_at = now
         self._was_connected = is_connected
+        if not is_connected:
+            self._name.look(now)
         is_due = now >= self._pace.due_at
         if is_due or now >= self._follow_at:
             self._follow_at = now + _FOLLOW_S
@@ -218,8 +253,8 @@ class MasterLink:
 
     def _follow_addresses(self) -> None:
         """Move publishers when this computer or the master has another address, or files are short."""
-        if not self._is_near:
-            self._own_host = host_towards(self.address) or self._own_host
+        if not self._is_near and self._name.known:
+            self._own_host = host_towards(self._name.known) or self._own_host
         is_cramped = not may_stay()
         if self.hosts == self._moved_to and not is_cramped:
             return
@@ -240,7 +275,7 @@ class MasterLink:
 
     def _in_reach(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
         """Publishers, each with the one endpoint that this node can reach."""
-        return tuple(in_reach(remote, self.address) for remote in remotes)
+        return tuple(in_reach(remote, self._name.known or self.address) for remote in remotes)
 
     def _obey(self, answer: Reply | Push, now: float) -> None:
         if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import zmq
 
 from nep.addresses import endpoint_of, host_of, is_endpoint, is_loopback
+from nep.backends.native.names import in_numbers
 from nep.descriptors import check_room
 from nep.errors import AddressInUseError, NepError
 
@@ -90,6 +91,7 @@ def connect(owner: Socket, address: str) -> str:
     endpoint = endpoint_of(address)
     if not is_endpoint(endpoint):
         raise NepError(f"'{address}' cannot be connected to; use a computer's address and a port up to 65535")
+    endpoint = endpoint_of(in_numbers(address))
     owner.connect(endpoint)
     return endpoint
 

@@ -1,0 +1,114 @@
+"""Names of computers are asked for once, in a thread of their own, never where sockets are served."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator
+
+import pytest
+import zmq
+
+import nep
+from nep.backends.native.context import SharedContext, join
+from nep.backends.native.link import MasterLink
+from nep.backends.native.names import MasterName
+from nep.masters import Master
+from nep.records import NodeRecord
+from tests.nep.programs import eventually
+
+
+class Book:
+    """Names as a system knows them: it answers when it is let, and counts who asks."""
+
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.asked: list[str] = []
+        self.threads: list[str] = []
+        self.may_answer = threading.Event()
+
+    def look_up(self, host: str) -> str:
+        self.asked.append(host)
+        self.threads.append(threading.current_thread().name)
+        assert self.may_answer.wait(20.0)
+        answer = self.answers.pop(0)
+        if not answer:
+            raise OSError(-2, "Name or service not known")
+        return answer
+
+
+@pytest.mark.parametrize(
+    ("address", "known"),
+    [("10.0.0.5:7780", "10.0.0.5:7780"), ("localhost:1", "127.0.0.1:1"), ("127.0.0.1:5", "127.0.0.1:5")],
+)
+def test_numbers_are_never_asked_for(address: str, known: str) -> None:
+    book = Book()
+    name = MasterName(address, lambda _known: None, book.look_up)
+    name.look(1.0)
+    assert name.known == known
+    assert name.wait(0.0)
+    assert book.asked == []
+
+
+def test_a_name_is_asked_for_again_only_after_a_while(caplog: pytest.LogCaptureFixture) -> None:
+    book, told = Book("", "", "10.0.0.5", "10.0.0.5", "10.0.0.6"), []
+    book.may_answer.set()
+    name = MasterName("robot:7780", told.append, book.look_up)
+
+    def look(now: float) -> None:
+        name.look(now)
+        assert name._thread is not None
+        name._thread.join(5.0)
+
+    with caplog.at_level(logging.WARNING):
+        for now in (10.0, 11.0, 14.9, 15.0):
+            look(now)
+    assert len(book.asked) == 2
+    assert [record.getMessage().partition(" (")[0] for record in caplog.records] == [
+        "nobody knows the computer 'robot' of the master"
+    ]
+    assert not name.wait(0.0)
+    for now in (20.0, 25.0, 30.0):
+        look(now)
+    assert told == ["10.0.0.5:7780", "10.0.0.6:7780"]
+    assert name.wait(0.0)
+
+
+@pytest.fixture
+def shared() -> Iterator[SharedContext]:
+    made = join()
+    yield made
+    made.leave()
+
+
+def test_a_name_that_nobody_answers_holds_up_nobody(shared: SharedContext, master: Master) -> None:
+    book = Book("127.0.0.1")
+    port = master.address.rpartition(":")[2]
+    with nep.node("other") as other:
+        socket = shared.socket(zmq.DEALER, "a test")
+        record = NodeRecord("1" * 16, "n", "host", 1)
+        link = MasterLink(socket, shared.io, record, f"robot:{port}", book.look_up)
+        shared.io.add(link)
+        eventually(lambda: book.asked == ["robot"])
+        try:
+            with pytest.raises(nep.MasterUnreachable, match="no computer is called 'robot' here"):
+                link.wait_for_name(0.05)
+            pub, sub = other.new_pub("topic"), other.new_sub("topic")
+            pub.publish(1)
+            assert sub.listen(timeout_s=5.0) == (True, 1)
+            book.may_answer.set()
+            link.wait_for_name(5.0)
+            assert "topic" in link.look(5.0).topics
+            assert book.threads == ["nep-name-robot"]
+            assert link.endpoint == f"tcp://127.0.0.1:{port}"
+        finally:
+            book.may_answer.set()
+            link.begin_leave()
+            link.close()
+
+
+def test_an_unknown_name_of_a_direct_connection_is_an_error_at_once() -> None:
+    with nep.node("n", master="127.0.0.1:1") as node:
+        wrong = node.direct("no..computer", 9123, "many2one")
+        with pytest.raises(nep.NepError, match=r"no computer is called 'no\.\.computer' here"):
+            node.new_pub("topic", configuration=wrong)
