@@ -60,7 +60,7 @@ def test_a_name_is_asked_for_again_only_after_a_while(caplog: pytest.LogCaptureF
         assert name._thread is not None
         name._thread.join(5.0)
 
-    with caplog.at_level(logging.WARNING):
+    with caplog.at_level(logging.INFO):
         for now in (10.0, 11.0, 14.9, 15.0):
             look(now)
     assert len(book.asked) == 2

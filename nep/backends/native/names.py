@@ -95,7 +95,7 @@ class MasterName:
         except (OSError, UnicodeError) as error:
             if not self._is_told:
                 self._is_told = True
-                _logger.warning(
+                _logger.info(  # who waits for the master is told by `MasterUnreachable`
                     "nobody knows the computer '%s' of the master (%s); asking again", self._host, error
                 )
             return
