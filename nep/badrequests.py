@@ -6,13 +6,13 @@ import logging
 from collections import OrderedDict
 from dataclasses import dataclass
 
+from nep.rarely import is_told
 from nep.text import escaped, shortened
 from nep.views import Alert
 
 __all__ = ["BadRequests", "who_sends"]
 
 _logger = logging.getLogger("nep.master")
-_LOGGED = frozenset(10**n for n in range(20))
 _LINES, _LINES_A_S = 10.0, 0.2
 """So many lines of log at once, and so many a second after them: each connection may be another sender."""
 _SENDERS = 100
@@ -53,7 +53,7 @@ class BadRequests:
         known.count += 1
         self._may_log = min(_LINES, self._may_log + (now - self._counted_at) * _LINES_A_S)
         self._counted_at = now
-        if known.count in _LOGGED and self._may_log >= 1.0:
+        if is_told(known.count) and self._may_log >= 1.0:
             self._may_log -= 1.0
             _logger.warning("%s", _sentence(known))
         while len(self._senders) > _SENDERS:

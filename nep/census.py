@@ -40,6 +40,7 @@ class Publisher:
     bytes: int = 0
     last_seq: int = 0
     last_stamp_ns: int | None = None
+    problem: str = ""
     changed_at: float = 0.0
 
 
@@ -256,6 +257,8 @@ class Census:
             publisher = member.publishers[count.id]
             self.counted(publisher, count.count, count.bytes, now)
             self.reached(publisher, count.last_seq, count.last_stamp_ns)
+            if count.problem != publisher.problem:
+                self.troubled(publisher, count.problem)
         for seen in subscribers:
             self.seen(member.subscribers[seen.id], seen.received, seen.lost, seen.problem)
 
@@ -274,6 +277,11 @@ class Census:
         """The number and the stamp of a publisher's newest message."""
         publisher.last_seq = as_count(last_seq)
         publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
+
+    def troubled(self, publisher: Publisher, problem: str) -> None:
+        """A publisher cannot send what it is given, and why; an empty sentence means that it can again."""
+        publisher.problem = escaped(shortened(problem, _PROBLEM_MAX)) if problem else ""
+        self.touched.add(publisher.record.topic)
 
     def seen(self, subscriber: Subscriber, received: int | None, lost: int | None, problem: str) -> None:
         """A subscriber has received so much until now."""

@@ -41,7 +41,8 @@ class Codec:
     """One way to turn payloads into bytes and back.
 
     `encode` raises `EncodeError`, `decode` raises `DecodeError`; `empty` makes what `listen()` hands out
-    when nothing came; `number` goes into the message's header.
+    when nothing came; `number` goes into the message's header. `check` raises `EncodeError` for what can be
+    seen at once, whatever the payload's size: it is of a type that the codec does not take.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Codec:
     encode: Callable[[object], Encoded]
     decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
     empty: Callable[[], object]
+    check: Callable[[object], object]
 
 
 def _plain(value: object) -> object:
@@ -82,11 +84,20 @@ def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> 
             raise DecodeError("json", len(data), str(first)) from first
 
 
-def _encode_string(payload: object) -> Encoded:
+def _anything(payload: object) -> None:
+    """What is in it shows only when it is encoded."""
+
+
+def _check_string(payload: object) -> str:
     if not isinstance(payload, str):
         raise EncodeError("string", type(payload).__name__, "publish a 'str', or use the type 'json'")
+    return payload
+
+
+def _encode_string(payload: object) -> Encoded:
+    text = _check_string(payload)
     try:
-        return Encoded(payload.encode("utf-8"))
+        return Encoded(text.encode("utf-8"))
     except UnicodeEncodeError as error:
         raise EncodeError("string", "str", "it holds half of a surrogate pair") from error
 
@@ -98,12 +109,16 @@ def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -
         raise DecodeError("string", len(data), f"byte {error.start} is no UTF-8") from error
 
 
+def _check_bytes(payload: object) -> bytes | bytearray | memoryview:
+    if not isinstance(payload, bytes | bytearray | memoryview):
+        raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")
+    return payload
+
+
 def _encode_bytes(payload: object) -> Encoded:
     if isinstance(payload, bytes):
         return encoded((payload, None))
-    if isinstance(payload, bytearray | memoryview):
-        return Encoded(bytes(payload))
-    raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")
+    return Encoded(bytes(_check_bytes(payload)))
 
 
 def _decode_bytes(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
@@ -149,11 +164,11 @@ def _none() -> object:
     return None
 
 
-JSON = Codec("json", 1, _encode_json, _decode_json, dict)
-STRING = Codec("string", 2, _encode_string, _decode_string, str)
-BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes)
-MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict)
-IMAGE = Codec("image", 5, images.encode, _decode_image, _none)
+JSON = Codec("json", 1, _encode_json, _decode_json, dict, _anything)
+STRING = Codec("string", 2, _encode_string, _decode_string, str, _check_string)
+BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes)
+MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _anything)
+IMAGE = Codec("image", 5, images.encode, _decode_image, _none, images.check)
 
 CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}
 _NUMBERED = {each.number: each for each in CODECS.values()}

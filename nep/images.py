@@ -139,8 +139,18 @@ def _shape(frame: NDArray[Any]) -> list[int]:
     return [frame.shape[0], frame.shape[1], 1 if frame.ndim == 2 else frame.shape[2]]
 
 
-def _checked(payload: object) -> NDArray[Any]:
-    """An array of a picture; one channel in two dimensions. Raises `EncodeError`."""
+def check(payload: object) -> None:
+    """Raises `EncodeError` for what is no picture by its type, its shape or its numbers."""
+    if isinstance(payload, bytes | bytearray | memoryview):
+        return
+    try:
+        _picture(payload)
+    except ImportError as error:
+        raise EncodeError("image", type(payload).__name__, _NEEDS) from error
+
+
+def _picture(payload: object) -> NDArray[Any]:
+    """The array of a picture as it is. Raises `EncodeError`."""
     np = _numpy()
     kind = type(payload).__name__
     if not isinstance(payload, np.ndarray):
@@ -157,6 +167,13 @@ def _checked(payload: object) -> NDArray[Any]:
         check_size(width, height, frame.nbytes / height / width, frame.nbytes)
     except DecodeError as error:
         raise EncodeError("image", kind, error.reason) from error
+    return frame
+
+
+def _checked(payload: object) -> NDArray[Any]:
+    """An array of a picture; one channel in two dimensions. Raises `EncodeError`."""
+    np = _numpy()
+    frame = _picture(payload)
     if frame.ndim == 3 and frame.shape[2] == 1:
         frame = frame[:, :, 0]
     whole: NDArray[Any] = np.ascontiguousarray(frame, dtype=frame.dtype.newbyteorder("="))

@@ -23,6 +23,7 @@ from nep.graph import Graph, GraphView
 from nep.listening import Listening
 from nep.masterport import MasterPort
 from nep.outgoing import Outgoing, with_hosts, without
+from nep.rarely import is_told
 from nep.renewals import is_renewal, read_renewal, renewed_body
 from nep.requests import Done, Listen, Look, Refused, Reply, ReportAlerts, Request
 from nep.starting import Owner
@@ -33,7 +34,6 @@ from nep.waker import Waker
 __all__ = ["MasterLoop"]
 
 _logger = logging.getLogger("nep.master")
-_LOGGED = frozenset(10**n for n in range(20))
 _TICK_S = 0.25
 _REST_MS = 10
 _NODES_PER_MS = 50
@@ -160,7 +160,7 @@ class MasterLoop:
     def _failed(self, error: Exception, what: str) -> None:
         """Log what went wrong; rarely, when it does again and again."""
         self._failures += 1
-        if self._failures in _LOGGED:
+        if is_told(self._failures):
             sentence = "the master could not carry out %s (%d times so far)"
             _logger.error(sentence, what, self._failures, exc_info=error)
 

@@ -11,9 +11,11 @@ from nep.arguments import seconds
 from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
 from nep.codecs import codec_for
 from nep.encoded import Encoded, encoded
-from nep.errors import ClosedError, DecodeError
+from nep.errors import ClosedError, DecodeError, EncodeError, WireError
 from nep.message import Message
 from nep.nulls import NullTeller
+from nep.rarely import is_told
+from nep.unsendable import Unsendable
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -41,6 +43,7 @@ class Publisher:
         self._spec = spec
         self._nulls = NullTeller(spec.topic) if spec.codec.name == "json" else None
         self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
+        self._unsendable = Unsendable(spec.topic, spec.codec.encode, outlet.report)
         self._is_latched = spec.is_latched
         self._is_closed = False
 
@@ -79,29 +82,66 @@ class Publisher:
         """Messages in which NaN or infinity was sent as `null`, because JSON has neither; they are logged."""
         return 0 if self._nulls is None else self._nulls.count
 
+    @property
+    def refused(self) -> int:
+        """Payloads that could not be encoded, and so nobody got; why is logged and an alert in the graph."""
+        return self._unsendable.count
+
     def publish(self, payload: object) -> None:
         """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.
 
-        With no subscriber nothing is encoded, unless it is latched. Raises `EncodeError`,
-        `ClosedError`.
+        Raises `EncodeError` for a payload of a type that the message type does not take, and `ClosedError`.
+        What cannot be sent because of something inside is refused: counted in `refused`, logged, and an alert
+        in the graph until one can. So nothing depends on whether somebody listens: with no subscriber a
+        payload is encoded only now and then, to see whether it could be sent, unless it is latched.
         """
         if self._is_closed or not (self._outlet.is_heard or self._is_latched):
-            self._skip()
-        else:
-            self._outlet.send(payload if isinstance(payload, Encoded) else self._encode(payload))
+            self._skip(payload)
+            return
+        try:
+            made = payload if isinstance(payload, Encoded) else self._encode(payload)
+        except Exception as error:  # noqa: BLE001 - a payload may be of any class, which may raise anything
+            self._check(payload)
+            self._unsendable.add(payload, error)
+            return
+        self._send(made)
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
-        """Send bytes that are encoded already. Raises `ClosedError`."""
+        """Send bytes that are encoded already. Raises as `publish` does."""
         if self._is_closed or not (self._outlet.is_heard or self._is_latched):
-            self._skip()
+            self._skip(Encoded(data, extension))
         else:
-            self._outlet.send(encoded((data, extension)))
+            self._send(encoded((data, extension)))
 
-    def _skip(self) -> None:
-        """Count a message that nobody wants."""
+    def _send(self, made: Encoded) -> None:
+        if type(made.data) is not bytes or made.extension is not None:
+            self._check(made)
+        try:
+            self._outlet.send(made)
+        except WireError as error:  # what is in the extension
+            self._unsendable.add(made, error)
+            return
+        if self._unsendable.problem:
+            self._unsendable.cure()
+
+    def _check(self, payload: object) -> None:
+        """Raises `EncodeError` for what can be seen at once."""
+        if not isinstance(payload, Encoded):
+            self._spec.codec.check(payload)
+            return
+        codec, data, extension = self._spec.codec.name, payload.data, payload.extension
+        if not isinstance(data, bytes | memoryview):
+            raise EncodeError(codec, type(data).__name__, "give its 'bytes'")
+        if extension is not None and not isinstance(extension, Mapping):
+            raise EncodeError(codec, type(extension).__name__, "an extension is a map")
+
+    def _skip(self, payload: object) -> None:
+        """Count a message that nobody wants; now and then see whether it could be sent."""
         if self._is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
-        self._outlet.skip()
+        self._check(payload)
+        if self._unsendable.try_out(payload):
+            self._outlet.skip()
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
@@ -148,6 +188,7 @@ class Subscriber:
         self._ready = inlet.ready
         self._empty = codec_for(spec.msg_type).empty
         self._problem = ""
+        self._unreadable = 0
 
     @property
     def topic(self) -> str:
@@ -254,7 +295,7 @@ class Subscriber:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
 
     def decoded(self, message: Message) -> object:
-        """The payload of a message that this subscriber got; a problem is logged once and shown in the graph.
+        """The payload of a message that it got; a problem is logged rarely and shown in the graph.
 
         Raises `DecodeError`.
         """
@@ -269,9 +310,12 @@ class Subscriber:
         return payload
 
     def _tell(self, error: DecodeError) -> None:
-        """A message cannot be read: log the first, and tell the graph."""
-        if not self._problem:
-            _logger.warning("a message on '%s' cannot be read: %s", self.topic, error)
+        """A message cannot be read: tell the graph, and log it rarely."""
+        self._unreadable += 1
+        if is_told(self._unreadable):
+            _logger.warning(
+                "a message on '%s' cannot be read (%d so far): %s", self.topic, self._unreadable, error
+            )
         self._problem = str(error)
         self._inlet.report(self._problem)
 

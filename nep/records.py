@@ -60,13 +60,17 @@ class SubscriberRecord:
 
 @dataclass(frozen=True)
 class PublisherCount:
-    """A publisher's statistics: all messages and bytes so far, and the newest message."""
+    """A publisher's statistics: all messages and bytes so far, and the newest message.
+
+    `problem` is a sentence about payloads that cannot be sent, or empty.
+    """
 
     id: int
     count: int
     bytes: int
     last_seq: int
     last_stamp_ns: int | None = None
+    problem: str = ""
 
 
 @dataclass(frozen=True)

@@ -84,13 +84,15 @@ def _take_over(census: Census, member: Member, said: RenewalSaid, now: float) ->
     for counts in said.publishers:
         publisher = publishers[counts["id"]]
         count, size_bytes, last_seq = counts["count"], counts["bytes"], counts["last_seq"]
-        stamp_ns = counts.get("last_stamp_ns")
+        stamp_ns, problem = counts.get("last_stamp_ns"), counts.get("problem", "")
         if not type(count) is type(size_bytes) is type(last_seq) is int:
             return False
-        if stamp_ns is not None and type(stamp_ns) is not int:
+        if (stamp_ns is not None and type(stamp_ns) is not int) or type(problem) is not str:
             return False
         census.counted(publisher, count, size_bytes, now)
         census.reached(publisher, last_seq, stamp_ns)
+        if problem != publisher.problem:
+            census.troubled(publisher, problem)
     for seen in said.subscribers:
         received, lost, problem = seen["received"], seen["lost"], seen.get("problem", "")
         if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:

@@ -41,7 +41,9 @@ class Viewer:
             if name not in known:
                 publishing, subscribing = census.publishing(name), census.subscribers_of(name)
                 known[name] = _look_at(name, publishing, subscribing)
-                if len(publishing) > 1 or any(each.problem for _member, each in subscribing):
+                is_told = any(each.problem for _member, each in subscribing)
+                is_told = is_told or any(each.problem for _member, each in publishing)
+                if len(publishing) > 1 or is_told:
                     self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
         nodes = {each.node.id: _node_info(each) for each in census.members.values()}
         topics = {name: known[name] for name in names}
@@ -181,6 +183,14 @@ def _topic_alerts(
             f"The topic “{topic}” has {len(types)} types: it is published by {said}",
             "Use the same type in all programs, or give one of the topics another name.",
         )
+    for member, publisher in publishing:
+        if publisher.problem:
+            yield Alert(
+                f"encode:{topic}",
+                f"“{member.node.name}” cannot send on “{topic}”: {publisher.problem}",
+                "Look at the program: nobody gets these messages.",
+            )
+            break
     for member, subscriber in subscribing:
         if subscriber.problem:
             yield Alert(

@@ -213,8 +213,6 @@ class Driver:
             publisher.publish(value)
         except nep.ClosedError:
             return
-        except nep.EncodeError as error:
-            _log.warning("%s: nothing is published on '%s': %s", self.name, topic, error)
 
     def _listen(self, topic: str, msg_type: str, receive: Callable[[object, int | None], None]) -> None:
         def hand_over(payload: object, publisher: int | None) -> None:

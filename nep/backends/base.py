@@ -93,6 +93,9 @@ class Outlet(Protocol):
     def skip(self) -> None:
         """Count a message that nobody wants."""
 
+    def report(self, problem: str) -> None:
+        """The publisher cannot send what it is given, and why; an empty sentence means that it can again."""
+
     def send(self, encoded: Encoded) -> None:
         """Publish. Never blocks: what a subscriber cannot take is lost to it, and it counts that."""
 

@@ -21,6 +21,7 @@ from nep.inbox import Inbox
 from nep.load import CpuLoad
 from nep.message import Message, arrived, kind_of
 from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.wire import extension_part
 
 __all__ = ["BACKEND"]
 
@@ -92,6 +93,7 @@ class MemoryOutlet:
         self.bytes = 0
         self._kind = kind_of(spec.topic, spec.codec.name, spec.msg_type, is_latched=spec.is_latched)
         self.last_stamp_ns: int | None = None
+        self.problem = ""
         self.latched: Message | None = None
         self.missing: tuple[str, ...] = ()
         self.is_closed = False
@@ -112,8 +114,23 @@ class MemoryOutlet:
             self.count += 1
             self.last_stamp_ns = time.time_ns()
 
+    def counts(self) -> PublisherCount:
+        """The statistics for a renewal."""
+        return PublisherCount(
+            self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, self.problem
+        )
+
+    def report(self, problem: str) -> None:
+        """Shown as an alert in the graph."""
+        self.problem = problem
+
     def send(self, encoded: Encoded) -> None:
-        """Put it into the inboxes; `data` that can still be changed is copied."""
+        """Put it into the inboxes; `data` that can still be changed is copied.
+
+        Raises `WireError` for an extension that has no form on the wire, as other back ends do.
+        """
+        if encoded.extension:
+            extension_part(encoded.extension)
         data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
         with self.hub.lock:
             self.skip()
@@ -275,7 +292,9 @@ class MemoryCarrier:
             self.node.id,
             hub.graph.epoch,
             hub.graph.revision,
-            tuple(PublisherCount(o.spec.id, o.count, o.bytes, o.count, o.last_stamp_ns) for o in outs),
+            tuple(
+                PublisherCount(o.spec.id, o.count, o.bytes, o.count, o.last_stamp_ns, o.problem) for o in outs
+            ),
             tuple(SubscriberCount(i.spec.id, i.received, i.lost, i.problem) for i in ins),
             self._load.ratio(),
         )

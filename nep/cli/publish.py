@@ -19,6 +19,7 @@ from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say
 from nep.codecs import CODECS, codec_for
+from nep.encoded import Encoded
 from nep.errors import EncodeError, NepError
 from nep.pubsub import Publisher
 from nep.views import TopicInfo
@@ -81,7 +82,7 @@ def publish(
         known = node.graph().topics.get(topic)
         kind = msg_type or (known.msg_type if known else "json")
         _warn_of_type(topic, kind, known)
-        value = None if payload == "-" else value_of(payload, kind)
+        value = None if payload == "-" else encoded_of(payload, kind)
         with node.new_pub(topic, kind, latched=latched) as publisher:
             if payload == "-":
                 _publish_lines(publisher, kind)
@@ -101,6 +102,11 @@ def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
         codec_for(kind).name == "json" and (near := get_close_matches(kind, CODECS, n=1)) and near[0] != kind
     ):
         say(f"the type '{kind}' is sent as JSON; did you mean '{near[0]}'?")
+
+
+def encoded_of(text: str, msg_type: str) -> Encoded:
+    """The bytes of `value_of`: a person wants to know at once what cannot be sent. Raises as it does."""
+    return codec_for(msg_type).encode(value_of(text, msg_type))
 
 
 def value_of(text: str, msg_type: str) -> object:
@@ -148,7 +154,7 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
         except UnicodeDecodeError as error:
             where = f"byte {error.start + 1} of line {number}"
             raise NepError(f"{where} is no UTF-8; save the text as UTF-8, or use --type bytes") from error
-        publisher.publish(value_of(text, msg_type))
+        publisher.publish(encoded_of(text, msg_type))
 
 
 def _lines() -> Iterator[bytes]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Callable, Iterator
 from itertools import count
 
+import numpy as np
 import pytest
 
 import nep
@@ -117,17 +119,97 @@ def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
     assert (early.lost, late.lost) == (0, 0)
 
 
-def test_nobody_listening_means_nothing_is_encoded(make: Make) -> None:
-    pub = make("a").new_pub("topic")
-    pub.publish(object())  # would be an EncodeError
-    assert (pub.subscribers, pub.count) == (0, 1)
+def test_what_cannot_be_sent_is_the_same_with_and_without_a_listener(
+    make: Make, caplog: pytest.LogCaptureFixture
+) -> None:
+    node = make("a")
+    pub = node.new_pub("topic")
+    bad = {"pose": {"x": 1}, "joints": [0, {"angle": {1, 2}}]}
+    pub.publish(bad)
+    assert (pub.subscribers, pub.count, pub.refused) == (0, 0, 1)
+    assert "a message on 'topic' cannot be sent (1 so far): cannot encode a 'dict' as 'json'" in caplog.text
+    assert "it is at 'joints[1].angle'" in caplog.text
     sub = make("b").new_sub("topic")
     assert pub.subscribers == 1
-    with pytest.raises(nep.EncodeError, match="cannot encode a 'object' as 'json'"):
-        pub.publish(object())
+    pub.publish(bad)
+    assert (pub.count, pub.refused) == (0, 2)
+    eventually(lambda: [each.id for each in node.graph().alerts] == ["encode:topic"])
+    (alert,) = node.graph().alerts
+    assert alert.sentence.startswith("“a” cannot send on “topic”: cannot encode a 'dict' as 'json'")
     pub.publish(1)
     assert sub.listen(timeout_s=2.0) == (True, 1)
-    assert sub.lost == 0
+    assert (sub.lost, pub.count, pub.refused) == (0, 1, 2)
+    eventually(lambda: not node.graph().alerts)
+
+
+def test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before(make: Make) -> None:
+    pub = make("a").new_pub("topic", latched=True)
+    pub.publish("good")
+    pub.publish(object())
+    assert (pub.count, pub.refused) == (1, 1)
+    assert make("b").new_sub("topic").listen(timeout_s=2.0) == (True, "good")
+
+
+@pytest.mark.parametrize("is_heard", [False, True])
+@pytest.mark.parametrize("latched", [False, True])
+@pytest.mark.parametrize(
+    ("msg_type", "payload", "sentence"),
+    [
+        ("string", 5, "cannot encode a 'int' as 'string'; publish a 'str', or use the type 'json'"),
+        ("bytes", "text", "cannot encode a 'str' as 'bytes'; publish 'bytes'"),
+        ("image", "text", "cannot encode a 'str' as 'image'; publish a 'uint8' array"),
+        ("image", np.zeros((4, 4, 3), np.complex64), "its numbers are 'complex64'"),
+        ("image", np.zeros((4, 0, 3), np.uint8), "is none of a picture"),
+        ("json", nep.Encoded("text"), "cannot encode a 'str' as 'json'; give its 'bytes'"),  # type: ignore[arg-type]
+        ("json", nep.Encoded(b"1", [1]), "cannot encode a 'list' as 'json'; an extension is a map"),  # type: ignore[arg-type]
+    ],
+)
+def test_a_payload_of_a_wrong_type_is_an_error_heard_or_unheard(
+    make: Make, msg_type: str, payload: object, sentence: str, is_heard: bool, latched: bool
+) -> None:
+    pub = make("a").new_pub("topic", msg_type, latched=latched)
+    if is_heard:
+        make("b").new_sub("topic", msg_type)
+    for _ in range(3):  # each of them, not only now and then
+        with pytest.raises(nep.EncodeError, match=re.escape(sentence)):
+            pub.publish(payload)
+    assert (pub.count, pub.refused) == (0, 0)
+
+
+class Treacherous:
+    """Raises whatever one asks it, as a class of a user may."""
+
+    def tolist(self) -> object:
+        raise RuntimeError(self)
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+@pytest.mark.parametrize("is_heard", [False, True])
+@pytest.mark.parametrize(
+    ("msg_type", "payload"),
+    [
+        ("string", "\ud800"),
+        ("json", {"a": "\ud800"}),
+        ("json", {object(): 1}),
+        ("json", 2**70),
+        ("json", Treacherous()),
+        ("msgpack", Treacherous()),
+        ("json", {Treacherous(): Treacherous()}),
+        ("msgpack", [2**70]),
+        ("image", b"no picture"),
+        ("bytes", nep.Encoded(b"1", {"a": object()})),
+    ],
+)
+def test_whatever_is_inside_ends_no_program(
+    make: Make, msg_type: str, payload: object, is_heard: bool
+) -> None:
+    pub = make("a").new_pub("topic", msg_type)
+    if is_heard:
+        make("b").new_sub("topic", msg_type)
+    pub.publish(payload)
+    assert (pub.count, pub.refused) == (0, 1)
 
 
 def test_keep_latest(make: Make) -> None:

@@ -98,6 +98,9 @@ class OriginalOutlet:
         with self._changed:
             wait_until(self._changed, lambda: self._filters > 0, timeout_s)
 
+    def report(self, problem: str) -> None:
+        """There is no graph that could show it."""
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._changed:

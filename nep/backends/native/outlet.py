@@ -85,6 +85,7 @@ class NativeOutlet:
         """From so many on a message is not simply sent to all."""
         self._backlog = Backlog()
         self._last_stamp_ns: int | None = None
+        self._problem = ""
         self._audience = Audience(spec.topic, spec.id)
         self._seen, self._apart = self._audience.seen, self._audience.apart
         self._names: dict[int, str] = {}
@@ -134,7 +135,9 @@ class NativeOutlet:
     def counts(self) -> PublisherCount:
         """The statistics for a renewal."""
         with self._changed:
-            return PublisherCount(self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns)
+            return PublisherCount(
+                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
+            )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Be reached at these addresses of this computer from now on; the endpoints. See `Places.move`."""
@@ -167,6 +170,10 @@ class NativeOutlet:
 
     # ---- sending
 
+    def report(self, problem: str) -> None:
+        """The publisher's trouble with a payload, for the next renewal."""
+        self._problem = problem
+
     def skip(self) -> None:
         """Count a message that nobody wants."""
         with self._lock:
@@ -174,7 +181,10 @@ class NativeOutlet:
             self._last_stamp_ns = time.time_ns()
 
     def send(self, encoded: Encoded) -> None:
-        """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed."""
+        """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed.
+
+        Raises `WireError` for an extension that has no form on the wire.
+        """
         data: Part
         data, beside = encoded
         extension = None

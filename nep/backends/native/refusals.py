@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 
+from nep.rarely import is_told
+
 __all__ = ["Refusals"]
 
 _TOLD_S = 5.0
-_LOGGED = frozenset(10**n for n in range(20))
 
 
 class Refusals:
@@ -23,7 +24,7 @@ class Refusals:
         self.count += 1
         self._reason = reason
         self._last_at = time.monotonic()
-        return self.count in _LOGGED
+        return is_told(self.count)
 
     def told(self) -> str:
         """The newest reason and how many there were; empty when there was none in the last seconds."""

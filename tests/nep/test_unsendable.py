@@ -1,0 +1,108 @@
+"""Payloads that cannot be sent: counted, told rarely, and where in them. No sockets."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+import nep
+from nep.codecs import CODECS
+from nep.rarely import is_told
+from nep.unsendable import Unsendable, place_of
+
+
+class Told:
+    """What was reported, and a clock that goes when it is told to."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self.now = 0.0
+        self.encoded = 0
+        self.takes_s = 0.0
+
+    def encode(self, payload: object) -> nep.Encoded:
+        self.encoded += 1
+        self.now += self.takes_s
+        return CODECS["json"].encode(payload)
+
+    def new(self) -> Unsendable:
+        return Unsendable("t", self.encode, self.problems.append, lambda: self.now)
+
+
+def test_unheard_payloads_are_looked_at_once_a_second() -> None:
+    told = Told()
+    unsendable = told.new()
+    for _ in range(1000):
+        assert unsendable.try_out(1)
+        told.now += 0.01
+    assert told.encoded == 10
+
+
+def test_a_payload_that_takes_long_is_looked_at_less_often() -> None:
+    told = Told()
+    told.takes_s = 0.5
+    unsendable = told.new()
+    for _ in range(10_000):
+        unsendable.try_out(1)
+        told.now += 0.01
+    assert told.encoded * 0.5 / told.now < 0.025
+
+
+def test_an_unheard_payload_that_cannot_be_sent_is_told_until_one_can() -> None:
+    told = Told()
+    unsendable = told.new()
+    assert not unsendable.try_out(object())
+    assert unsendable.count == 1
+    told.now += 1.0
+    assert unsendable.try_out(1)
+    assert told.problems == ["cannot encode a 'object' as 'json'; 'object' has no form in it", ""]
+
+
+def test_good_and_bad_in_turn_are_logged_rarely(caplog: pytest.LogCaptureFixture) -> None:
+    told = Told()
+    unsendable = told.new()
+    for _ in range(500):
+        unsendable.add([object()], nep.EncodeError("json", "list", "because"))
+        unsendable.cure()
+    assert unsendable.count == 500
+    assert len(caplog.records) == 3
+    assert caplog.records[-1].getMessage().startswith("a message on 't' cannot be sent (100 so far): ")
+
+
+def test_good_and_bad_messages_in_turn_are_logged_rarely(caplog: pytest.LogCaptureFixture) -> None:
+    with nep.node("n", "memory", master="rarely") as node:
+        sub, pub = node.new_sub("t"), node.new_pub("t")
+        for _ in range(500):
+            pub.publish_bytes(b"{")
+            pub.publish(1)
+            assert sub.listen() == (True, 1)
+    assert [record.levelno for record in caplog.records] == [logging.WARNING] * 3
+
+
+@pytest.mark.parametrize(
+    ("payload", "place"),
+    [
+        (object(), ""),
+        ({"a": 1}, ""),
+        ({"a": {"b": [1, 2, {"c": object()}]}}, "a.b[2].c"),
+        ([[[object()]]], "[0][0][0]"),
+        ({"a": list(range(20_000)), "b": object()}, "b"),
+        ([*list(range(9998)), object()], "[9998]"),
+        ([*list(range(20000)), object()], ""),
+        ({object(): 1}, ""),
+        ({"a": (1, {2})}, "a[1]"),
+    ],
+)
+def test_where_in_a_payload_it_is(payload: object, place: str) -> None:
+    assert place_of(payload, CODECS["json"].encode) == place
+
+
+def test_a_payload_that_holds_itself_has_an_end() -> None:
+    endless: list[object] = []
+    endless.append(endless)
+    assert place_of(endless, CODECS["json"].encode).startswith("[0][0]")
+
+
+def test_the_rule_of_rare_logging() -> None:
+    assert [count for count in range(1001) if is_told(count)] == [1, 10, 100, 1000]
