@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from app.core.stopping import RobotStop, StopReport
 
 STOPPING_SHOWN_AFTER_S = 0.1
+MOST_NAMED = 4
 NOTHING = "Take “when started” from Events and hang blocks below it"
 
 
@@ -270,7 +271,11 @@ def _wrong_words(report: StopReport) -> str:
     told = [robot.wrong for robot in report.unproven if robot.refused]
     untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
     silent = [robot.who for robot in report.unproven if not robot.error]
-    return "; ".join([*told, *untold, *([f"{listed(silent)} did not answer"] if silent else [])])
+    if len(silent) > MOST_NAMED:
+        silent = [*silent[:MOST_NAMED], f"{len(silent) - MOST_NAMED} more"]
+    wrong = [*told, *untold, *([f"{listed(silent)} did not answer"] if silent else [])]
+    more = [f"{len(wrong) - MOST_NAMED} more may still move"] if len(wrong) > MOST_NAMED else []
+    return "; ".join([*wrong[:MOST_NAMED], *more])
 
 
 def stop_words(robot: RobotStop, clock: str) -> str:

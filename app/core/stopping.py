@@ -37,6 +37,9 @@ LATE_S = 120.0
 """How long an answer that comes too late is still taken."""
 LATE_KEPT = 64
 UNKNOWN_KEPT = 32
+MOST_SERVING = 32
+"""So many programs that serve one robot are waited for, and so many that only listen are named:"""
+MOST_LISTENING = 4
 LOOK_S = 0.1
 """How often the master is asked at most while an answer of an unknown publisher waits."""
 GRAPH_S = 0.3
@@ -76,6 +79,8 @@ class RobotStop:
         """What is wrong, without a full stop: "Pepper did not answer"; nothing when it stopped."""
         if self.answered or not self.can_confirm:
             return ""
+        if self.program and self.refused:
+            return f"{self.error} (says “{self.program}”)"
         return self.error or f"{self.who} did not answer"
 
     @property
@@ -532,13 +537,17 @@ class RobotStopper:
         own = identity.node_id if identity is not None else "nobody"
         found: dict[str, RobotStop | None] = {own: None}
         answering = {node for way in target.ways for node in publishing(view, way.answer)}
-        for node in (node for way in target.ways for node in hearing(view, way.command)):
-            if node in (own, self._node.id):
-                continue
-            program = asked.programs[node] = identity_of(view, node).node or node
-            can_confirm = node in answering
-            line = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
-            found.setdefault(node, None if can_confirm else line)
+        heard = dict.fromkeys(node for way in target.ways for node in hearing(view, way.command))
+        others = [node for node in heard if node not in (own, self._node.id)]
+        for node in [node for node in others if node in answering][:MOST_SERVING]:
+            asked.programs[node] = identity_of(view, node).node or node
+            found[node] = None
+        listening = [node for node in others if node not in answering]
+        programs = [identity_of(view, node).node or node for node in listening[:MOST_LISTENING]]
+        if len(listening) > MOST_LISTENING:
+            programs = [f"{len(listening)} programs"]
+        for node, program in zip(listening, programs, strict=False):
+            found[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
         for before in target.earlier:
             if before.node_id not in found:
                 asked.programs[before.node_id] = before.node or before.node_id

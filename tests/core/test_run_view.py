@@ -88,6 +88,27 @@ def test_not_answered_names_the_robot_and_what_a_hand_can_do() -> None:
     assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)
 
 
+def test_what_a_robot_said_stands_first_in_its_own_words() -> None:
+    stuck = RobotStop("Arm", False, 9.0, error="Arm may still move: the brake is stuck", refused=True)
+    view = view_of(after(PEPPER, stuck, SILENT), [], 0)
+    assert view.title == "Arm may still move: the brake is stuck; Turtle did not answer"
+    assert view.detail == "Pepper stopped (38 ms). Switch Arm and Turtle off by hand."
+    assert view.confirm == "Arm and Turtle are still"
+    twin = RobotStop("Arm", False, 9.0, error=stuck.error, refused=True, program="arm 2")
+    assert view_of(after(twin), [], 0).title == "Arm may still move: the brake is stuck (says “arm 2”)"
+    assert stop_words(stuck, "8:40") == "Arm may still move: the brake is stuck, at 8:40"
+
+
+def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
+    many = [RobotStop("Pepper", False, None, program=f"copy {number}") for number in range(30)]
+    title = view_of(after(*many), [], 0).title
+    assert title.endswith("Pepper (“copy 3”) and 26 more did not answer")
+    refused = [
+        RobotStop(f"R{n}", False, 1.0, error=f"R{n} may still move: no", refused=True) for n in range(9)
+    ]
+    assert view_of(after(*refused), [], 0).title.endswith("R3 may still move: no; 5 more may still move")
+
+
 def test_a_robot_of_rize_is_never_called_stopped() -> None:
     view = view_of(after(RIZE), [], 0)
     assert view.result == "stop sent; Nao cannot confirm"

@@ -112,6 +112,18 @@ def test_a_program_that_only_listens_to_the_commands_is_named(master, stopper) -
     assert [robot.sentence for robot in report.robots][1:] == [said]
 
 
+def test_a_crowd_that_listens_is_one_line(master, stopper) -> None:
+    nodes = [nep.node(f"listener {number}", master=master.address) for number in range(6)]
+    for node in nodes:
+        node.new_sub("/Pepper/command", "robot/command")
+    stopper.see(stopper._node.graph())
+    report = stopper.stop_all()
+    for node in nodes:
+        node.close()
+    assert [robot.program for robot in report.robots] == ["", "6 programs"]
+    assert report.proven
+
+
 def test_whoever_announced_it_first_is_the_robot_also_when_nobody_said_so(master, stopper, pepper) -> None:
     twin = WireRobot(master.address)
     try:
