@@ -73,6 +73,7 @@ class BannerRoom(QWidget):
         if said == self._said:
             return
         first, self._said = not self._said, said
+        self._place.raise_()
         wanted = self.height_wanted
         top = QRect(0, self.y(), self.width(), wanted)
         if first:
@@ -93,7 +94,6 @@ class BannerRoom(QWidget):
         place = QRect(self.x(), top, self.width(), wanted)
         if place != self._place.geometry():
             self._place.setGeometry(place)
-        self._place.raise_()
 
     def _mouse(self) -> QPoint:
         at, parent = self.mouse_at(), self.parentWidget()

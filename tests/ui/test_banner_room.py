@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, Qt
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
@@ -49,8 +49,13 @@ def places(window: MainWindow) -> dict[str, QPoint]:
 
 def say(window: MainWindow, name: str = "one", severity: str = "error") -> None:
     window.session.alerts.put(name, severity, f"It is {name}.", "Mend it.", button="Mend", action="run.stop")
-    window.tick()
-    QApplication.processEvents()
+    settle(window)
+
+
+def settle(window: MainWindow) -> None:
+    for _ in range(5):  # Qt lays out what lies in what was laid out
+        window.tick()
+        QApplication.processEvents()
 
 
 def test_pages_stay_while_the_mouse_is_over_them_and_make_room_when_it_has_left(
@@ -160,3 +165,39 @@ def test_it_keeps_to_the_window_when_that_changes(window: MainWindow, mouse: Mou
     QApplication.processEvents()
     window.tick()
     assert window.banner.geometry().top() >= window.run_bar.geometry().bottom()
+
+
+def test_a_banner_that_stands_there_is_not_painted_again(window: MainWindow, mouse: Mouse) -> None:
+    mouse.over(window.tool_bar)
+    say(window)
+    mouse.now += FRESH_S
+    settle(window)
+    changed: list[QEvent.Type] = []
+
+    class Listens(QObject):
+        def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+            changed.append(event.type())
+            return False
+
+    listens = Listens()
+    window.banner.installEventFilter(listens)
+    for _ in range(10):
+        window.tick()
+        QApplication.processEvents()
+    window.banner.removeEventFilter(listens)
+    assert not {QEvent.Type.Paint, QEvent.Type.ZOrderChange, QEvent.Type.Resize} & set(changed)
+
+
+def test_longer_words_of_the_same_alert_move_nothing_either(qtbot, window: MainWindow, mouse: Mouse) -> None:
+    assert window.bench is not None
+    mouse.over(window.tool_bar)
+    say(window)
+    mouse.over(window.bench.docks["topics"].panel)
+    before, low = places(window), window.banner.height()
+    window.session.alerts.put("one", "error", "It is one. " * 60, "Mend it.")
+    window.tick()
+    qtbot.waitUntil(lambda: window.banner.height() > low)
+    assert places(window) == before
+    mouse.over(window.tool_bar)
+    QApplication.processEvents()
+    assert window.room.height() == window.banner.height()

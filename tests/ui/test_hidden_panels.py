@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtCore import QEvent, QObject
+from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.core.session import Session
 from app.core.settings import Settings
@@ -313,3 +314,40 @@ def test_every_panel_that_watches_tells_what_it_looks_at(case: Case) -> None:
     case.window.show_start()
     case.hide_for_long()
     assert case.source.wanted == {"/Pepper/answer"}
+
+
+class Paints(QObject):
+    """Writes down which widgets are painted."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.of: list[str] = []
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Paint:
+            self.of.append(type(watched).__name__)
+        return False
+
+
+@pytest.mark.parametrize("layout", ["behaviour", "developer"])
+def test_nothing_is_painted_again_that_has_not_changed(qtbot, case: Case, layout: str) -> None:
+    bench = case.window.show_layout(layout)
+    for name in ("health", "robots", "alerts", "console"):
+        bench.open(name)
+    bench.focus_panel(bench.docks["health"])  # nothing there blinks, as a field does
+    case.tick()
+    case.arrive("/Pepper/battery", b'{"value": 84}')
+    settle(qtbot, case, bench.docks["health"])
+    for _ in range(40):  # figures that are told only now and then have been told
+        case.tick()
+        QApplication.processEvents()
+    paints = Paints()
+    application = QApplication.instance()
+    assert application is not None
+    application.installEventFilter(paints)
+    for _ in range(60):
+        case.tick()
+        QApplication.processEvents()
+    application.removeEventFilter(paints)
+    told = {"MainWindow", "QWidget", "StatusBar", "StatusItem"}  # how long a tick takes is a new figure
+    assert set(paints.of) <= told
