@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from typing import IO, TYPE_CHECKING, Literal, cast
 
 from nep.cli.values import json_of
@@ -43,15 +44,21 @@ class Column:
 
 def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
     """A console for coloured text, on `out` if it is given; rich is loaded when the first one is made."""
+    made = _console_class()
+    return made(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
+
+
+@cache
+def _console_class() -> type[Console]:
     from rich.console import Console  # noqa: PLC0415 - 40 ms that `--json` and `--help` need not wait for
 
-    class Ours(Console):
+    class OpenConsole(Console):
         """Tells of a reader that has left as every stream does."""
 
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError(errno.EPIPE, "nobody reads the output any more")
 
-    return Ours(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
+    return OpenConsole
 
 
 def json_painter() -> Callable[[str, str], Text]:
