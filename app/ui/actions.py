@@ -111,7 +111,16 @@ TABLE: tuple[Row, ...] = (
     Row("run.full_speed", "Run", "Full speed", "", group="pace", above=True),
     Row("run.slow", "Run", "Slow motion: 0.5 s a block", "", group="pace"),
     Row("run.very_slow", "Run", "Very slow: 1.5 s a block", "", group="pace"),
-    Row("run.stop", "Run", "Stop the program and all robots", "F12", "square", above=True, everywhere=True),
+    Row(
+        "run.stop",
+        "Run",
+        "Stop the program and all robots",
+        "F12",
+        "square",
+        above=True,
+        everywhere=True,
+        also=("Ctrl+.",),  # F12 is a key for sound on Macs and many laptops
+    ),
     Row("robots.virtual", "Robots", "Use the virtual Pepper", "", "bot"),
     Row("robots.turtle", "Robots", "Use the virtual Turtle", "", "bot"),
     Row("robots.show", "Robots", "Try what a robot can do", "", "eye", above=True),

@@ -21,7 +21,9 @@ from app.ui.main_window import START, MainWindow
 from app.ui.mends import RobotMends
 from app.ui.others_sheet import OthersSheet
 from app.ui.popup import Sheet
+from app.ui.shortcuts import STOP
 from app.ui.single_window import Asked
+from app.ui.stop_keys import StopKeys
 from app.ui.tabs import Tabs
 from nep.later import later
 
@@ -91,6 +93,8 @@ class Commands:
             **RobotMends(window.session, self.files, window.toast.say, lambda: self._edit("undo")).asked(),
         }
         self.habits.use(self.actions, self.actions.fill(window.bar.menus))
+        shortcuts = self.habits.shortcuts
+        self.stop_keys = StopKeys(window, lambda: shortcuts.of(STOP), self.actions[STOP].trigger)
         window.run = self.run
         window.status.opened.connect(self._ask_about_others)
         self._connect()

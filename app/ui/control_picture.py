@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
 
 from app.robots.description import Parameter
 from app.ui.control import Control, connect, line_field
+from app.ui.file_dialogs import show_free
 from app.ui.flow import Flow
 from app.ui.picture_file import FILES, encoded, image_of, read_picture
 from app.ui.picture_thumbnail import Thumbnail
@@ -124,9 +125,10 @@ class PictureChoice(QWidget):
     # -- a file -------------------------------------------------------------------------------------------
 
     def _ask(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(self, "Choose a picture", "", FILES)
-        if path:
-            self.use_file(Path(path))
+        dialog = QFileDialog(self, "Choose a picture", "", FILES)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.fileSelected.connect(lambda chosen: self.use_file(Path(chosen)))
+        show_free(dialog)
 
     def use_file(self, path: Path) -> None:
         """Take a picture file; one that can't be read is named and says why."""

@@ -1,4 +1,4 @@
-"""Which file? The system's own dialogs ask it, the only ones there are; Stop stays free meanwhile."""
+"""Which file? The only dialogs that there are ask it; Stop stays free meanwhile."""
 
 from __future__ import annotations
 
@@ -24,34 +24,37 @@ class Asks(Protocol):
         """Where to save."""
 
 
+def show_free(dialog: QFileDialog) -> None:
+    """Show a dialog that leaves Stop free: the window can be used, and Stop's keys work in the dialog too.
+
+    Qt's own dialog, not the system's: keys that are pressed there never come to us, and some of them block.
+    """
+    dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    dialog.setWindowModality(Qt.WindowModality.NonModal)
+    dialog.show()
+    dialog.activateWindow()  # the keys go there, also where no window manager sees to it
+
+
 class SystemDialogs:
-    """The system's own file dialogs, not blocking the window."""
+    """File dialogs that do not block the window."""
 
     def __init__(self, window: QWidget) -> None:
         self._window = window
 
-    def _show(self, dialog: QFileDialog) -> None:
-        """Show a dialog that leaves Stop free: the window can be used, and F12 works in the dialog too."""
-        everywhere = Qt.ShortcutContext.ApplicationShortcut
-        dialog.addActions([act for act in self._window.actions() if act.shortcutContext() == everywhere])
-        dialog.setWindowModality(Qt.WindowModality.NonModal)
-        dialog.show()
-        dialog.activateWindow()  # the keys go there, also where no window manager sees to it
-
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog("Open a behaviour", folder, take)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        self._show(dialog)
+        show_free(dialog)
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog("Save the behaviour", str(Path(suggestion).parent), take)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
-        self._show(dialog)
+        show_free(dialog)
 
     def _dialog(self, title: str, folder: str, take: Callable[[Path], None]) -> QFileDialog:
         dialog = QFileDialog(self._window, title, folder, FILTER)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(lambda chosen: take(Path(chosen)))
         return dialog

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QGridLayout, QHBoxLayout, QScrollArea
 
 from app.core import snapshots
 from app.core.settings import Settings
+from app.ui.file_dialogs import show_free
 from app.ui.overlay import Overlay
 from app.ui.theme import MODES, Theme
 from app.ui.theme_system import WISHES
@@ -134,15 +135,12 @@ class SettingsSheet(Overlay):
         self._changed(lambda: self.theme.set_motion(wish))
 
     def _choose(self) -> None:
-        """The system's dialog; it is modal to nothing, so that F12 goes on working."""
+        """Ask for a folder, while everything else goes on."""
         before = str(snapshots.folder(self._settings))
         dialog = QFileDialog(self.window_below(), "Folder for pictures", before)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self.keep_folder)
-        dialog.setWindowModality(Qt.WindowModality.NonModal)
-        dialog.show()
-        dialog.activateWindow()  # the keys go there, also where no window manager sees to it
+        show_free(dialog)
 
     def keep_folder(self, folder: str) -> None:
         """Keep pictures there from now on."""

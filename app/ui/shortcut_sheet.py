@@ -234,7 +234,8 @@ class ShortcutSheet(Overlay):
         if entry.name == STOP and len(self._shortcuts.of(STOP)) == 1:
             self._tell("Stop keeps F12.")
             return
-        self._stop_waiting(f"“{entry.words}” has no key of its own now.")
+        said = f"“{entry.words}” has no key of its own now."
+        self._stop_waiting("Stop has only F12 now." if entry.name == STOP else said)
         self._shortcuts.give(entry.name, "")
 
     def _reset(self) -> None:

@@ -1,7 +1,7 @@
 """Which keys do what: those of the table of commands as a person changed them, and those that stay.
 
-Kept in the settings under "shortcuts": only what differs from the table. F12 is Stop and stays so; Stop may
-have a second key.
+Kept in the settings under "shortcuts": only what differs from the table. F12 is Stop and stays so; Stop has a
+second key, Ctrl+. at first (Cmd+. on Macs, where F12 is a key for sound).
 """
 
 from __future__ import annotations
@@ -120,7 +120,8 @@ class Shortcuts(QObject):
         """The keys of a command now, the first of them in menus and tooltips."""
         keys = self._own.get(name, self.default(name))
         if name == STOP:
-            return (STOP_KEY, *(key for key in keys if key != STOP_KEY))
+            given = {key for other, own in self._own.items() if other != STOP for key in own}
+            return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in given))
         return tuple(key for key in keys if key != STOP_KEY)
 
     def first(self, name: str) -> str:

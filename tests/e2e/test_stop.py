@@ -50,12 +50,12 @@ def test_f12_in_the_web_view_stops(turning: Studio) -> None:
     assert turning.outlined("stopped")
 
 
-def test_f12_while_a_text_in_a_block_is_edited_stops(turning: Studio) -> None:
+def test_ctrl_period_while_a_text_in_a_block_is_edited_stops(turning: Studio) -> None:
     turning.point("[data-id='text Round and round'] .blocklyInputField", dx=10, dy=10)
     typing = "document.activeElement && document.activeElement.classList.contains('blocklyHtmlInput')"
     until(lambda: turning.page(typing), "the text is edited")
     turning.screen.type("Hello")
-    turning.screen.key("F12")
+    turning.screen.key(".", ["Ctrl"])
     stands_still(turning)
 
 

@@ -145,7 +145,17 @@ def test_stop_keeps_f12_and_may_have_a_second_key(keys: Shortcuts) -> None:
     assert keys.of("run.stop") == ("F12", "F5")
     assert keys.of("run.run") == ()
     keys.reset("run.stop")
+    assert keys.of("run.stop") == ("F12", "Ctrl+.")
+
+
+def test_stops_second_key_is_left_to_whom_a_person_gave_it(tmp_path: Path, qapp: object) -> None:
+    settings = Settings(tmp_path)
+    settings.set("shortcuts", {"run.step": ["Ctrl+."]})
+    keys = Shortcuts(settings, print)
     assert keys.of("run.stop") == ("F12",)
+    assert keys.holder("Ctrl+.") == "run.step"
+    keys.reset("run.step")
+    assert keys.of("run.stop") == ("F12", "Ctrl+.")
 
 
 def test_nobody_else_gets_f12_not_even_from_the_settings(tmp_path: Path, qapp: object) -> None:
@@ -293,6 +303,9 @@ def test_keys_are_taken_away_and_reset(sheet: ShortcutSheet, commands: Commands)
     QTest.mouseClick(sheet.reset_all, Qt.MouseButton.LeftButton)
     assert keys.of("file.save") == ("Ctrl+S",)
     choose(sheet, "Stop the program and all robots")
+    sheet._take_away()
+    assert sheet.said.text() == "Stop has only F12 now."
+    assert keys.of("run.stop") == ("F12",)
     sheet._take_away()
     assert sheet.said.text() == "Stop keeps F12."
 

@@ -1,0 +1,167 @@
+"""Stop works with everything open: nothing is modal, and Stop's keys reach it before anything else."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QContextMenuEvent, QGuiApplication
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog, QMenu
+
+import app.ui
+from app.robots.inputs import Parameter
+from app.ui.commands import Commands
+from app.ui.control_picture import NoPictures, PictureChoice
+from app.ui.main_window import MainWindow
+from app.ui.theme import Theme
+from app.ui.widgets.choices import Choice
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
+
+MODAL = {
+    "exec", "exec_", "setModal", "getOpenFileName", "getOpenFileNames", "getSaveFileName",
+    "getExistingDirectory", "getOpenFileUrl", "getSaveFileUrl", "getColor", "getFont", "getText", "getItem",
+    "getInt", "getDouble", "getMultiLineText", "ApplicationModal", "WindowModal",
+}  # fmt: skip
+KEYS = [
+    (Qt.Key.Key_F12, Qt.KeyboardModifier.NoModifier),
+    (Qt.Key.Key_Period, Qt.KeyboardModifier.ControlModifier),
+]
+
+
+@pytest.fixture
+def stops(qtbot, window: MainWindow, commands: Commands) -> Iterator[list[str]]:
+    """How often Stop was done; the window shows the Developer layout and has the keyboard."""
+    done: list[str] = []
+    commands.actions["run.stop"].triggered.connect(lambda: done.append("stop"))
+    window.theme.set_motion("on")
+    window.show()
+    window.activateWindow()
+    commands.run("layout.developer")
+    qtbot.waitUntil(window.isActiveWindow)
+    yield done
+    for widget in QApplication.topLevelWidgets():
+        if isinstance(widget, (QMenu, QFileDialog)):
+            widget.close()
+
+
+def a_menu(window: MainWindow) -> None:
+    menu = window.bar.menus.actions()[3].menu()
+    menu.popup(window.mapToGlobal(QPoint(200, 40)))
+
+
+def a_menu_of_a_panel(window: MainWindow) -> None:
+    dock = window.benches["developer"].docks["topics"]
+    dock.title.menu_wanted.emit(None)
+
+
+def a_context_menu_of_a_field(window: MainWindow) -> None:
+    field = window.bar.search
+    place = QPoint(4, 4)
+    event = QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, field.mapToGlobal(place))
+    QApplication.sendEvent(field, event)
+
+
+def a_list_of_choices(window: MainWindow) -> None:
+    choice = Choice(window.theme, [(name, name) for name in ("one", "two")])
+    choice.setParent(window)
+    choice.show()
+    choice.showPopup()
+
+
+def a_file_dialog(window: MainWindow) -> None:
+    window.run("file.open")
+
+
+def the_dialog_of_a_picture(window: MainWindow) -> None:
+    choice = PictureChoice(window.theme, Parameter("p", "picture", "image"), NoPictures())
+    choice.setParent(window)
+    choice.show()
+    choice.choose.click()
+
+
+def a_panel_that_floats(window: MainWindow) -> None:
+    dock = window.benches["developer"].docks["topics"]
+    dock.setFloating(True)
+    dock.activateWindow()
+    dock.panel.filter.setFocus()
+
+
+def a_field_in_which_one_types(window: MainWindow) -> None:
+    window.benches["developer"].docks["topics"].panel.filter.setFocus()
+
+
+def a_command(name: str) -> Callable[[MainWindow], None]:
+    def run(window: MainWindow) -> None:
+        window.run(name)
+
+    run.__name__ = name
+    return run
+
+
+OPENED = [
+    a_menu,
+    a_menu_of_a_panel,
+    a_context_menu_of_a_field,
+    a_list_of_choices,
+    a_file_dialog,
+    the_dialog_of_a_picture,
+    a_panel_that_floats,
+    a_field_in_which_one_types,
+    *map(
+        a_command,
+        ("palette.open", "settings.open", "help.shortcuts", "help.about", "network.others", "layout.keep"),
+    ),
+]
+
+
+@pytest.mark.parametrize("opened", OPENED, ids=lambda each: each.__name__)
+@pytest.mark.parametrize("key", KEYS, ids=("F12", "Ctrl+."))
+def test_stop_works_with_it_open(
+    qtbot, window: MainWindow, stops: list[str], opened: Callable[[MainWindow], None], key: tuple
+) -> None:
+    opened(window)
+    QApplication.processEvents()
+    assert QApplication.activeModalWidget() is None
+    QTest.keyClick(QGuiApplication.focusWindow(), *key)
+    assert stops == ["stop"]
+
+
+def test_stop_held_down_stops_once(window: MainWindow, stops: list[str]) -> None:
+    handle = QGuiApplication.focusWindow()
+    QTest.keyPress(handle, Qt.Key.Key_F12)
+    QTest.keyRelease(handle, Qt.Key.Key_F12)
+    assert stops == ["stop"]
+
+
+@pytest.fixture
+def choice(qtbot, theme: Theme) -> PictureChoice:
+    made = PictureChoice(theme, Parameter("p", "picture", "image"), NoPictures())
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+def test_a_file_dialog_gives_what_was_chosen(choice: PictureChoice, tmp_path: Path) -> None:
+    choice.choose.click()
+    (dialog,) = choice.findChildren(QFileDialog)
+    assert not dialog.isModal()
+    assert dialog.testOption(QFileDialog.Option.DontUseNativeDialog)
+    dialog.fileSelected.emit(str(tmp_path / "no.png"))
+    assert choice.field.text() == str(tmp_path / "no.png")
+    dialog.close()
+
+
+def test_nothing_in_the_window_is_modal() -> None:
+    found = [
+        f"{path.name}: {ast.unparse(node)}"
+        for path in Path(app.ui.__file__).parent.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Attribute) and node.attr in MODAL
+    ]
+    assert found == ["application.py: application.exec"]
