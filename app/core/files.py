@@ -116,8 +116,18 @@ def _keep_mode(old: Path, new: Path) -> None:
     try:
         mode = old.stat().st_mode & 0o777
     except FileNotFoundError:
-        mode = 0o644  # asking for the umask means changing it for every thread
+        mode = _mode_of_new_files(new)
     new.chmod(mode)
+
+
+def _mode_of_new_files(beside: Path) -> int:
+    """What the umask leaves of a new file, learnt by making one: to ask is to change it for every thread."""
+    probe = beside.with_name(f"{beside.stem}.mode.part")  # swept away with the others after a crash
+    os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    try:
+        return stat.S_IMODE(probe.stat().st_mode)
+    finally:
+        probe.unlink()
 
 
 def _sync_folder(folder: Path) -> None:

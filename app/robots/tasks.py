@@ -24,6 +24,8 @@ when something goes on: well before Studio gives up (`app.core.runs.STOP_TIMEOUT
 _GRACE_S = 1.0
 """So long a function may take to put things away after a cancel, a time-out or one that takes its place."""
 _LONGEST_QUEUE = 50
+_MOST_RUNNING = 50
+"""What uses nothing runs side by side, each in a thread of its own."""
 NOTHING_RUNS = "nothing with this id runs"
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
@@ -99,6 +101,10 @@ class Tasks:
         if clashing and task.on_busy == "reject":
             busy = f"{task.action}: {self._name} is busy with {clashing[0].title or clashing[0].action}"
             task.finish(Answer("failed", error=busy))
+            return
+        if len(self._running) >= _MOST_RUNNING:
+            full = f"{task.action}: {_MOST_RUNNING} other actions run already"
+            task.finish(Answer("failed", error=full))
             return
         if len(self._queue) >= _LONGEST_QUEUE:
             full = f"{task.action}: {_LONGEST_QUEUE} other actions are waiting already"

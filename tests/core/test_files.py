@@ -166,6 +166,20 @@ def test_what_concerns_only_its_user_is_private_whatever_the_umask(tmp_path: Pat
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
+@pytest.mark.parametrize(("umask", "mode"), [(0o077, 0o600), (0o022, 0o644), (0o002, 0o664)])
+def test_a_new_behaviour_is_as_shared_as_the_umask_says(tmp_path: Path, umask: int, mode: int) -> None:
+    path = tmp_path / "mine.nepb"
+    before = os.umask(umask)
+    try:
+        write_atomically(path, b"{}")
+        write_atomically(path, b"{ }")
+    finally:
+        os.umask(before)
+    assert path.stat().st_mode & 0o777 == mode
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.nepb"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
 @pytest.mark.usefixtures("open_umask")
 def test_what_an_earlier_version_left_open_is_closed_at_the_start(tmp_path: Path) -> None:
     home = tmp_path / "home"

@@ -93,6 +93,18 @@ def test_a_queue_that_is_full_refuses_with_a_sentence(world: World) -> None:
     assert world.states("n49") == ["accepted"]
 
 
+def test_what_uses_nothing_does_not_run_without_end(world: World) -> None:
+    for number in range(50):
+        world.ask(f"n{number}", ())
+    eventually(lambda: len(world.began) == 50)
+    world.ask("last", ())
+    assert world.answers["last"][0].error == "last: 50 other actions run already"
+    world.let_go["n7"].set()
+    eventually(lambda: world.states("n7")[-1] == "succeeded")
+    world.ask("later", ())
+    eventually(lambda: world.states("later") == ["accepted", "running"])
+
+
 def test_a_stop_is_answered_when_nothing_runs_any_more(world: World) -> None:
     world.ask("kick", ("legs",), cancellable=False, obeys=False)
     eventually(ran(world, "kick"))
