@@ -48,11 +48,18 @@ class Inbox:
         self._bytes -= message.size_bytes
         return message
 
-    def take_all(self) -> list[Message]:
-        """All messages, oldest first."""
-        messages = list(self.messages)
-        self.messages.clear()
-        self._bytes = 0
+    def take_all(self, most_bytes: int | None = None) -> list[Message]:
+        """All messages, oldest first; no more when they are `most_bytes` together."""
+        if most_bytes is None or self._bytes <= most_bytes:
+            messages = list(self.messages)
+            self.messages.clear()
+            self._bytes = 0
+            return messages
+        messages = []
+        while self.messages and most_bytes > 0:
+            messages.append(self.messages.popleft())
+            most_bytes -= messages[-1].size_bytes
+            self._bytes -= messages[-1].size_bytes
         return messages
 
     def __len__(self) -> int:

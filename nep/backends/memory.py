@@ -27,6 +27,8 @@ __all__ = ["BACKEND"]
 
 _logger = logging.getLogger("nep")
 
+_BATCH_BYTES = 64 * 2**20
+"""A sink works on so many bytes at once; with those that wait for it there are no more than the bound."""
 _BATCH_S = 0.005  # sinks are called 200 times a second at most
 
 
@@ -162,7 +164,8 @@ class MemoryInlet:
     def __init__(self, carrier: MemoryCarrier, hub: _Hub, spec: SubscriberSpec) -> None:
         self._carrier = carrier
         self.hub = hub
-        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
+        batch = 0 if spec.sink is None else _BATCH_BYTES
+        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self.ready: deque[Message] = deque()
         self.spec = spec
         self.received = self.lost = self.refused = 0
@@ -187,10 +190,10 @@ class MemoryInlet:
         self._carrier.wait((self,), timeout_s)
         return self.poll()
 
-    def take_all(self) -> list[Message]:
-        """All messages that are there."""
+    def take_batch(self) -> list[Message]:
+        """What a sink gets at once."""
         with self._carrier.changed:
-            return self.inbox.take_all()
+            return self.inbox.take_all(_BATCH_BYTES)
 
     def report(self, problem: str) -> None:
         """Shown as an alert in the graph."""
@@ -333,7 +336,7 @@ class MemoryCarrier:
         while not self._closing.is_set():
             self.wait(self._sinks, 0.1)
             for inlet in self._sinks:
-                messages = inlet.take_all()
+                messages = inlet.take_batch()
                 if messages and inlet.spec.sink is not None:
                     try:
                         inlet.spec.sink(messages)

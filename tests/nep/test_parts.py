@@ -17,14 +17,16 @@ from hypothesis import strategies as st
 import nep
 from nep import addresses
 from nep.backends.base import Backend
+from nep.backends.native.audience import MAX_SUBSCRIBERS, Audience
 from nep.backends.native.io import IoThread, Rest
-from nep.backends.native.sources import Sources
+from nep.backends.native.sources import UNLISTED_MAX, Sources
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.inbox import Inbox
 from nep.message import Message
 from nep.plugins import discover
 from nep.records import PublisherRecord, RemotePublisher
 from nep.waker import Waker
+from nep.wire import hello_part
 
 
 def message(n: int, size: int = 1) -> Message:
@@ -356,3 +358,53 @@ def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
     io.close()
     for each in (slow, *others):
         each.waker.close()
+
+
+def test_publishers_that_nobody_lists_are_remembered_up_to_a_bound() -> None:
+    sources = Sources()
+    for number in range(1, 11):
+        sources.listed(remote(number))
+    for number in range(100, 5000):
+        assert sources.arrived(number, 2**64 - 1, is_alone=False)
+    assert len(sources.by_id) == UNLISTED_MAX + 10
+    assert all(sources.find(number) is not None for number in (*range(1, 11), 4999))
+    assert (sources.received, sources.lost) == (4900, 0)
+    sources.listed(remote(4999))
+    sources.pop(4998)
+    for number in range(10_000, 20_000):
+        sources.get(number)
+    assert len(sources.by_id) == UNLISTED_MAX + 11
+
+
+def test_a_flood_of_hellos_is_greeted_up_to_a_bound() -> None:
+    audience = Audience("t", 7)
+    for number in range(MAX_SUBSCRIBERS + 1000):
+        greeted = audience.note(b"\1" + hello_part(number, "t", tells=True), 0)
+        assert (greeted is not None) == (number < MAX_SUBSCRIBERS)
+    assert len(audience.seen) == len(audience.hellos) == len(audience.windows) == MAX_SUBSCRIBERS
+    assert audience.refusals.count == 1000
+    assert audience.note(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
+    assert audience.note(b"\0" + hello_part(5, "t", tells=True), 0) is None
+    assert audience.note(b"\1" + hello_part(77_777, "t"), 0) is not None
+    assert not audience.tells_all
+    for number in range(50_000):  # nor do other filters pile up
+        audience.note(b"\1t\0" + b"%d" % number, 0)
+        audience.note(b"\1t", 0)
+    assert len(audience.apart) == 1
+
+
+def test_a_batch_of_a_sink_has_a_bound() -> None:
+    inbox = Inbox("all", max_bytes=1000)
+    for number in range(10):
+        inbox.put(message(number, 100))
+    assert [each.seq for each in inbox.take_all(250)] == [0, 1, 2]
+    assert [each.seq for each in inbox.take_all(0)] == []
+    assert len(inbox.take_all(10_000)) == 7
+    assert inbox.put(message(11, 1000)) == 0
+
+
+def test_publishers_that_died_and_do_not_come_back_are_left_beyond_a_bound() -> None:
+    sources = Sources()
+    for number in range(1, UNLISTED_MAX + 11):
+        sources.listed(remote(number, name=f"N{number}")).is_lapsed = number != 5
+    assert sources.ended(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]

@@ -8,12 +8,14 @@ from nep.errors import WireError
 from nep.message import Kind, kind_of
 from nep.records import RemotePublisher
 
-__all__ = ["Source", "Sources"]
+__all__ = ["UNLISTED_MAX", "Source", "Sources"]
 
 FAREWELL_S = 3.0
 """So long after a publisher has unregistered its last messages may still come."""
 GAP_MAX = 2**32
 """More messages than these nobody misses at once: an hour of a million a second."""
+UNLISTED_MAX = 1000
+"""So many publishers are remembered that no master lists: whoever sends on a topic may call itself any."""
 _UNKNOWN = kind_of("", "", "")
 
 
@@ -50,12 +52,24 @@ class Sources:
         self.lost = 0
         self.by_id: dict[int, Source] = {}
         """All of them. Only to be looked at."""
+        self._unlisted: dict[int, None] = {}
+        """Those that no master lists, the oldest first."""
 
     def get(self, publisher: int) -> Source:
-        """The source of this id, made when it is new."""
+        """The source of this id, made when it is new; the oldest that no master lists may go for it."""
         source = self.by_id.get(publisher)
         if source is None:
             source = self.by_id[publisher] = Source()
+            self._unlisted[publisher] = None
+            if len(self._unlisted) > UNLISTED_MAX:
+                self.pop(next(iter(self._unlisted)))
+        return source
+
+    def listed(self, remote: RemotePublisher) -> Source:
+        """The source of a publisher that the master lists, made when it is new."""
+        source = self.get(remote.publisher.id)
+        source.remote = remote
+        self._unlisted.pop(remote.publisher.id, None)
         return source
 
     def find(self, publisher: int) -> Source | None:
@@ -64,6 +78,7 @@ class Sources:
 
     def pop(self, publisher: int) -> Source | None:
         """Forget a source."""
+        self._unlisted.pop(publisher, None)
         return self.by_id.pop(publisher, None)
 
     def items(self) -> list[tuple[int, Source]]:
@@ -145,9 +160,14 @@ class Sources:
             source.final = final
 
     def ended(self, now: float) -> list[int]:
-        """Publishers that unregistered long ago and whose bye has not come."""
+        """Publishers to leave: they unregistered long ago and their bye has not come.
+
+        Beside them the oldest of more than `UNLISTED_MAX` that fell silent and were not replaced.
+        """
         all_ = self.by_id.items()
-        return [each for each, source in all_ if source.ends_at is not None and now >= source.ends_at]
+        silent = [each for each, source in all_ if source.is_lapsed and source.ends_at is None]
+        over = [each for each, source in all_ if source.ends_at is not None and now >= source.ends_at]
+        return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
 
     def replaced_by(self, remote: RemotePublisher) -> list[int]:
         """Silent publishers whose program has been started again, as `remote`."""

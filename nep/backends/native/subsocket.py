@@ -84,8 +84,7 @@ class SubSocket:
         """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
         for old in self.sources.replaced_by(remote):
             self.leave(old)
-        source = self.sources.get(remote.publisher.id)
-        source.remote = remote
+        source = self.sources.listed(remote)
         source.form = 0  # its next message is looked at: the type may be another one
         source.is_lapsed = False
         source.ends_at = None

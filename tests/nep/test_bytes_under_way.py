@@ -1,0 +1,173 @@
+"""Bounds in bytes of real processes: what one does not read grows nowhere, and every loss is counted."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+
+import psutil
+import pytest
+import zmq
+
+import nep
+from nep.backends.native.window import WINDOW_BYTES
+from nep.masters import Master
+from tests.nep.programs import Program, eventually, running
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot stop a process")
+
+HUGE = 6_220_800
+"""A picture of 1920 x 1080."""
+MB = 2**20
+MOST = WINDOW_BYTES + 64 * MB
+"""What a process may grow by; the second part is for one batch of a sink, or what Python does beside."""
+
+SUBSCRIBER = """
+import sys, threading, nep
+is_over = threading.Event()
+def busy(messages):
+    is_over.wait()
+with nep.node("subscriber", master=sys.argv[1]) as node:
+    sinks = {"busy": busy, "quick": lambda messages: None}
+    sub = node.new_sub("t", "bytes", sink=sinks.get(sys.argv[2]))
+    print("ready")
+    for line in sys.stdin:
+        if line == "on\\n":
+            is_over.set()
+        elif line == "take\\n":
+            print(sum(1 for _ in iter(lambda: sub.receive(1.0), None)))
+        print(sub.received, sub.lost)
+"""
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[nep.Node]:
+    with nep.node("publisher", master=master.address) as made:
+        yield made
+
+
+@pytest.fixture
+def publisher(node: nep.Node) -> nep.Publisher:
+    return node.new_pub("t", "bytes")
+
+
+def rss(pid: int) -> int:
+    return int(psutil.Process(pid).memory_info().rss)
+
+
+def subscribed(program: Program) -> Program:
+    assert program.line() == "ready"
+    return program
+
+
+def publish_huge(publisher: nep.Publisher, count: int) -> int:
+    """Publish so many, each in memory of its own; the most that this process grew by."""
+    before = most = rss(os.getpid())
+    for number in range(count):
+        publisher.publish(bytes([number % 256]) * HUGE)
+        most = max(most, rss(os.getpid()))
+    return most - before
+
+
+def told(program: Program) -> tuple[int, int]:
+    """What it received, and what it lost."""
+    program.say("tell")
+    received, lost = program.line().split()
+    return int(received), int(lost)
+
+
+def is_all_counted(program: Program, count: int) -> bool:
+    return sum(told(program)) == count
+
+
+def test_a_stopped_subscriber_costs_its_publisher_no_more_and_counts_what_it_missed(
+    publisher: nep.Publisher, master: Master
+) -> None:
+    with running(SUBSCRIBER, master.address, "idle") as stopped:
+        subscribed(stopped)
+        for _ in range(1000):
+            publisher.publish(b"small")
+        stopped.stop()
+        assert publish_huge(publisher, 80) < MOST
+        stopped.signal(signal.SIGCONT)
+        eventually(lambda: is_all_counted(stopped, 1080), 20.0)
+
+
+def test_a_busy_sink_costs_its_own_program_no_more(publisher: nep.Publisher, master: Master) -> None:
+    with running(SUBSCRIBER, master.address, "busy") as busy:
+        subscribed(busy)
+        before = rss(busy.process.pid)
+        for _ in range(100):  # fewer than its socket takes: the huge ones go there, too
+            publisher.publish(b"small")
+        grown = []
+
+        def has_settled() -> bool:  # a second without growing
+            grown.append(rss(busy.process.pid) - before)
+            return len(grown) > 100 and max(grown[-100:]) - min(grown[-100:]) < MB
+
+        publish_huge(publisher, 80)
+        eventually(has_settled, 20.0)
+        assert 100 * MB < max(grown) < MOST
+        busy.say("on")
+        busy.line()
+        eventually(lambda: is_all_counted(busy, 180), 20.0)
+        assert rss(busy.process.pid) - before < MOST
+
+
+def test_one_that_is_stopped_takes_nothing_from_the_others(publisher: nep.Publisher, master: Master) -> None:
+    with (
+        running(SUBSCRIBER, master.address, "idle") as stopped,
+        running(SUBSCRIBER, master.address, "quick") as quick,
+    ):
+        subscribed(stopped)
+        subscribed(quick)
+        stopped.stop()
+        for number in range(80):
+            publisher.publish(bytes([number]) * HUGE)
+            if number % 10 == 9:
+                eventually(lambda: is_all_counted(quick, publisher.count), 20.0)
+        assert told(quick) == (80, 0)
+        stopped.signal(signal.SIGCONT)
+        eventually(lambda: is_all_counted(stopped, 80), 20.0)
+        assert told(stopped)[1] >= 80 - WINDOW_BYTES // HUGE - 1  # its own were bounded
+        publisher.publish(b"for both again")
+        for each in (quick, stopped):
+            eventually(lambda each=each: is_all_counted(each, 81), 20.0)  # type: ignore[misc]
+
+
+def test_a_burst_of_thirty_pictures_is_not_lost_even_if_its_reader_is_late(
+    publisher: nep.Publisher, master: Master
+) -> None:
+    with running(SUBSCRIBER, master.address, "idle") as late:
+        subscribed(late)
+        publisher.publish(b"x" * 8_000_000)  # what came first decides nothing
+        eventually(lambda: is_all_counted(late, 1), 20.0)
+        late.stop()
+        publish_huge(publisher, 30)
+        late.signal(signal.SIGCONT)
+        late.say("take")
+        assert late.line() == "31"
+        assert late.line() == "31 0"
+
+
+def test_who_says_no_hello_and_reads_nothing_takes_nothing_from_those_who_do(
+    node: nep.Node, publisher: nep.Publisher, master: Master
+) -> None:
+    """It could be asked nothing: what libzmq holds for it is counted."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    with context.socket(zmq.SUB) as other, running(SUBSCRIBER, master.address, "quick") as quick:
+        subscribed(quick)
+        other.linger, other.rcvhwm = 0, 1
+        other.setsockopt(zmq.SUBSCRIBE, b"t\0")
+        other.connect(node.graph().topics["t"].publishers[0].endpoints[0])
+        eventually(lambda: publisher.publish(b"small") is None and bool(other.poll(10)))
+        grown, before = 0, rss(os.getpid())
+        for _ in range(8):
+            publish_huge(publisher, 10)
+            grown = max(grown, rss(os.getpid()) - before)
+            eventually(lambda: is_all_counted(quick, publisher.count), 20.0)
+        assert grown < MOST
+        assert told(quick)[1] == 0
+    context.term()
