@@ -187,10 +187,20 @@ class Fleet:
         self._tries.cancel(self._get(name), action)
 
     def world(self, name: str, change: Payload) -> None:
-        """Change the world of a virtual robot: touch its head, move the ball, say a word."""
+        """Change the world of a virtual robot: touch its head, move the ball, say a word.
+
+        Of one that Studio does not know to be virtual a person is asked first, as before it moves.
+        """
         link = self._get(name)
-        if link.world is not None:
+        actions = [action.name for action in link.robot.actions]
+        may = self.moving.permits([(link.robot, actions)], lambda: self._change_again(name, change))
+        if may and link.world is not None:
             link.world.publish(dict(change))
+
+    def _change_again(self, name: str, change: Payload) -> None:
+        """Do what was asked before a person said that the robot may move."""
+        if name in self._links:
+            self.world(name, change)
 
     def stopped(self, words: Mapping[str, str], wrong: Mapping[str, str]) -> None:
         """These robots were told to stop; the words say what each did, by its name.
@@ -204,6 +214,7 @@ class Fleet:
                 continue
             link.last_stop, link.not_stopped = said, wrong.get(name, "")
             if not link.not_stopped:
+                link.left_busy = False
                 self._tries.end_all(link, "canceled")
             self._alive.rest(name)
 
@@ -211,7 +222,7 @@ class Fleet:
         """A person says that these robots stand still."""
         for link in map(self._links.get, names):
             if link is not None:
-                link.not_stopped, link.earlier = "", ()
+                link.not_stopped, link.earlier, link.left_busy = "", (), False
 
     def take_settled(self) -> tuple[str, ...]:
         """The robots that were not stopped and have ended now, as they say, what would not end; once each."""
@@ -413,6 +424,7 @@ class Fleet:
 
     def _away(self, link: RobotLink) -> None:
         link.connected, link.gone_s = False, self._clock()
+        link.left_busy = link.left_busy or bool(link.running)
         self.known.saw([link.robot])
         self._alive.rest(link.name)
         if link.watch is not None:

@@ -75,7 +75,7 @@ class RobotLink:
     ``goes_on`` what it says itself about actions that it could not end; both are empty when all is well.
     ``identity`` is the program that it is; ``earlier`` are programs of its name that went away and may still
     move it, ``topics_before`` those of its earlier descriptions. ``was_real`` says that it has not always
-    been virtual.
+    been virtual, ``left_busy`` that it did something for a person when it went away.
     """
 
     name: str
@@ -98,6 +98,7 @@ class RobotLink:
     topics_before: tuple[Topics, ...] = ()
     is_opening: bool = False
     was_real: bool = False
+    left_busy: bool = False
     publisher: Publisher | None = None
     world: Publisher | None = None
     watch: Watch | None = None

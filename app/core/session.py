@@ -366,7 +366,7 @@ class Session:
         """Whom a stop reaches: who is there, and who went away while a program used it."""
         kept = self.runs.kept
         for link in self.fleet.links:
-            if link.earlier and link.name not in kept:
+            if link.earlier and link.name not in kept and not link.left_busy:
                 link.earlier = ()  # nothing moved it when it was started anew
         targets = tuple(
             StopTarget(link.robot, link.identity, link.earlier, link.topics_before)

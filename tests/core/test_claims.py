@@ -200,6 +200,27 @@ def test_who_takes_the_name_of_a_robot_in_motion_does_not_prove_its_stop(
         thief.close()
 
 
+def test_nor_of_one_that_a_person_moved(session: Session, master: Master, pepper: WireRobot) -> None:
+    link = the_link(session)
+    pepper.slow = {"say"}
+    tried = session.fleet.invoke("Pepper", "say", {"text": "Hi"})
+    tick_until(session, lambda: tried.state == "accepted")
+    before = link.identity
+    pepper._node.close()
+    tick_until(session, lambda: not link.connected)
+    thief = WireRobot(master.address)
+    try:
+        tick_until(session, lambda: link.connected and link.identity != before)
+        tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "unanswered")
+        session.runs.confirm_still()
+        session.tick()
+        stop_is_proven(session)
+    finally:
+        thief.close()
+
+
 @pytest.mark.parametrize("leaf", ["command", "answer", "world"])
 def test_a_robot_may_not_name_the_topics_of_another_its_own(
     session: Session, pepper: WireRobot, evil: nep.Node, leaf: str

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import psutil
 import pytest
@@ -23,6 +24,7 @@ from app.robots.description import Robot, parse, td_for
 from app.robots.identity import Identity
 from app.robots.turtle import ROBOT
 from nep.masters import Master
+from nep.pubsub import Publisher
 from tests.core.waiting import tick_until
 
 HERE = platform.node()
@@ -135,6 +137,32 @@ def test_a_real_robot_that_says_that_it_is_virtual_now_is_asked_about(fleet: Fle
     assert asks(fleet)
     fleet.join(turtle(virtual=True), "/Turtle/description", mine)
     assert asks(fleet)
+
+
+class World:
+    """Stands for the publisher of a robot's world."""
+
+    def __init__(self) -> None:
+        self.changes: list[object] = []
+
+    def publish(self, change: object) -> None:
+        self.changes.append(change)
+
+
+def test_the_world_of_a_strangers_robot_is_not_changed_before_the_answer(fleet: Fleet) -> None:
+    """What it calls its world may be a topic that moves something real."""
+    fleet.join(turtle(), "/Turtle/description", STRANGE)
+    link, world = fleet.link("Turtle"), World()
+    assert link is not None
+    link.world = cast("Publisher", world)
+    fleet.world("Turtle", {"touch": "head"})
+    assert fleet.moving.question is not None
+    assert world.changes == []
+    fleet.moving.answer(let=True)
+    assert world.changes == [{"touch": "head"}]
+    fleet.join(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
+    fleet.world("Turtle", {"reset": True})
+    assert len(world.changes) == 2
 
 
 def test_a_yes_is_for_this_program_and_always_for_its_computer(fleet: Fleet, tmp_path: Path) -> None:
