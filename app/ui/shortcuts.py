@@ -6,7 +6,6 @@ second key, Ctrl+. at first (Cmd+. on Macs, where F12 is a key for sound).
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,8 +17,8 @@ from PySide6.QtWidgets import QApplication
 from app.core.settings import Settings
 from app.errors import SettingsError
 from app.ui.actions import TABLE, Row
+from app.ui.words import spoken_key as spoken_key
 
-MAC_KEYS = {"Ctrl": "⌘", "Alt": "⌥", "Shift": "⇧", "Meta": "⌃"}
 STOP, STOP_KEY = "run.stop", "F12"
 NEEDS_WITH = "A key alone is for typing. Hold Ctrl or Alt with it, or use a function key."
 ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
@@ -60,14 +59,6 @@ FIXED: tuple[Fixed, ...] = (
     Fixed("Palette", "Do it", "Enter"),
     Fixed("Palette", "Change the shortcut", "Ctrl+Enter"),
 )
-
-
-def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
-    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"; on a Mac, where Ctrl is Cmd, "⌘ ⇧ S"."""
-    words = re.sub(r"\+(?=.)", " ", shortcut)
-    if platform != "darwin":
-        return words
-    return " ".join(MAC_KEYS.get(word, word) for word in words.split(" "))
 
 
 def normal(key: str) -> str:

@@ -1,7 +1,11 @@
-"""Figures as people read them: a number with its unit, blank when it is not known."""
+"""Figures as people read them: a number with its unit, blank when it is not known; and keys."""
 
 from __future__ import annotations
 
+import re
+import sys
+
+MAC_KEYS = {"Ctrl": "⌘", "Alt": "⌥", "Shift": "⇧", "Meta": "⌃"}
 THIN = "\u2009"  # a thin space between thousands
 
 
@@ -64,3 +68,18 @@ def seconds_words(value_s: float) -> str:
     if value_s < 10:
         return f"{value_s:.1f} s"
     return f"{round(value_s)} s" if value_s < 120 else f"{round(value_s / 60)} min"
+
+
+def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
+    """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"; on a Mac, where Ctrl is Cmd, "⌘ ⇧ S"."""
+    words = re.sub(r"\+(?=.)", " ", shortcut)
+    if platform != "darwin":
+        return words
+    return " ".join(MAC_KEYS.get(word, word) for word in words.split(" "))
+
+
+def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
+    """A button's words with its key: "Save (Ctrl+S)"; on a Mac "Save (⌘ S)"."""
+    if not shortcut:
+        return tip
+    return f"{tip} ({spoken_key(shortcut, platform) if platform == 'darwin' else shortcut})"

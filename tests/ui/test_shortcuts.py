@@ -25,6 +25,7 @@ from app.ui.palette_match import Found
 from app.ui.shortcut_sheet import ShortcutSheet
 from app.ui.shortcuts import FIXED, Shortcuts, spoken_key
 from app.ui.theme import Theme
+from app.ui.words import tip_with_key
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 CTRL = Qt.KeyboardModifier.ControlModifier
@@ -67,6 +68,9 @@ def test_keys_are_spoken_as_they_stand_on_a_mac() -> None:
     assert spoken_key("Meta+Tab", "darwin") == "⌃ Tab"
     assert spoken_key("Ctrl++", "darwin") == "⌘ +"
     assert spoken_key("Ctrl+Shift+S", "linux") == "Ctrl Shift S"
+    assert tip_with_key("Save", "Ctrl+S", "darwin") == "Save (⌘ S)"
+    assert tip_with_key("Save", "Ctrl+S", "linux") == "Save (Ctrl+S)"
+    assert tip_with_key("Save", "", "darwin") == "Save"
 
 
 def test_a_mac_has_its_menus_at_the_top_of_the_screen(

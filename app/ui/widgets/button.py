@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
+from app.ui.words import tip_with_key
 
 Kind = Literal["plain", "primary", "ghost", "run", "stop"]
 Size = Literal["small", "normal", "form", "large"]
@@ -45,7 +46,7 @@ def name_command(widget: QWidget, command: str, tip: str, key: str = "") -> None
     """Say which command a button does; its tooltip follows the key that a person gives the command."""
     widget.setProperty("command", command)
     widget.setProperty("tip", tip)
-    widget.setToolTip(f"{tip} ({key})" if key else tip)
+    widget.setToolTip(tip_with_key(tip, key))
 
 
 class Button(QAbstractButton):
@@ -196,7 +197,7 @@ class IconButton(QAbstractButton):
     def set_name(self, name: str, shortcut: str = "") -> None:
         """What the button does, and its key."""
         self.setAccessibleName(name)
-        self.setToolTip(f"{name} ({shortcut})" if shortcut else name)
+        self.setToolTip(tip_with_key(name, shortcut))
 
     def _icon_side(self) -> float:
         name = "normal" if self._side < 40 else "large"
