@@ -17,8 +17,10 @@ __all__ = ["MOST_BYTES", "MOST_PIXELS", "ImageFile", "check_size", "examine"]
 
 MOST_PIXELS = 120_000_000
 """More than any camera of a robot has."""
-MOST_BYTES = 512_000_000
-"""What the pixels, and the decoder's own tables beside them, may take of memory."""
+MOST_BYTES = 750_000_000
+"""What the pixels, and what the decoder has beside them, may take of memory."""
+_COPIES = 2
+"""OpenCV holds all pixels twice while it decodes (measured with 4.14, JPEG and PNG)."""
 MOST_SCANS = 100
 """Passes of a JPEG that comes in refinements; encoders make about ten."""
 MOST_SCANNED = 1_200_000_000
@@ -184,7 +186,7 @@ class _Jpeg(_Reader):
 
     def _checked(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
         channels = 1 if frame.components == 1 else 3
-        pixel_bytes = float(channels)
+        pixel_bytes = float(_COPIES * channels)
         is_refined = frame.is_refined or self.number(at + 2, 1) != frame.components
         if is_refined:  # the decoder keeps all coefficients until the last scan
             pixel_bytes += frame.coefficient_bytes
@@ -236,7 +238,7 @@ class _Png(_Reader):
         needed, kinds, orientation = self._chunks()
         channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _CHANNELS[colour]
         bits = 16 if depth == 16 else 8
-        check_size(width, height, channels * bits // 8, self.size)
+        check_size(width, height, _COPIES * channels * bits // 8, self.size)
         if orientation >= _TURNED:
             width, height = height, width
         data = self.data
