@@ -39,7 +39,12 @@ class Book:
 
 @pytest.mark.parametrize(
     ("address", "known"),
-    [("10.0.0.5:7780", "10.0.0.5:7780"), ("localhost:1", "127.0.0.1:1"), ("127.0.0.1:5", "127.0.0.1:5")],
+    [
+        ("10.0.0.5:7780", "10.0.0.5:7780"),
+        ("localhost:1", "127.0.0.1:1"),
+        ("*:7", "127.0.0.1:7"),
+        ("127.0.0.1:5", "127.0.0.1:5"),
+    ],
 )
 def test_numbers_are_never_asked_for(address: str, known: str) -> None:
     book = Book()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 
 import zmq
+from zmq.utils import garbage
 
 from nep import forks
 from nep.backends.native.io import IoThread
@@ -128,6 +129,8 @@ def _forked() -> None:
     if _shared is not None:
         _inherited.append(_shared)
         _shared = None
+    # pyzmq makes its thread for what is sent without a copy under this lock: a fork just then leaves it held.
+    garbage.gc._lock = threading.Lock()  # noqa: SLF001
 
 
 forks.in_child(_forked)

@@ -23,6 +23,8 @@ _logger = logging.getLogger("nep")
 
 _AGAIN_S = 5.0
 _SLICE_S = 0.1
+_HERE = frozenset({"localhost", "*"})
+"""Names of this computer that nobody has to be asked for; a master at "*" is reached here as well."""
 
 
 def look_up(host: str) -> str:
@@ -61,7 +63,7 @@ class MasterName:
         self._again_at = 0.0
         self._is_told = False
         self._answered = threading.Event()
-        host = "127.0.0.1" if self._host == "localhost" else self._host
+        host = "127.0.0.1" if self._host in _HERE else self._host
         if _is_number(host):
             self.known = f"{host}:{self._port}"
             self._answered.set()
@@ -69,7 +71,7 @@ class MasterName:
     def look(self, now: float) -> None:
         """The master is not connected: ask again, when it is a name and the last time was long ago."""
         is_asking = self._thread is not None and self._thread.is_alive()
-        if _is_number(self._host) or self._host == "localhost" or is_asking or now < self._again_at:
+        if _is_number(self._host) or self._host in _HERE or is_asking or now < self._again_at:
             return
         self._again_at = now + _AGAIN_S
         thread = threading.Thread(target=self._ask, name=f"nep-name-{self._host}", daemon=True)
@@ -110,5 +112,5 @@ def _is_number(host: str) -> bool:
     try:
         ipaddress.IPv4Address(host)
     except ValueError:
-        return host == "*"
+        return False
     return True
