@@ -10,6 +10,7 @@ from typing import Protocol
 
 import zmq
 
+from nep.descriptors import SPARE, has_room
 from nep.forks import give_up, watch
 from nep.gateway.census import Census, Program
 from nep.gateway.desk import Desk, Ports
@@ -24,6 +25,7 @@ from nep.message import Message
 _LOOK_S = 1.0
 """How often programs that ended are looked for, and taken ports are tried again."""
 _MAX_SOCKETS = 8192
+_PAIR_FILES = 20
 _PAUSE_S = 0.2
 _PROGRAMS_MAX = 2000
 """So many programs and topics are remembered: everything asked is written to the file again."""
@@ -222,6 +224,8 @@ class Gateway:
         known = self._known.port_of(line)
         if known is not None and (line.is_service or self._relay.pair(line) or self._open(line, known)):
             return known
+        if not has_room(_PAIR_FILES + SPARE):
+            raise RequestError("the master has too many files open; end programs, or restart it", line.topic)
         for base in self._known.candidates(self._census.is_used):
             if self._open(line, base):
                 self._known.give(line, base)
@@ -232,6 +236,8 @@ class Gateway:
         """Open a line's sockets on `base`; whether that port and the next were to be had."""
         if line.is_service:
             return is_free(base)
+        if not has_room(_PAIR_FILES + SPARE):
+            return False
         try:
             self._relay.open(line, base)
         except zmq.ZMQError:

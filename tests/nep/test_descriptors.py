@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import socket
 import sys
+from pathlib import Path
 
 import psutil
 import pytest
@@ -182,3 +184,38 @@ sys.stdin.readline()
 def local_names(program: Program) -> list[str]:
     connections = psutil.Process(program.process.pid).net_connections(kind="unix")
     return [each.laddr for each in connections if str(each.laddr).startswith("@nep-")]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts files as Linux does")
+def test_a_gateway_without_files_refuses_originals_and_goes_on(tmp_path: Path) -> None:
+    code = (
+        FEW
+        + """
+from pathlib import Path
+import json, zmq
+from nep.gateway.attachment import GatewayAttachment
+from nep.gateway.desk import Ports
+attached = GatewayAttachment(Path(sys.argv[1]) / "ports.json", Ports(int(sys.argv[2]), 0, 0))
+def ask(topic):
+    said = {"node": "n", "topic": topic, "mode": "many2many", "socket": "publisher", "msg_type": "json"}
+    socket.send_json({**said, "pid": os.getpid()})
+    assert socket.poll(20_000)
+    return socket.recv_json()
+with nep.master("127.0.0.1:0", attachments=[attached], learn_s=0.0), zmq.Context() as context:
+    with context.socket(zmq.REQ) as socket:
+        socket.connect(f"tcp://127.0.0.1:{sys.argv[2]}")
+        ask("first")
+        used = len(os.listdir("/proc/self/fd"))
+        hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+        resource.setrlimit(resource.RLIMIT_NOFILE, (used + 20, hard))
+        print(ask("second"))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+        print(ask("third")["state"])
+"""
+    )
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    with running(code, str(tmp_path), str(port)) as program:
+        assert "the master has too many files open" in program.line()
+        assert program.line() == "success"
+        assert program.end()[1] == ""

@@ -117,11 +117,6 @@ class IoThread:
         self._orders.clear()
         self._selector.close()
 
-    @property
-    def is_current(self) -> bool:
-        """Whether the caller is this thread."""
-        return threading.current_thread() is self._thread
-
     def _order(self, what: str, served: Served, done: threading.Event | None) -> None:
         self._orders.append((what, served, done))
         self._waker.wake()
