@@ -128,7 +128,7 @@ def test_it_lies_in_the_runtime_folder_one_for_each_folder_of_studio(runtime: Pa
 def test_a_runtime_folder_that_others_reach_is_not_used(
     runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: str
 ) -> None:
-    home = tmp_path / "home"
+    home = runtime / "home"  # a short name: with several workers that of `tmp_path` is too long for a socket
     if wrong == "open":
         runtime.chmod(0o777)
     elif wrong == "linked":
