@@ -20,7 +20,7 @@ from app.robots.profile import validate
 from app.robots.source_lines import Line, line_of, lines_of
 from app.robots.tasks import BEAT_S
 from app.robots.typed import Schema, fields_schema, input_schema, input_types, returned_type, schema_of
-from app.robots.typed_values import check_finite, plain, told, told_fields
+from app.robots.typed_values import check_sendable, plain, told, told_fields
 
 Function = TypeVar("Function", bound=Callable[..., object])
 Described = TypeVar("Described")
@@ -112,7 +112,7 @@ class Returned:
     def told(self, value: object) -> Mapping[str, object]:
         """The answer's output for what the function returned; RobotValueError when it is of another type."""
         made = self._told(value)
-        check_finite(made)
+        check_sendable(made)
         return made
 
     def _told(self, value: object) -> Mapping[str, object]:

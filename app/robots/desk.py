@@ -155,7 +155,11 @@ class Desk:
             if given.is_final and operation == "invoke":
                 self._open.discard(wanted)
             told: dict[str, object] = {"id": wanted, "op": operation, "action": name, "state": given.state}
-            told |= {"output": dict(given.output), "feedback": dict(given.feedback), "error": given.error}
+            told |= {
+                "output": dict(given.output),
+                "feedback": dict(given.feedback),
+                "error": _sendable(given.error),
+            }
             if given.waits_for:
                 told["waits_for"] = list(given.waits_for)
             if given.replaces:
@@ -163,6 +167,11 @@ class Desk:
             self._publish(told)
 
         return answer
+
+
+def _sendable(error: str | None) -> str | None:
+    """The sentence without halves of letters (of a file's name, say), which no message can hold."""
+    return None if error is None else error.encode("utf-8", "replace").decode("utf-8")
 
 
 def _typed(

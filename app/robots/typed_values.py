@@ -200,16 +200,18 @@ def plain(value: object, depth: int = 0) -> object:
     raise RobotValueError(f"must be what JSON has, not {_shown_value(value)}")
 
 
-def check_finite(value: object) -> None:
-    """RobotValueError when a number in a JSON value is none that JSON can tell: infinite, or not a number."""
+def check_sendable(value: object) -> None:
+    """RobotValueError when a message can't hold a JSON value: an endless number, half a letter."""
+    if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
+        raise RobotValueError("must be text of whole letters")
     if isinstance(value, float) and not math.isfinite(value):
         raise RobotValueError(f"must be a finite number, not {value}")
     if isinstance(value, Mapping):
         for item in value.values():
-            check_finite(item)
+            check_sendable(item)
     elif isinstance(value, list):
         for item in value:
-            check_finite(item)
+            check_sendable(item)
 
 
 def same(allowed: object, value: object) -> bool:

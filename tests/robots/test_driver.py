@@ -69,9 +69,13 @@ def test_noise_on_the_command_topic_is_survived(turtle, node):
 
 
 def test_a_function_that_fails_is_answered_with_its_sentence(turtle, caplog):
-    _, ears, _ = turtle
+    body, ears, _clock = turtle
     ears.invoke("1", "fail")
     assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", "no fuel")
+    body.breaks = ValueError("no file 'a\udcff'")
+    ears.invoke("3", "fail", how="broken")
+    assert ears.final("3")["error"] == "fail broke off: no file 'a?'"
+    body.breaks = ZeroDivisionError()
     ears.invoke("2", "fail", how="broken")
     assert ears.final("2")["error"] == "fail broke off: ZeroDivisionError"
 

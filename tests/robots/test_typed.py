@@ -398,6 +398,7 @@ def test_what_a_function_returns_is_the_output(arm, asked, returned, output):
         ("look", 7, "must have x, y and name, not be 7"),
         ("count", "many", "count must be a whole number, not 'many'"),
         ("anything", {"a": float("inf")}, "must be a finite number, not inf"),
+        ("anything", {"a": ["\ud800"]}, "must be text of whole letters"),
     ],
 )
 def test_a_wrong_return_is_a_failure_with_a_sentence(arm, asked, returned, why):
