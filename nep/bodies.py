@@ -6,12 +6,12 @@ A body is one msgpack map. Requests carry `do` (what is asked) and `call` (a num
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from nep.collecting import collecting_later
 from nep.errors import WireError
-from nep.packing import pack_surely, unpack, unpack_first
+from nep.packing import pack_surely, unpack, unpack_bounded, unpack_first
 from nep.plain import read, write
 from nep.requests import (
     Added,
@@ -67,6 +67,9 @@ _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
 _ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
 
 _LARGE_BYTES = 50_000
+_SMALL_BYTES = 4096
+_LISTS_MAX, _LONGEST = 50_000, 20_000
+"""A request has fewer lists and maps, and none is longer: a node that joins has 5 000 records at most."""
 _VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
 """How an answer with a graph begins that `ViewPacker` made."""
 
@@ -87,7 +90,10 @@ def decode_request(body: bytes) -> Asked:
     """The request in a body; never raises, so that every sender gets an answer."""
     call = 0
     try:
-        envelope = _envelope(body)
+        if len(body) < _SMALL_BYTES:
+            envelope = _envelope(body, unpack)
+        else:
+            envelope = _envelope(body, lambda body: unpack_bounded(body, _LISTS_MAX, _LONGEST))
         number = envelope.get("call", 0)
         # Negative ones are those of the master's own process: nobody else may take their replies.
         call = number if type(number) is int and number >= 0 else 0
@@ -128,7 +134,7 @@ def decode_answer(body: bytes) -> tuple[int, Reply | Push]:
 
 
 def _decode_answer(body: bytes) -> tuple[int, Reply | Push]:
-    envelope = _envelope(body)
+    envelope = _envelope(body, unpack)
     name, call = envelope.get("is"), envelope.get("re", 0)
     kind = _ANSWERS.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(call, int):
@@ -136,9 +142,9 @@ def _decode_answer(body: bytes) -> tuple[int, Reply | Push]:
     return call, read(kind, envelope.get("what", {}))
 
 
-def _envelope(body: bytes) -> Mapping[str, object]:
+def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str, object]:
     try:
-        value = unpack(body)
+        value = unpack_it(body)
     except ValueError as error:
         raise WireError(f"the body is no msgpack: {error}", len(body)) from error
     if not isinstance(value, dict):

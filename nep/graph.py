@@ -19,7 +19,15 @@ from nep.errors import WireError
 from nep.leases import LEASE_S, Leases
 from nep.outgoing import Outgoing
 from nep.records import Expected, NodeRecord, PublisherRecord, SubscriberRecord
-from nep.registration import ALL_RECORDS_MAX, RECORDS_MAX, check_record, check_request, is_proven, records_of
+from nep.registration import (
+    ALL_RECORDS_MAX,
+    ALWAYS_ROOM,
+    RECORDS_MAX,
+    check_record,
+    check_request,
+    is_proven,
+    records_of,
+)
 from nep.renewals import RenewalSaid, same_ids, take_over
 from nep.requests import (
     Added,
@@ -238,7 +246,7 @@ class Graph:
         if mine > max(own, RECORDS_MAX):
             raise WireError(f"a node has {RECORDS_MAX} publishers and subscribers at most")
         all_ = len(census.publisher_owners) + len(census.subscriber_owners)
-        if mine > own and all_ + mine - own > ALL_RECORDS_MAX:
+        if mine > max(own, ALWAYS_ROOM) and all_ + mine - own > ALL_RECORDS_MAX:
             raise WireError(f"the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most")
 
     # ---- requests

@@ -35,6 +35,8 @@ __all__ = ["MasterLoop"]
 
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
+_AWAY_S = 1.0
+"""A master that did not look for so long (a suspended computer, a large request) judges nobody at once."""
 _REST_MS = 10
 _NODES_PER_MS = 50
 """How long renewals may gather: not at all with fewer nodes than these, then 1 ms longer for so many each."""
@@ -76,6 +78,7 @@ class MasterLoop:
         self._listening = Listening(self._port.socket, int(self.address.rpartition(":")[2]))
         self._follow_at = 0.0
         self._failures = 0
+        self._ticked_at = time.monotonic()
         watch(self)
 
     # ---- from other threads
@@ -179,8 +182,10 @@ class MasterLoop:
         return max(0, int((at - time.monotonic()) * 1000) + 1)
 
     def _tick(self, now: float) -> None:
-        self._send(self._graph.tick(now))
-        self._send(self._graph.silent(now))
+        was_away, self._ticked_at = now - self._ticked_at > _AWAY_S, now
+        if not was_away:  # else it is we who were late: what they sent meanwhile may still wait here
+            self._send(self._graph.tick(now))
+            self._send(self._graph.silent(now))
         ended = (self._graph.node_at(_name_of(sender)) for sender in self._port.ended(now))
         self._send(self._graph.probes([each.node.id for each in ended if each is not None]))
         self._graph.apply(ReportAlerts("requests", self._bad.alerts(now)), 0, now, "")
@@ -206,7 +211,10 @@ class MasterLoop:
             self._apply(Asked(self._calls, submission.request), "")
 
     def _serve_router(self) -> None:
+        enough_at = time.monotonic() + _TICK_S
         for _ in range(1000):  # then time for the rest of the loop
+            if time.monotonic() > enough_at:
+                return
             try:
                 sender, *body = self._port.receive()
             except zmq.Again:

@@ -15,11 +15,13 @@ from nep.errors import AddressInUseError
 
 __all__ = ["MasterPort"]
 
-REQUEST_MAX_BYTES = 8 * 2**20
+REQUEST_MAX_BYTES = 4 * 2**20
 """Whoever sends more in one part is disconnected."""
 UNREAD_MAX_BYTES = 32 * 2**20
 """So much is kept for a program that asks for graphs and does not read them, in bodies of 4 kB and more."""
 _LARGE_BYTES = 4096
+_RECEIVE_AHEAD = 16
+"""So many requests of each connection wait here; more wait where they come from."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
 _FILES = 16
 _RETURN_S = 0.5
@@ -49,6 +51,7 @@ class MasterPort:
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
         self.socket.setsockopt(zmq.SNDHWM, 10_000)
+        self.socket.setsockopt(zmq.RCVHWM, _RECEIVE_AHEAD)
         self.socket.copy_threshold = _LARGE_BYTES
         self.socket.setsockopt(zmq.MAXMSGSIZE, REQUEST_MAX_BYTES)
         try:

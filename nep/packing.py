@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import msgpack  # type: ignore[import-untyped]
 
-__all__ = ["pack", "pack_surely", "saturated", "unpack", "unpack_first"]
+__all__ = ["pack", "pack_surely", "saturated", "unpack", "unpack_bounded", "unpack_first"]
 
+_Made = TypeVar("_Made")
 _LEAST, _MOST = -(2**63), 2**64 - 1
 
 
@@ -75,6 +77,35 @@ def _map(pairs: list[tuple[object, object]]) -> dict[object, object]:
 
 def _hashable(key: object) -> object:
     return tuple(map(_hashable, key)) if isinstance(key, list) else key
+
+
+def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
+    """As `unpack`, for what a stranger sent: `most_lists` lists and maps at most, none longer than `longest`.
+
+    A million empty lists take a megabyte to send and seconds to make. Raises `ValueError`.
+    """
+    left = most_lists
+
+    def count(value: _Made) -> _Made:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise ValueError(f"it has more than {most_lists} lists and maps")
+        return value
+
+    try:
+        value: object = msgpack.unpackb(
+            data,
+            raw=False,
+            strict_map_key=False,
+            list_hook=count,
+            object_hook=count,
+            max_array_len=longest,
+            max_map_len=longest,
+        )
+    except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
+        raise ValueError(str(error) or "the bytes end too early") from error
+    return value
 
 
 def unpack_first(data: bytes) -> object:

@@ -17,6 +17,9 @@ from nep.text import control_in, escaped, shortened
 from nep.wire import check_node_name, check_topic
 
 __all__ = [
+    "ALL_RECORDS_MAX",
+    "ALWAYS_ROOM",
+    "RECORDS_MAX",
     "check_record",
     "check_request",
     "id_from",
@@ -26,10 +29,12 @@ __all__ = [
     "records_of",
 ]
 
-RECORDS_MAX = 10_000
+RECORDS_MAX = 5_000
 """So many publishers and subscribers one node may have,"""
-ALL_RECORDS_MAX = 50_000
-"""and all nodes together."""
+ALL_RECORDS_MAX = 20_000
+"""and all nodes together,"""
+ALWAYS_ROOM = 100
+"""but so many each of them in any case: nobody keeps others out."""
 _ENDPOINTS_MAX = 32
 _PID_MAX = 2**32 - 1
 _NODE_ID = re.compile("[0-9a-f]{16}")

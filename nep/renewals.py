@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from nep.census import Census, Member, as_ratio
-from nep.packing import pack_surely, unpack
+from nep.packing import pack_surely, unpack, unpack_bounded
 from nep.requests import RENEW_S, Renew
 
 __all__ = ["RenewalSaid", "is_renewal", "read_renewal", "renewed_body", "same_ids", "take_over"]
@@ -17,6 +17,7 @@ __all__ = ["RenewalSaid", "is_renewal", "read_renewal", "renewed_body", "same_id
 _BEGINS = b"\x83\xa2do\xa5renew"
 """How our own renewals begin. Another order of the fields is as right, and takes the usual way."""
 
+_SMALL_BYTES, _LISTS_MAX = 4096, 20_000
 _Counts = Sequence[Mapping[str, Any]]
 
 
@@ -42,7 +43,9 @@ def read_renewal(body: bytes) -> RenewalSaid | None:
     if not body.startswith(_BEGINS):
         return None
     try:
-        envelope: Any = unpack(body)
+        envelope: Any = (
+            unpack_bounded(body, _LISTS_MAX, _LISTS_MAX) if len(body) > _SMALL_BYTES else unpack(body)
+        )
         what = envelope["what"]
         said = RenewalSaid(
             envelope["call"],

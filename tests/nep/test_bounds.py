@@ -239,3 +239,36 @@ def test_a_thread_that_waits_for_a_graph_is_told_when_it_is_unreadable(pair: Sim
     eventually(lambda: pair.calls.read() == [] and asked.view is not None)
     thread.join(5.0)
     assert failed[0].startswith("RequestRefusedErrorthe master's answer cannot be read")
+
+
+class JustConnected:
+    """A socket that is connected between the first try to send and the look at what it can do."""
+
+    closed = False
+
+    def __init__(self) -> None:
+        self.sent: list[bytes] = []
+        self._is_connected = False
+
+    def setsockopt(self, _option: int, _value: object) -> None:
+        pass
+
+    def connect(self, _endpoint: str) -> None:
+        pass
+
+    def getsockopt(self, option: int) -> int:
+        self._is_connected = self._is_connected or option == zmq.EVENTS
+        return int(zmq.POLLOUT)
+
+    def send(self, body: bytes, _flags: int) -> None:
+        if not self._is_connected:
+            raise zmq.Again
+        self.sent.append(body)
+
+
+def test_a_request_is_sent_at_once_when_the_connection_comes_while_it_is_made() -> None:
+    """The look at the socket takes the only signal of it: without a second try it waits for half a second."""
+    socket = JustConnected()
+    calls = Calls(socket, "127.0.0.1:9", lambda: None)  # type: ignore[arg-type]
+    calls.begin(Ping())
+    assert socket.sent == [bodies.encode_request(Ping(), 1)]

@@ -148,6 +148,7 @@ class Calls:
     def read(self) -> list[Answer]:
         """What came, `_READ_MAX` at most; also sends what is still to be sent. For the node's thread."""
         answers: list[Answer] = []
+        events = 0
         with self._changed:
             while not (many := len(answers) >= _READ_MAX):
                 events = self._events()
@@ -158,7 +159,7 @@ class Calls:
                 elif not self._flush():  # sending may take in what came meanwhile
                     break
             self.has_more = many
-            self.is_connected = bool(self._events() & zmq.POLLOUT)
+            self.is_connected = bool(events & zmq.POLLOUT)
         return answers
 
     def stop(self) -> None:
@@ -183,8 +184,11 @@ class Calls:
             if len(self._calls) > _MOST_CALLS:
                 self._drop_oldest()
             self._flush()
-            is_input = self._events() & zmq.POLLIN
-        if is_input:
+            events = self._events()
+            if events & zmq.POLLOUT and not call.is_sent:
+                self._flush()  # it was connected just now, and that was the only signal of it
+                events = self._events()
+        if events & zmq.POLLIN:
             self._after_use()
         return call
 

@@ -1,0 +1,205 @@
+"""A master under siege: three honest nodes must not notice what a hostile program sends to it."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import psutil
+import pytest
+import zmq
+
+import nep
+from nep import bodies
+from nep.packing import pack, pack_surely
+from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.registration import node_id_from
+from nep.requests import AddPublisher, Join, Leave, Look, RemovePublisher, Renew, Request
+from tests.nep.programs import MASTER, eventually, running
+
+NAMES = ("Arm", "Eye", "Leg")
+MEMORY_MAX_BYTES = 400 * 2**20
+
+
+class Siege:
+    """Three honest nodes, each with a publisher and a subscriber of one topic, and sockets of an attacker."""
+
+    def __init__(self, address: str, stack: ExitStack) -> None:
+        self._address = address
+        self.nodes = [stack.enter_context(nep.node(name, master=address)) for name in NAMES]
+        self.subs = [each.new_sub("/state") for each in self.nodes]
+        self.pubs = [each.new_pub("/state") for each in self.nodes]
+        self.epoch = self.nodes[0].graph().epoch
+        self._context = stack.enter_context(zmq.Context())
+        self._stack = stack
+        self._said = 0
+
+    def attacker(self, routing_id: bytes = b"") -> zmq.Socket[bytes]:
+        """One more connection to the master."""
+        socket = self._stack.enter_context(self._context.socket(zmq.DEALER))
+        socket.setsockopt(zmq.LINGER, 0)
+        if routing_id:
+            socket.setsockopt(zmq.ROUTING_ID, routing_id)
+        socket.connect(f"tcp://{self._address}")
+        return socket
+
+    def go_on(self) -> None:
+        """What each publishes reaches all; the graph shows all; a new node joins."""
+        self._said += 1
+        for pub in self.pubs:
+            pub.publish(self._said)
+        for sub in self.subs:
+            assert [sub.listen(2.0) for _ in self.pubs] == [(True, self._said)] * 3
+            assert sub.lost == 0
+        with nep.node("Guest", master=self._address) as guest:
+            pub = guest.new_pub("/state")
+            assert pub.subscribers >= 3
+            assert set(NAMES) <= {each.name for each in guest.graph(5.0).nodes.values()}
+
+
+@pytest.fixture(scope="module")
+def siege() -> Iterator[Siege]:
+    with running(MASTER, "127.0.0.1:0") as master, ExitStack() as stack:
+        made = Siege(master.line(), stack)
+        made.go_on()
+        ids = [each.id for each in made.nodes]
+        yield made
+        made.go_on()
+        assert [each.id for each in made.nodes] == ids
+        assert set(ids) <= made.nodes[0].graph().nodes.keys()
+        assert psutil.Process(master.process.pid).memory_info().rss < MEMORY_MAX_BYTES
+
+
+def mallory(n: int) -> NodeRecord:
+    return NodeRecord(node_id_from(f"k{n}"), f"Mallory {n}", "host", 1, key=f"k{n}")
+
+
+def say(socket: zmq.Socket[bytes], *requests: Request) -> None:
+    for request in requests:
+        socket.send(bodies.encode_request(request, 1))
+
+
+def answers(socket: zmq.Socket[bytes], count: int) -> None:
+    """Wait until the master has dealt with so many requests."""
+    for _ in range(count):
+        assert socket.poll(10_000), "the master does not answer any more"
+        socket.recv()
+
+
+def random_bytes(siege: Siege) -> None:
+    socket = siege.attacker()
+    for size in (0, 1, 7, 100, 5000, 100_000) * 30:
+        socket.send(os.urandom(size))
+    answers(socket, 180)
+
+
+def huge_and_nested(siege: Siege) -> None:
+    socket = siege.attacker()
+    wide = b"\xdd" + (3 * 2**20).to_bytes(4, "big") + b"\xc0" * (3 * 2**20)
+    lists: object = [[[[]] * 1000] * 50] * 50
+    bodies_sent = [
+        b"\x91" * (3 * 2**20) + b"\xc0",
+        wide,
+        pack({"do": "ping", "call": 1})[:-1] + wide,
+        pack({"do": "join", "call": 1, "what": {"node": lists}}),
+        pack({"do": "renew", "call": 1, "what": {"node_id": "x", "publishers": lists}}),
+        pack({"do": "join", "call": 1, "what": {str(n): n for n in range(200_000)}}),
+    ]
+    for body in bodies_sent * 4:
+        socket.send(body)
+    answers(socket, 24)
+
+
+def many_topics(siege: Siege) -> None:
+    """A hundred thousand: most are refused, and what is taken is gone with who registered it."""
+    sockets = [siege.attacker() for _ in range(20)]
+    for n, socket in enumerate(sockets):
+        records = (
+            PublisherRecord(n * 10_000 + k, f"/m{n}/{k}", "json", "json", ("tcp://127.0.0.1:9",))
+            for k in range(1, 5001)
+        )
+        say(socket, Join(mallory(n), 0, tuple(records)))
+    for socket in sockets:
+        answers(socket, 1)
+    assert len(siege.nodes[0].graph(10.0).topics) <= 20_010
+    siege.go_on()
+    for n, socket in enumerate(sockets):
+        say(socket, Leave(mallory(n).id))
+        answers(socket, 1)
+    assert len(siege.nodes[0].graph(10.0).topics) <= 10
+
+
+def numbers_that_cannot_be(siege: Siege) -> None:
+    socket = siege.attacker()
+    me = mallory(50)
+    publisher = PublisherRecord(5, "/elsewhere", "json", "json", ("tcp://127.0.0.1:9",))
+    say(socket, Join(me, 2**63, (publisher,), (SubscriberRecord(6, "/state", "json"),)))
+    answers(socket, 1)
+    count = 0
+    for epoch in (siege.epoch, 0, -1, 2**63, 2**64 - 1):
+        for revision in (0, -5, 2**64 - 1):
+            for ratio in (math.nan, math.inf, -1.0, 1e308):
+                publishers = (PublisherCount(5, -(2**63), 2**64 - 1, 2**64 - 1, -7),)
+                subscribers = (SubscriberCount(6, -1, 2**64 - 1, "\x1b[2J" * 1000),)
+                say(socket, Renew(me.id, epoch, revision, publishers, subscribers, ratio))
+                count += 1
+    for what in (math.nan, [], {}, "x", -1, 2**64 - 1):
+        socket.send(pack_surely({"do": "renew", "call": what, "what": {"node_id": what, "epoch": what}}))
+        count += 1
+    answers(socket, count)
+    say(socket, Leave(me.id))
+    answers(socket, 1)
+
+
+def ids_of_others(siege: Siege) -> None:
+    for victim, pub in zip(siege.nodes, siege.pubs, strict=True):
+        for routing_id in (victim.id.encode(), b""):
+            socket = siege.attacker(routing_id)
+            taken = PublisherRecord(pub.id, "/state", "json", "json", ("tcp://127.0.0.1:9",))
+            said: list[Request] = [
+                Leave(victim.id),
+                Join(NodeRecord(victim.id, "x", "host", 1)),
+                Join(NodeRecord(victim.id, "x", "host", 1, key="guessed")),
+                RemovePublisher(victim.id, pub.id, 0),
+                AddPublisher(mallory(60), taken),
+                Join(mallory(60), 0, (taken,)),
+            ]
+            say(socket, *said)
+            answers(socket, len(said))
+
+
+def coming_and_going(siege: Siege) -> None:
+    for n in range(100):
+        with siege.attacker() as socket:
+            record = PublisherRecord(10**9 + n, "/state", "json", "json", ("tcp://127.0.0.1:9",))
+            say(socket, AddPublisher(mallory(1000 + n), record))
+            answers(socket, 1)
+
+
+def looks_that_are_never_read(siege: Siege) -> None:
+    socket = siege.attacker()
+    for _ in range(3000):
+        if not socket.poll(1000, zmq.POLLOUT):
+            break
+        say(socket, Look())
+
+
+@pytest.mark.parametrize(
+    "attack",
+    [
+        random_bytes,
+        huge_and_nested,
+        many_topics,
+        numbers_that_cannot_be,
+        ids_of_others,
+        coming_and_going,
+        looks_that_are_never_read,
+    ],
+    ids=lambda attack: attack.__name__,
+)
+def test_honest_nodes_do_not_notice(siege: Siege, attack: Callable[[Siege], None]) -> None:
+    attack(siege)
+    siege.go_on()
+    eventually(lambda: set(NAMES) <= {each.name for each in siege.nodes[0].graph(5.0).nodes.values()})
