@@ -15,6 +15,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
@@ -67,7 +68,7 @@ class BehaviourTab(QAbstractButton):
         self.setText(facts.name)
         self.setAccessibleName(", ".join([facts.name, *states]))
         self.setAccessibleDescription("The behaviour that shows" if current else "Another open behaviour")
-        self.setToolTip(facts.tip or self.accessibleName())
+        self.setToolTip(plain.tip(facts.tip or self.accessibleName()))
         self.update()
         return wider
 

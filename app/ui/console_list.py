@@ -20,6 +20,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QFont, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.plain_key import is_plain
 from app.ui.theme import Theme
@@ -104,7 +105,7 @@ class ConsoleModel(QAbstractListModel):
             return record
         if role in {Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole}:
             return line_of(record)
-        return tip_of(record) if role == Qt.ItemDataRole.ToolTipRole else None
+        return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
     def show_all(self, records: Sequence[LogRecord], wanted: Callable[[LogRecord], bool]) -> None:
         """Begin anew with those of the records (oldest first) that are wanted."""

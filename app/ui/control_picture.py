@@ -15,6 +15,7 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
 from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
 
 from app.robots.description import Parameter
+from app.ui import plain
 from app.ui.control import Control, connect, line_field
 from app.ui.file_dialogs import show_free
 from app.ui.flow import Flow
@@ -136,7 +137,7 @@ class PictureChoice(QWidget):
         self._image, said = read_picture(path)
         self.thumbnail.show_image(self._image)
         self.field.setText(path.name if self._image is not None else str(path))
-        self.field.setToolTip(str(path))
+        self.field.setToolTip(plain.tip(str(path)))
         self._judge(said)
         self.changed.emit()
 
@@ -167,7 +168,9 @@ class PictureChoice(QWidget):
         menu = Menu(self._theme, self)
         topics = list(self._pictures.topics())
         for topic in topics:
-            menu.addAction(topic).triggered.connect(lambda _on=False, topic=topic: self.use_topic(topic))
+            menu.addAction(plain.entry(topic)).triggered.connect(
+                lambda _on=False, topic=topic: self.use_topic(topic)
+            )
         if not topics:
             menu.addAction("No camera sends pictures now").setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

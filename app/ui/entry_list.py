@@ -10,6 +10,7 @@ from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelInde
 from PySide6.QtGui import QFont, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.palette_match import Entry, Found
 from app.ui.shortcuts import spoken_key
@@ -65,7 +66,7 @@ class EntryModel(QAbstractListModel):
         if role == Qt.ItemDataRole.AccessibleTextRole:
             return spoken(entry)
         if role == Qt.ItemDataRole.ToolTipRole:
-            return entry.reason or entry.words
+            return plain.tip(entry.reason or entry.words)
         return None
 
     def flags(self, index: Index) -> Qt.ItemFlag:

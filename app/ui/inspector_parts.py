@@ -12,6 +12,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.lazy_json import LazyList, LazyObject
+from app.ui import plain
 from app.ui.theme import Theme
 from app.ui.widgets import Changing, IconButton, Line, label, paint
 from app.ui.words import age_words, grouped, latency_words, size_words
@@ -150,7 +151,7 @@ class Foot(QWidget):
     def show_path(self, path: str) -> None:
         """The path of the chosen value; empty when none is."""
         self.path.setText(path)
-        self.path.setToolTip(path)
+        self.path.setToolTip(plain.tip(path))
         for button in (self.copy_value, self.copy_path):
             button.setEnabled(bool(path))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
+from app.ui import plain
 from app.ui.actions import Actions
 from app.ui.main_window import MainWindow
 from app.ui.reasons import why_not
@@ -69,8 +70,8 @@ class MenuLists:
         self._recent.menuAction().setVisible(bool(recent))
         for file in recent:
             words = file.name if file.there else f"{file.name} (not there any more)"
-            entry = self._recent.addAction(words)
-            entry.setToolTip(str(file.path))
+            entry = self._recent.addAction(plain.entry(words))
+            entry.setToolTip(plain.tip(str(file.path)))
             entry.setEnabled(file.there)
             entry.triggered.connect(lambda _on=False, path=file.path: self._open_file(path))
         self._recent.addSeparator()
@@ -89,7 +90,7 @@ class MenuLists:
         if own:
             menu.addSeparator()
         for each in own:
-            entry = menu.addAction(each.name)
+            entry = menu.addAction(plain.entry(each.name))
             entry.setCheckable(True)
             entry.setChecked(shown == each.base and arrangements.own(each.base) == each.name)
             entry.triggered.connect(lambda _on=False, name=each.name: self.own(name))

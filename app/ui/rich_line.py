@@ -6,6 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from app.ui import plain
 from app.ui.theme import Theme
 from app.ui.widgets import paint
 
@@ -18,7 +19,7 @@ class BoldInLine(QWidget):
         self._theme, self._kind = theme, kind
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.setAccessibleName(sentence)
-        self.setToolTip(sentence)
+        self.setToolTip(plain.tip(sentence))
         before, found, after = sentence.partition(subject) if subject else (sentence, "", "")
         self._parts = ((before, False), (found, True), (after, False))
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.ui import plain
 from app.ui.earlier_sheet import when_words
 from app.ui.robot_item import LIST_WIDTH, RobotItem
 from app.ui.theme import Theme
@@ -134,5 +135,6 @@ class RobotList(QWidget):
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction("Find out why").triggered.connect(lambda: self._run("help.doctor"))
-        menu.addAction(f"Forget {item.name}").triggered.connect(lambda: self.forgotten.emit(item.name))
+        forget = menu.addAction(plain.entry(f"Forget {item.name}"))
+        forget.triggered.connect(lambda: self.forgotten.emit(item.name))
         return menu

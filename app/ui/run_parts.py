@@ -7,6 +7,7 @@ from PySide6.QtGui import QFont, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.core.run_view import RunView
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
@@ -84,7 +85,7 @@ class Sentence(QWidget):
         if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
             self._title, self._detail, self._is_alarm = title, detail, is_alarm
             self.setAccessibleName(f"{title}. {detail}")
-            self.setToolTip(f"{title}\n{detail}")
+            self.setToolTip(plain.tip(f"{title}\n{detail}"))
             self.update()
 
     def _title_font(self) -> QFont:

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.settings import Settings
 from app.errors import SettingsError
+from app.ui import plain
 from app.ui.actions import TABLE, Row
 from app.ui.words import spoken_key as spoken_key
 
@@ -195,4 +196,4 @@ class Shortcuts(QObject):
             if isinstance(command, str):
                 said = widget.property("tip") or widget.accessibleName()
                 key = ", ".join(spoken_key(each) for each in self.of(command))
-                widget.setToolTip(f"{said} ({key})" if key else str(said))
+                widget.setToolTip(plain.tip(f"{said} ({key})" if key else str(said)))

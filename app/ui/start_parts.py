@@ -10,6 +10,7 @@ from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.settings import RecentFile
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.miniature import Row, paint_rows
 from app.ui.start_art import Art, upper_corners
@@ -135,7 +136,7 @@ class RecentRow(QAbstractButton):
         self._when = day_words(then, now)
         self.setText(recent.name)
         self.setAccessibleName(f"Open {recent.name}, {self._when}")
-        self.setToolTip(str(recent.path))
+        self.setToolTip(plain.tip(str(recent.path)))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)

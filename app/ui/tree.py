@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
 
+from app.ui import plain
 from app.ui.tree_difference import MISSING, OFF, Mark, Part, differs, parts_of
 from app.ui.tree_values import is_container, keys_of, size_of, values_of, words_of
 
@@ -111,7 +112,7 @@ class TreeModel(QAbstractItemModel):
         if role == Qt.ItemDataRole.DisplayRole:
             return str(node.key)
         if role == Qt.ItemDataRole.ToolTipRole:
-            return node.path
+            return plain.tip(node.path)
         if role == Qt.ItemDataRole.AccessibleTextRole:
             return ", ".join(part for part in (str(node.key), words_of(node.value), node.mark) if part)
         return None

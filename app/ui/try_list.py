@@ -11,6 +11,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description import Action
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.input_words import input_words
 from app.ui.theme import Theme
@@ -41,7 +42,7 @@ class TryRow(QAbstractButton):
         self.setProperty("focusRadius", theme.radius("small"))
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self.setAccessibleName(f"{self.when}, {self.given}, {self.result}; take these values")
-        self.setToolTip(f"{self.result}. Press to take these values")
+        self.setToolTip(plain.tip(f"{self.result}. Press to take these values"))
 
     def sizeHint(self) -> QSize:
         return QSize(200, round(self._theme.scaled(ROW)))

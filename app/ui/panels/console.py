@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout
 
+from app.ui import plain
 from app.ui.console_list import (
     LEVELS,
     RECORD_ROLE,
@@ -216,7 +217,7 @@ class ConsolePanel(PanelWidget):
 
     @staticmethod
     def _offer(menu: Menu, words: str, is_chosen: bool, choose: partial[None]) -> None:
-        action = menu.addAction(words.replace("&", "&&"))
+        action = menu.addAction(plain.entry(words))
         action.setCheckable(True)
         action.setChecked(is_chosen)
         action.triggered.connect(lambda _on=False: choose())

@@ -11,6 +11,7 @@ from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage, QR
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core import snapshots
+from app.ui import plain
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_actions import PictureActions
 from app.ui.picture_place import PicturePlace
@@ -222,7 +223,7 @@ class ImagePanel(PanelWidget):
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
         for name in self.topics():
-            action = menu.addAction(name)
+            action = menu.addAction(plain.entry(name))
             action.setCheckable(True)
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from app.core.companions import VIRTUAL_ROBOTS
 from app.core.problem_list import Listed, Mend, listed
+from app.ui import plain
 from app.ui.action_card import Tile
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
@@ -225,7 +226,7 @@ class ProblemsPanel(PanelWidget):
             f"{kinds.count(kind)} {PLURAL[kind][kinds.count(kind) > 1]}" for kind in PLURAL if kind in kinds
         ]
         self.chip.setAccessibleName(", ".join(words))
-        self.chip.setToolTip(", ".join(words))
+        self.chip.setToolTip(plain.tip(", ".join(words)))
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)

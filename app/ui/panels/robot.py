@@ -11,6 +11,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
+from app.ui import plain
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.plain_key import is_plain
 from app.ui.robot_drawing import RobotDrawing
@@ -184,7 +185,7 @@ class RobotPanel(PanelWidget):
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
         for link in self.session.fleet.links:
-            action = menu.addAction(link.name)
+            action = menu.addAction(plain.entry(link.name))
             action.setCheckable(True)
             action.setChecked(link.name == self._robot)
             action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.choose(name))

@@ -8,6 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
@@ -46,7 +47,7 @@ def name_command(widget: QWidget, command: str, tip: str, key: str = "") -> None
     """Say which command a button does; its tooltip follows the key that a person gives the command."""
     widget.setProperty("command", command)
     widget.setProperty("tip", tip)
-    widget.setToolTip(tip_with_key(tip, key))
+    widget.setToolTip(plain.tip(tip_with_key(tip, key)))
 
 
 class Button(QAbstractButton):
@@ -197,7 +198,7 @@ class IconButton(QAbstractButton):
     def set_name(self, name: str, shortcut: str = "") -> None:
         """What the button does, and its key."""
         self.setAccessibleName(name)
-        self.setToolTip(tip_with_key(name, shortcut))
+        self.setToolTip(plain.tip(tip_with_key(name, shortcut)))
 
     def _icon_side(self) -> float:
         name = "normal" if self._side < 40 else "large"

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.ui import plain
 from app.ui.flow import Flow
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
@@ -104,7 +105,7 @@ class _Swatch(QAbstractButton):
         self.setCheckable(True)
         self.setAutoExclusive(True)
         self.setAccessibleName(name)
-        self.setToolTip(name)
+        self.setToolTip(plain.tip(name))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setFixedSize(SWATCH + 8, SWATCH + 8)
         self.setProperty("focusInset", 4)

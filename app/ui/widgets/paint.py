@@ -14,6 +14,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
+from app.ui import plain
 from app.ui.theme import Theme
 
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
@@ -110,7 +111,7 @@ def tell_whole(widget: QWidget, words: str) -> None:
         return
     short = widget.width() < widget.sizeHint().width() - 1
     widget.setProperty("shortened", short)
-    widget.setToolTip(words if short else "")
+    widget.setToolTip(plain.tip(words if short else ""))
 
 
 def announce(widget: QWidget, words: str) -> None:

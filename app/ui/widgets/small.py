@@ -9,6 +9,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QFrame, QLabel, QLineEdit, QSizePolicy, QWidget
 
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import paint
@@ -55,8 +56,8 @@ class Elided(QLabel):
         room = self.contentsRect()
         fits = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideMiddle, room.width() + 1)
         whole = self.text() if fits != self.text() else ""
-        if whole != self.toolTip():
-            self.setToolTip(whole)
+        if plain.tip(whole) != self.toolTip():
+            self.setToolTip(plain.tip(whole))
         painter = QPainter(self)
         painter.setPen(self.palette().color(self.foregroundRole()))
         painter.drawText(room, int(paint.LEFT), fits)

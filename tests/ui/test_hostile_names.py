@@ -1,0 +1,124 @@
+"""Names from the network are shown as they are: no tooltip, label, menu or view takes them for markup."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QAbstractListModel, QModelIndex, Qt
+from PySide6.QtGui import Qt as Guessing
+from PySide6.QtGui import QTextDocument
+from PySide6.QtWidgets import QAbstractItemView, QLabel, QMenu, QWidget
+
+import app.ui
+from app.ui import plain
+from app.ui.banner import BannerPlace
+from app.ui.docks import Dock
+from app.ui.panel_shelf import PanelShelf
+from app.ui.panels.base import PanelWidget
+from app.ui.theme import Theme
+from tests.ui.fakes import Session, pepper
+from tests.ui.panel_case import Window, ticks
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+NAME = '<img src="/etc/passwd"> & <b>R</b>'
+
+
+@pytest.mark.parametrize(
+    "words", [NAME, "<b>x", "<!doctype html>", "<?xml?>", "a\n<i>b</i>", "x < y", "&amp;", "", "a  b"]
+)
+def test_a_tooltip_shows_exactly_the_words(qapp, words: str) -> None:
+    tip = plain.tip(words)
+    if not Guessing.mightBeRichText(tip):
+        assert tip == words
+        return
+    shown = QTextDocument()
+    shown.setHtml(tip)
+    assert shown.toPlainText() == words
+    assert "<img" not in tip
+
+
+def test_a_menu_shows_exactly_the_name(qtbot) -> None:
+    menu = QMenu()
+    qtbot.addWidget(menu)
+    action = menu.addAction(plain.entry("R&D\t<b>Ctrl+Q</b>"))
+    assert action.text() == "R&&D <b>Ctrl+Q</b>"
+
+
+def test_every_tooltip_that_is_not_a_constant_goes_through_the_one_seam() -> None:
+    found = []
+    for path in Path(app.ui.__file__).parent.rglob("*.py"):
+        for line in path.read_text("utf-8").splitlines():
+            given = re.search(r"\.setToolTip\((.*)", line)
+            if given and not re.match(r'"[^"]*"\)$|plain\.tip\(', given[1]):
+                found.append(f"{path.name}: {line.strip()}")
+    assert not found
+
+
+def hostile() -> Window:
+    """A session in which everything that comes from the network has a name that looks like markup."""
+    session = Session.full()
+    for topic in list(session.topics):
+        topic.name = f"{topic.name}{NAME}"
+        topic.msg_type = f"{NAME}{topic.msg_type}"
+        topic.publisher_nodes = (NAME,)
+    link = session.fleet.links[0]
+    robot = pepper(f"Pepper{NAME}")
+    actions = [replace(action, title=f"{action.title} {NAME}") for action in robot.actions]
+    link.robot = replace(robot, actions=tuple(actions))
+    session.fleet.revision += 1
+    session.alerts.put("a", "error", NAME, NAME, button=NAME, action="x")
+    session.console.add("error", NAME, NAME)
+    return Window(session)
+
+
+def shown(view: QAbstractItemView) -> Iterator[str]:
+    """The tooltips of a view, as far as its rows are there."""
+    model = view.model()
+
+    def below(parent: QModelIndex) -> Iterator[str]:
+        for row in range(min(50, model.rowCount(parent))):
+            for column in range(1 if isinstance(model, QAbstractListModel) else model.columnCount(parent)):
+                index = model.index(row, column, parent)
+                yield str(index.data(Qt.ItemDataRole.ToolTipRole) or "")
+                yield from below(index)
+
+    if model is not None:
+        yield from below(QModelIndex())
+
+
+@pytest.mark.parametrize("name", [name for name in PanelShelf() if name != "behaviour"])
+def test_no_panel_takes_a_name_for_markup(qtbot, name: str) -> None:
+    window = hostile()
+    panel = PanelShelf()[name].make(window.context())
+    assert isinstance(panel, PanelWidget)
+    dock = Dock(window.theme, PanelShelf()[name], panel, "comfortable")
+    qtbot.addWidget(dock)
+    dock.resize(900, 600)
+    dock.show()
+    ticks(window, panel, 2)
+    for topic in list(window.session.topics)[:2]:
+        panel.show_topic(topic.name)
+        ticks(window, panel)
+    for widget in dock.findChildren(QWidget):
+        assert "<img" not in widget.toolTip(), widget
+        if isinstance(widget, QLabel):
+            told = widget.text()
+            markup = widget.textFormat() != Qt.TextFormat.PlainText and Guessing.mightBeRichText(told)
+            assert not (markup and "<img" in told), widget
+        if isinstance(widget, QAbstractItemView):
+            assert not any("<img" in tip for tip in shown(widget)), widget
+    panel.shut()
+
+
+def test_the_banner_shows_names_as_they_are(qtbot, theme: Theme) -> None:
+    window = hostile()
+    banner = BannerPlace(theme)
+    qtbot.addWidget(banner)
+    banner.show_alerts(window.session.alerts.active)
+    for label in banner.findChildren(QLabel):
+        assert "<img" not in label.text() or label.textFormat() == Qt.TextFormat.PlainText
