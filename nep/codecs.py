@@ -33,6 +33,7 @@ from nep.packing import pack, unpack
 
 __all__ = ["CODECS", "Codec", "Encoded", "codec", "codec_for", "codec_numbered"]
 
+_BYTES = (bytes, bytearray, memoryview)
 _NUMPY = orjson.OPT_SERIALIZE_NUMPY
 
 
@@ -110,7 +111,7 @@ def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -
 
 
 def _check_bytes(payload: object) -> bytes | bytearray | memoryview:
-    if not isinstance(payload, bytes | bytearray | memoryview):
+    if not isinstance(payload, _BYTES):
         raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")
     return payload
 

@@ -141,7 +141,7 @@ def _shape(frame: NDArray[Any]) -> list[int]:
 
 def check(payload: object) -> None:
     """Raises `EncodeError` for what is no picture by its type, its shape or its numbers."""
-    if isinstance(payload, bytes | bytearray | memoryview):
+    if isinstance(payload, (bytes, bytearray, memoryview)):
         return
     try:
         _picture(payload)

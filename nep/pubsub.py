@@ -26,6 +26,7 @@ SLICE_S = 0.1
 """Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
 
 _logger = logging.getLogger("nep")
+_DATA = (bytes, memoryview)  # made once: this is asked for every message that nobody hears
 
 
 class Publisher:
@@ -104,7 +105,10 @@ class Publisher:
             self._check(payload)
             self._unsendable.add(payload, error)
             return
-        self._send(made)
+        if made is payload or self._unsendable.problem:
+            self._send(made)
+        else:
+            self._outlet.send(made)
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send bytes that are encoded already. Raises as `publish` does."""
@@ -130,7 +134,7 @@ class Publisher:
             self._spec.codec.check(payload)
             return
         codec, data, extension = self._spec.codec.name, payload.data, payload.extension
-        if not isinstance(data, bytes | memoryview):
+        if not isinstance(data, _DATA):
             raise EncodeError(codec, type(data).__name__, "give its 'bytes'")
         if extension is not None and not isinstance(extension, Mapping):
             raise EncodeError(codec, type(extension).__name__, "an extension is a map")

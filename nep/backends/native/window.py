@@ -13,9 +13,9 @@ __all__ = ["BACKLOG_STEP_BYTES", "STEP_BYTES", "WINDOW_BYTES", "WINDOW_LEAST_BYT
 
 WINDOW_BYTES = 192 * 2**20
 """So much may be under way to one subscriber. With the batch that its sink works on these are 256 MB."""
-WINDOW_LEAST_BYTES = 16 * 2**20
+WINDOW_LEAST_BYTES = 24 * 2**20
 """The least that a subscriber may ask for: two steps, so that nobody waits for each message to be read."""
-STEP_BYTES = 8 * 2**20
+STEP_BYTES = 12 * 2**20
 """How often a subscriber is asked what it has read."""
 BACKLOG_STEP_BYTES = 2**20
 """How often it is noted what libzmq holds for those that cannot be asked."""
