@@ -7,7 +7,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -122,8 +122,32 @@ def first_steps(window: MainWindow, commands: Commands, options: Options) -> lis
     return [window.begin, show]
 
 
+def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
+    """Why no window can open here, and what to do, in a sentence; "" when one can.
+
+    ``platform`` as `sys.platform` says it, ``user`` the number of the user (0 is root).
+    """
+    if not platform.startswith("linux"):
+        return ""
+    if not any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")):
+        return (
+            "there is no screen here (DISPLAY and WAYLAND_DISPLAY are not set); start it where you see a "
+            "desktop, or run a behaviour with no window: nep-studio run FILE"
+        )
+    if user == 0 and not environ.get("QTWEBENGINE_DISABLE_SANDBOX"):
+        return (
+            "the block editor's browser refuses to run as root with its sandbox; start Studio as another "
+            "user, or, where nothing else can be done, set QTWEBENGINE_DISABLE_SANDBOX=1"
+        )
+    return ""
+
+
 def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order."""
+    refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
+    if refused:
+        sys.stderr.write(f"nep-studio: {refused}\n")
+        return 2
     bring_here()
     meeting_place = single_window.place(home())
     if not options.alone and single_window.hand_over(meeting_place, Asked(options.files, options.demo)):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QEvent, QObject, QRectF, Qt
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QApplication, QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
+from shiboken6 import isValid
 
 from app.core.moving import Moving
 from app.errors import SettingsError
@@ -109,8 +110,8 @@ class MoveQuestion(QWidget):
         self.setAccessibleDescription(question.sentence)
         if not self.isVisible():
             self._before = QApplication.focusWidget()
+        self.show()  # first: fonts and margins of the style sheet come with it
         self._place()
-        self.show()
         self.raise_()
         self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
 
@@ -118,9 +119,9 @@ class MoveQuestion(QWidget):
         focus = QApplication.focusWidget()
         had_focus = focus is not None and self.isAncestorOf(focus)
         self.hide()
-        if had_focus and self._before is not None:
-            self._before.setFocus(Qt.FocusReason.PopupFocusReason)
-        self._before = None
+        before, self._before = self._before, None
+        if had_focus and before is not None and isValid(before) and before.isVisible():
+            before.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _answer(self, *, let: bool) -> None:
         try:
@@ -136,6 +137,9 @@ class MoveQuestion(QWidget):
         wide = min(round(self._theme.scaled(WIDE)), window.width() - 32)
         self.setFixedWidth(wide)
         layout = self.layout()
+        if layout is not None:
+            layout.invalidate()
+            layout.activate()
         high = layout.heightForWidth(wide) if layout is not None else -1
         self.resize(wide, max(high, self.minimumSizeHint().height()))
         top = round(window.height() * TOP_SHARE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
@@ -121,3 +121,25 @@ def test_it_stays_in_a_small_window_and_moves_with_it(window, qtbot) -> None:
     qtbot.waitUntil(lambda: window.question.width() <= 400)
     inside = window.rect()
     assert inside.contains(window.question.geometry())
+
+
+def test_what_had_the_keyboard_may_be_gone_by_then(window) -> None:
+    window.ask("move")
+    window.field.deleteLater()
+    QCoreApplication.sendPostedEvents(window.field, QEvent.Type.DeferredDelete.value)
+    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    assert window.done == ["moved"]
+    assert not window.question.isVisible()
+
+
+def test_its_words_have_their_room_at_the_first_show(qtbot, tmp_path) -> None:
+    window = Window(tmp_path)
+    qtbot.addWidget(window)
+    window.question._theme.apply()  # the words grow when the question is polished
+    window.show()
+    window.ask("move", "turn")
+    first = window.question.height()
+    for words in (window.question.title, window.question.sentence):
+        assert words.height() >= words.heightForWidth(words.width())
+    window.resize(1001, 700)
+    assert window.question.height() == first

@@ -208,6 +208,21 @@ def test_freezing_holds_the_message_until_it_is_pressed_again(panel, window) -> 
     assert panel.model.value() == {"n": 2}
 
 
+def test_a_bad_message_that_is_held_is_shown_as_bytes_in_both_ways(panel, window) -> None:
+    panel.show_topic("/faces")
+    window.session.send("/faces", b"not json \x00\xff")
+    panel.refresh()
+    panel.freeze.setChecked(True)
+    window.session.send("/faces", {"good": 1})
+    ticks(window, panel)
+    press(button(panel.mode, "Tree"))
+    assert panel.body.page == RAW
+    assert panel.body.sentence.text().startswith("This can't be read as json: ")
+    assert "6e 6f 74" in panel.bytes.text()
+    panel.freeze.setChecked(False)
+    assert panel.model.value() == {"good": 1}
+
+
 def test_copying_a_value_and_a_path(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard())

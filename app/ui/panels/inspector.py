@@ -26,6 +26,7 @@ from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.tree_difference import OFF
 from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.menus import Menu
+from nep.errors import NepError
 
 if TYPE_CHECKING:
     from app.core.lazy_json import JsonIndex
@@ -137,11 +138,19 @@ class InspectorPanel(PanelWidget):
             self._offer_large(message)
         elif large:
             self._read_elsewhere(message)
-        elif tells_its_shape(message) or self.session.topics.check(topic):
-            value = image_summary(message) if message.codec == "image" else message.payload
-            self._show_tree(message, value, None)
+        elif tells_its_shape(message) or message is not topic.newest or self.session.topics.check(topic):
+            self._show_decoded(message)
         else:
             self._show_raw(message, topic.decode_error or "")
+
+    def _show_decoded(self, message: Message) -> None:
+        """Show it as a tree; a message that is held may be bad although the newest one is not."""
+        try:
+            value = image_summary(message) if message.codec == "image" else message.payload
+        except NepError as error:
+            self._show_raw(message, str(error))
+        else:
+            self._show_tree(message, value, None)
 
     def _read_elsewhere(self, message: Message) -> None:
         """Let the reader's thread look into it; until then what was there stays."""

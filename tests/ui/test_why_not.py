@@ -1,0 +1,46 @@
+"""Where no window can open, Studio says why and what to do; it does not die without a word."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.ui.application import why_not
+
+X11 = {"DISPLAY": ":0"}
+
+
+@pytest.mark.parametrize(
+    ("environ", "platform", "user", "said"),
+    [
+        (X11, "linux", 1000, ""),
+        ({"WAYLAND_DISPLAY": "wayland-0"}, "linux", 1000, ""),
+        ({"QT_QPA_PLATFORM": "offscreen"}, "linux", 1000, ""),
+        ({}, "linux", 1000, "there is no screen here"),
+        ({"DISPLAY": ""}, "linux", 1000, "there is no screen here"),
+        (X11, "linux", 0, "as root"),
+        ({**X11, "QTWEBENGINE_DISABLE_SANDBOX": "1"}, "linux", 0, ""),
+        ({}, "darwin", 0, ""),
+        ({}, "win32", 1, ""),
+    ],
+)
+def test_why_no_window_opens(environ: dict[str, str], platform: str, user: int, said: str) -> None:
+    assert said in why_not(environ, platform, user)
+    assert bool(said) == bool(why_not(environ, platform, user))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="screens have no name elsewhere")
+def test_without_a_screen_it_ends_with_a_sentence(tmp_path: Path) -> None:
+    hidden = {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}
+    environ = {name: value for name, value in os.environ.items() if name not in hidden}
+    environ["NEP_STUDIO_HOME"] = str(tmp_path)
+    command = [sys.executable, "-m", "app"]
+    done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("nep-studio: there is no screen here")
+    assert "reinstall" not in done.stderr
