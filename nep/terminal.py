@@ -42,6 +42,7 @@ class Terminal(io.TextIOBase):
         self._lines_dropped = 0
         self._is_over = stream is None
         self._is_closing = False
+        self._is_writing = False
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
@@ -77,6 +78,11 @@ class Terminal(io.TextIOBase):
     def flush(self) -> None:
         """Nothing: whoever flushes must not wait either."""
 
+    def drain(self, timeout_s: float = CLOSE_S) -> bool:
+        """Wait until all is written, for what must be read before the program ends; whether it is."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._waiting and not self._is_writing, timeout_s)
+
     def close(self, timeout_s: float = CLOSE_S) -> None:
         """Give what waits `timeout_s` to be written, then leave it. May be called twice."""
         with self._changed:
@@ -101,18 +107,23 @@ class Terminal(io.TextIOBase):
             except (OSError, ValueError):  # nobody reads it any more, or it was closed: nowhere to say so
                 with self._changed:
                     self._is_over = True
+                    self._is_writing = False
                     self._waiting.clear()
+                    self._changed.notify_all()
                 return
 
     def _next(self) -> str | None:
         """What is to be written now; None at the end. Waits."""
         with self._changed:
+            self._is_writing = False
+            self._changed.notify_all()
             self._changed.wait_for(lambda: self._waiting or self._lines_dropped or self._is_closing)
             if not self._waiting and not self._lines_dropped:
                 return None
             text = "".join(self._waiting)
             self._waiting.clear()
             self._size = 0
+            self._is_writing = True
             dropped, self._lines_dropped = self._lines_dropped, 0
         if dropped:
             text += f"… {dropped} line{'s' if dropped > 1 else ''} left out: nobody read this for a while\n"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import re
+import sys
 from collections import deque
 from collections.abc import Callable, MutableMapping
 from typing import TextIO
@@ -16,6 +17,7 @@ from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
 
 from app.core import faults
 from app.core.faults import SaidOnce
+from nep import terminal
 
 FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
 QUIET = "--log-level=3"  # Chromium's own lines: only what ends it
@@ -73,20 +75,30 @@ class Log(logging.Handler):
             add(*self._kept.popleft())
 
 
-class Terminal(logging.StreamHandler[TextIO]):
-    """Warnings and errors on the standard error output, with the traceback of what is new."""
+class Terminal(logging.StreamHandler[terminal.Terminal]):
+    """Warnings and errors on the standard error output, with the traceback of what is new.
 
-    def __init__(self) -> None:
-        super().__init__()
+    Nobody waits for it, the window's thread least of all: a terminal may take nothing for hours.
+    """
+
+    def __init__(self, stream: TextIO | None) -> None:
+        super().__init__(terminal.Terminal(stream))
         self._once = SaidOnce()
         self.setLevel(logging.WARNING)
-        self.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+        self.setFormatter(terminal.LineFormatter("%(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one line; what happens again and again comes with its count."""
         told = self._once.told(record)
         if told is not None:
             super().emit(told)
+            if told.levelno >= logging.CRITICAL:  # Qt ends the program behind it
+                self.stream.drain()
+
+    def close(self) -> None:
+        """Give what waits a moment to be written; logging calls it at the end of the program."""
+        self.stream.close()
+        super().close()
 
 
 def listen() -> Log:
@@ -98,7 +110,7 @@ def listen() -> Log:
     qInstallMessageHandler(on_qt_message)
     root = logging.getLogger()
     if not root.handlers:
-        root.addHandler(Terminal())
+        root.addHandler(Terminal(sys.stderr))
     log = Log()
     root.addHandler(log)
     root.addHandler(faults.LogFile(faults.log_folder()))

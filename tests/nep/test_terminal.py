@@ -79,6 +79,18 @@ def test_all_is_written_before_it_closes() -> None:
     terminal.close()
 
 
+def test_draining_waits_for_what_was_written_and_not_for_ever(stuck: Stuck) -> None:
+    terminal = Terminal(stuck)
+    assert terminal.drain(0.0)
+    terminal.write("last words\n")
+    assert stuck.begins.wait(5.0)
+    assert not terminal.drain(0.0)
+    stuck.may_go_on.set()
+    assert terminal.drain(5.0)
+    assert stuck.getvalue() == "last words\n"
+    terminal.close()
+
+
 def test_no_stream_and_a_dead_one_are_stood() -> None:
     with Terminal(None) as nowhere:
         assert nowhere.write("x") == 1

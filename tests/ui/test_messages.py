@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import logging
+import threading
 
 import pytest
 from PySide6.QtCore import QMessageLogContext, QtMsgType
 
-from app.ui.messages import FLAGS, Log, on_qt_message, quiet_chromium
+from app.ui.messages import FLAGS, Log, Terminal, on_qt_message, quiet_chromium
 
 
 @pytest.mark.parametrize(
@@ -61,3 +63,27 @@ def test_the_log_is_kept_until_the_console_takes_it() -> None:
     log.take(lambda *line: lines.append(line))
     log.take(lambda *line: lines.append(line))
     assert lines == [("warn", "qt", "a warning"), ("error", "qt", "an error")]
+
+
+class Stuck(io.StringIO):
+    """A terminal that takes nothing until somebody presses Ctrl+Q."""
+
+    def __init__(self):
+        super().__init__()
+        self.may_go_on = threading.Event()
+
+    def write(self, text):
+        assert self.may_go_on.wait(10.0)
+        return super().write(text)
+
+
+def test_a_terminal_that_takes_nothing_does_not_stop_the_window():
+    stuck = Stuck()
+    handler = Terminal(stuck)
+    for n in range(1000):
+        handler.handle(
+            logging.makeLogRecord({"name": "qt", "levelno": logging.WARNING, "msg": f"no. {n}\x1b[2J"})
+        )
+    stuck.may_go_on.set()
+    handler.close()
+    assert stuck.getvalue().splitlines() == [f"qt: no. {n}\\x1b[2J" for n in range(1000)]
