@@ -143,15 +143,15 @@ def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
 
 
 def run(options: Options) -> int:
-    """Show the window until it is closed; the exit code is 0 when that was in order."""
-    refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
-    if refused:
-        sys.stderr.write(f"nep-studio: {refused}\n")
-        return 2
+    """Show the window until it is closed; the exit code is 0 when that was in order, 2 when none can open."""
     bring_here()
     meeting_place = single_window.place(home())
     if not options.alone and single_window.hand_over(meeting_place, Asked(options.files, options.demo)):
         return 0
+    refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
+    if refused:
+        sys.stderr.write(f"nep-studio: {refused}\n")
+        return 2
     log = messages.listen()
     messages.quiet_chromium(os.environ)
     application = make_application()
