@@ -191,7 +191,8 @@ def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master)
     """The first has a subscriber that hangs; what the second published arrives all the same."""
     hung = """
     import sys, nep
-    sub = nep.node("hung").new_sub("hung", "bytes")
+    node = nep.node("hung")
+    subs = node.new_sub("hung", "bytes"), node.new_sub("quiet", "bytes")
     print("ready")
     sys.stdin.readline()
     """
@@ -199,6 +200,7 @@ def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master)
     import sys, nep
     first = nep.node("first").new_pub("hung", "bytes")
     second = nep.node("second").new_pub("pictures", "bytes")
+    third = nep.node("third").new_pub("quiet", "bytes")
     print("ready")
     sys.stdin.readline()
     for n in range(8):
@@ -217,6 +219,7 @@ def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master)
     assert [(ok, data[:1]) for ok, data in got] == [(True, bytes([n])) for n in range(8)]  # type: ignore[index]
     assert "'hung' is closed before 1 subscriber(s) took everything: up to 8 messages not delivered" in error
     assert "pictures" not in error
+    assert "quiet" not in error, "nothing was sent there, so nothing is missing"
 
 
 def test_connections_to_masters_that_nobody_needs_are_closed(master: Master) -> None:

@@ -342,13 +342,15 @@ class NativeOutlet:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
                     self._bye()  # a full queue drops it like anything else
             if self._seen:
-                most = self.count - min(self._seen.values())
-                _logger.warning(
-                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
-                    self.spec.topic,
-                    len(self._seen),
-                    most,
-                )
+                owed = [max(self.count - seen, self._latched is not None) for seen in self._seen.values()]
+                if any(owed):  # else only the bye was not taken
+                    _logger.warning(
+                        "'%s' is closed before %d subscriber(s) took everything: "
+                        "up to %d messages not delivered",
+                        self.spec.topic,
+                        sum(map(bool, owed)),
+                        max(owed),
+                    )
                 self._audience.forget()
                 self.subscribers = 0
 
