@@ -10,6 +10,7 @@ from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.faults import survived
+from app.core.robot_link import NOT_STOPPED
 from app.core.session import Session
 from app.ui.app_bar import AppBar
 from app.ui.arrangements import Arrangements
@@ -254,7 +255,7 @@ class MainWindow(QMainWindow):
         words, status = robots_chip(self.session)
         self.bar.show_robots(words, status)
         if self.showing == START:
-            self.bar.stop.show_state(view.stop_word, ring=view.state == "stopping", filled=self._moves())
+            self.bar.stop.show_state(view.stop_word, ring=view.state == "stopping", filled=self._may_move())
             there = any(link.state in {"ready", "busy"} for link in self.session.fleet.links)
             self.start.show_robot(words if there else "", status)
         elif self.showing == "behaviour":
@@ -283,6 +284,11 @@ class MainWindow(QMainWindow):
 
     def _moves(self) -> bool:
         return self.session.runs.active or any(link.state == "busy" for link in self.session.fleet.links)
+
+    def _may_move(self) -> bool:
+        """Whether a program, or a robot that did not stop, may move something now."""
+        is_open = self.session.runs.view().stop_word != "Stop"
+        return is_open or self._moves() or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
 
     def _show_alerts(self) -> None:
         alerts = self.session.alerts

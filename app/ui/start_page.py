@@ -9,7 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QSpacerItem,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.core.files import read_whole
 from app.core.settings import RecentFile
@@ -20,6 +29,9 @@ from app.ui.theme import Theme
 from app.ui.widgets import Button, label, paint
 
 WIDTH = 1080
+BANNER_ROOM = 40
+"""More room above the question, where the page is high enough: a banner that may not move the page covers no
+words there."""
 EXAMPLES_SHOWN = 4
 IN_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 RECENT_SHOWN = 3
@@ -106,6 +118,9 @@ class StartPage(QWidget):
         column = QVBoxLayout(content)
         column.setContentsMargins(0, 35, 0, 24)
         column.setSpacing(0)
+        column.addSpacerItem(
+            QSpacerItem(0, BANNER_ROOM, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
+        )
         self._question = label("What would you like to do?", "display", wrap=True)
         column.addWidget(self._question)
         column.addSpacing(7)

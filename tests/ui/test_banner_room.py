@@ -201,3 +201,17 @@ def test_longer_words_of_the_same_alert_move_nothing_either(qtbot, window: MainW
     mouse.over(window.tool_bar)
     QApplication.processEvents()
     assert window.room.height() == window.banner.height()
+
+
+def test_on_the_start_page_it_covers_no_words_though_the_mouse_is_over_the_page(
+    window: MainWindow, mouse: Mouse
+) -> None:
+    window.show_start()
+    settle(window)
+    mouse.over(window.start)
+    question = window.start._question
+    before = question.mapTo(window, QPoint())
+    say(window)
+    assert window.banner.isVisible()
+    assert question.mapTo(window, QPoint()) == before, "nothing moved"
+    assert window.banner.banner.mapTo(window, QPoint(0, window.banner.banner.height())).y() <= before.y()

@@ -15,6 +15,8 @@ from app.core.journal import Journal, left_behind
 from app.core.run_view import RunView
 from app.core.session import Session
 from app.core.settings import Settings
+from app.robots import simulated
+from app.robots.description import parse, td_for
 from app.ui.actions import TABLE, shortcuts
 from app.ui.application import Options, first_steps
 from app.ui.coming import Coming
@@ -48,6 +50,28 @@ def test_it_begins_with_the_start_page(qtbot, window: MainWindow, commands: Comm
     assert not window.status.isVisible()
     assert not window.bar.switch.isVisible()
     assert window.bar.stop.isVisible()
+    window.tick()
+    assert not window.bar.stop.filled
+
+
+def test_stop_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    show(qtbot, window)
+    fleet = window.session.fleet
+    fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
+    window.tick()
+    assert not window.bar.stop.filled
+    link = fleet.link("Pepper")
+    assert link is not None
+    link.not_stopped = "Pepper may still move: the brake does not answer"
+    window.tick()
+    assert window.bar.stop.filled
+    link.not_stopped = ""
+    link.goes_on = "Pepper may still move: wave has not ended"
+    window.tick()
+    assert window.bar.stop.filled
+    link.goes_on = ""
     window.tick()
     assert not window.bar.stop.filled
 

@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 from app.core.run_view import RunView
 from app.ui.run_bar import RunBar, ToolBar
 from app.ui.theme import Theme
+from app.ui.widgets import StopButton, paint
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -136,3 +137,18 @@ def test_stop_is_where_it_was_in_every_compact_state(tools: ToolBar) -> None:
         QTest.qWait(1)
         places.add(tools.stop.geometry().getRect())
     assert len(places) == 1
+
+
+@pytest.mark.parametrize("place", ["runBar", "toolBar", "appBar"])
+@pytest.mark.parametrize("word", ["Stop", "Stopping", "Stop again"])
+def test_stop_has_room_for_each_of_its_words_and_its_key(qtbot, theme: Theme, place, word) -> None:
+    stop = StopButton(theme, place)
+    qtbot.addWidget(stop)
+    size = stop.sizeHint()
+    stop.show_state(word)
+    assert stop.sizeHint() == size, "its size stays"
+    stop.resize(size)
+    font, key_font = stop._fonts()
+    key = paint.width_of(key_font, "F12") + 7 if place != "runBar" else 0
+    needed = stop._side() + 8 + paint.width_of(font, word) + key
+    assert needed + 12 <= size.width() - 2 * 4, "within its frame, with some air"

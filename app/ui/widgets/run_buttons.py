@@ -98,7 +98,7 @@ class StopButton(QAbstractButton):
     def sizeHint(self) -> QSize:
         wanted = self._theme.pair("stop", self._place)
         word, key = self._fonts()
-        least = self._side() + 26 + paint.width_of(word, "Stop again" if self._place != "appBar" else "Stop")
+        least = self._side() + 26 + paint.width_of(word, "Stop again")  # one place and size in every state
         if self._place != "runBar":
             least += paint.width_of(key, "F12") + 8
         height = max(wanted.height(), round(paint.height_of(word)) + 10)
