@@ -1,20 +1,42 @@
-"""Stop's keys work whatever is open: menus, lists, dialogs, sheets, and panels that float."""
+"""Stop's keys and buttons work whatever is open: menus, lists, dialogs, sheets, and panels that float."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from PySide6.QtCore import QEvent, QObject
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QWindow
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QEvent, QObject, QPoint, Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QWindow
+from PySide6.QtWidgets import QAbstractButton, QApplication
+
+from app.ui.widgets import Button, StopButton
 
 _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
+
+
+def stop_at(place: QPoint) -> QAbstractButton | None:
+    """The button that stops, all robots or one, at a place of the screen that nothing popped up over."""
+    windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
+    inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
+    if any(window.windowType() == Qt.WindowType.Popup for window in inside):
+        return None
+    for window in inside:
+        under = window.childAt(window.mapFromGlobal(place))
+        if isinstance(under, StopButton) or (isinstance(under, Button) and under.kind == "stop"):
+            return under
+    return None
+
+
+def shut_popups() -> None:
+    """Close every menu and list that is open."""
+    while (popup := QApplication.activePopupWidget()) is not None and popup.close():
+        continue
 
 
 class StopKeys(QObject):
     """Hears the keys of every window of ours before anything in it does.
 
     A shortcut is not enough: an open menu or list, a page or a field that claims the key would have it.
+    A button is not enough either: while a menu or a list is open, the press beside it only closes it.
     """
 
     def __init__(
@@ -41,4 +63,17 @@ class StopKeys(QObject):
                 if event.type() == QEvent.Type.KeyPress and not event.isAutoRepeat():
                     self._stop()
                 return True
+        if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
+            return self._pressed(event)
         return super().eventFilter(watched, event)
+
+    def _pressed(self, event: QMouseEvent) -> bool:
+        """Whether a press beside what pops up was on a button that stops, and is done with."""
+        if event.button() != Qt.MouseButton.LeftButton or QApplication.activePopupWidget() is None:
+            return False
+        stop = stop_at(event.globalPosition().toPoint())
+        if stop is None:
+            return False
+        shut_popups()
+        stop.click()
+        return True

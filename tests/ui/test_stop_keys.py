@@ -132,6 +132,41 @@ def test_stop_works_with_it_open(
     assert stops == ["stop"]
 
 
+@pytest.fixture
+def presses(window: MainWindow, stops: list[str]) -> list[str]:
+    """How often the button was clicked."""
+    done: list[str] = []
+    window.tool_bar.stop.clicked.connect(lambda: done.append("stop"))
+    return done
+
+
+@pytest.mark.parametrize("opened", OPENED[:4], ids=lambda each: each.__name__)
+def test_the_first_press_on_stop_stops_and_closes_what_pops_up(
+    window: MainWindow, presses: list[str], opened: Callable[[MainWindow], None]
+) -> None:
+    opened(window)
+    QApplication.processEvents()
+    assert QApplication.activePopupWidget() is not None
+    stop = window.tool_bar.stop
+    place = stop.mapTo(window, stop.rect().center())
+    QTest.mousePress(window.windowHandle(), Qt.MouseButton.LeftButton, pos=place)
+    assert presses == ["stop"]
+    QTest.mouseRelease(window.windowHandle(), Qt.MouseButton.LeftButton, pos=place)
+    assert presses == ["stop"]
+    assert QApplication.activePopupWidget() is None
+
+
+def test_a_press_beside_what_pops_up_and_beside_stop_only_closes_it(
+    window: MainWindow, presses: list[str]
+) -> None:
+    a_menu(window)
+    QApplication.processEvents()
+    place = window.tool_bar.stop.mapTo(window, QPoint(-20, 4))
+    QTest.mouseClick(window.windowHandle(), Qt.MouseButton.LeftButton, pos=place)
+    assert not presses
+    assert QApplication.activePopupWidget() is None
+
+
 def test_stop_held_down_stops_once(window: MainWindow, stops: list[str]) -> None:
     handle = QGuiApplication.focusWindow()
     QTest.keyPress(handle, Qt.Key.Key_F12)
