@@ -20,6 +20,8 @@ from nep.views import GraphView
 
 MOST_ROBOTS = 200
 MOST_CLAIMANTS = 8
+MOST_OWNERS = 4
+"""Programs of one robot whose descriptions are kept, should one of them come back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +34,15 @@ class Claim:
 
 @dataclass(slots=True)
 class _Announced:
-    """A description topic: whose it is, and the newest description of each of its publishers."""
+    """A description topic: whose it is, and the newest description of each of its publishers.
+
+    ``owners`` are the nodes whose it was, the newest at the front. What they said is kept while they are not
+    listed: a latched message comes once, and a program that only slept comes back over the same connection.
+    """
 
     watch: Watch | None = None
     owner: Identity | None = None
+    owners: tuple[str, ...] = ()
     told: dict[int, Message] = field(default_factory=dict)
     parsed: Message | None = None
     robot: Robot | None = None
@@ -107,10 +114,15 @@ class Announcements:
                 known.watch = self._watches.open([topic])
             if known.owner is None or known.owner.node_id not in nodes:
                 known.owner, known.robot, known.parsed = identity_of(view, nodes[0]), None, None
+                known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MOST_OWNERS]
             others = (node for node in nodes if node != known.owner.node_id)
             known.twins = tuple(identity_of(view, node) for node in others)
             ids = {publisher.id for publisher in view.topics[topic].publishers}
-            known.told = {id: message for id, message in known.told.items() if id in ids}
+            known.told = {
+                id: message
+                for id, message in known.told.items()
+                if id in ids or self._senders.node_of(message) in known.owners
+            }
             self._read(topic, known)
 
     def add(self, batches: Mapping[str, Batch]) -> None:
@@ -119,6 +131,7 @@ class Announcements:
             known = self._topics[topic]
             for message in batches[topic].messages:
                 if message.publisher is not None:
+                    known.told.pop(message.publisher, None)  # the newest stands at the end
                     known.told[message.publisher] = message
             while len(known.told) > MOST_CLAIMANTS:
                 self._drop_one(known)
@@ -136,16 +149,23 @@ class Announcements:
         return self._topics.setdefault(topic, _Announced())
 
     def _end(self, known: _Announced) -> None:
-        """Nobody announces it any more; whose it was is kept: after a new master that one comes back."""
+        """Nobody announces it any more; whose it was, and what that said, is kept: that one may come back.
+
+        After a new master, or when it only slept, it does so over the connection that it has.
+        """
         if known.watch is not None:
             known.watch.close()
         known.watch, known.robot, known.parsed, known.twins = None, None, None, ()
-        known.told.clear()
+        known.told = {id: told for id, told in known.told.items() if self._is_owners(known, told)}
 
     def _drop_one(self, known: _Announced) -> None:
-        """Make room among the publishers; what the robot's own program said stays."""
-        others = (id for id, told in known.told.items() if not self._is_owners(known, told))
-        del known.told[next(others, next(iter(known.told)))]
+        """Make room among the publishers; what the robot's programs said stays, the present one's longest."""
+        for owners in (known.owners, known.owners[:1]):
+            for id, told in known.told.items():
+                if self._senders.node_of(told) not in owners:
+                    del known.told[id]
+                    return
+        del known.told[next(iter(known.told))]
 
     def _is_owners(self, known: _Announced, message: Message) -> bool:
         return known.owner is not None and self._senders.node_of(message) == known.owner.node_id

@@ -382,9 +382,12 @@ class Fleet:
         if before is None or identity is None or before.node_id == identity.node_id:
             return
         self._notes.append(f"{link.name} was started anew: it is {identity.words} now, before {before.words}")
-        link.not_stopped = link.goes_on = ""
+        goes_on, link.goes_on = link.goes_on, ""
         if not self._processes.has_ended(before):
             link.earlier = (before, *link.earlier)[:MOST_EARLIER]
+            link.not_stopped = link.not_stopped or goes_on
+        elif not link.earlier:
+            link.not_stopped = ""  # what did not stop runs no more
 
     def _leave_topics(self, link: RobotLink) -> None:
         """Its description names other topics: what was asked on the old ones has ended."""

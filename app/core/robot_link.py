@@ -115,9 +115,12 @@ class RobotLink:
 
     @property
     def state(self) -> str:
-        """``away``, ``not stopped``, ``silent``, ``busy`` or ``ready``."""
+        """``away``, ``not stopped``, ``silent``, ``busy`` or ``ready``.
+
+        One that has not stopped may still move when it is away.
+        """
         if not self.connected:
-            return "away"
+            return NOT_STOPPED if self.not_stopped else "away"
         if self.not_stopped or self.goes_on:
             return NOT_STOPPED
         if self.silent is not None or self.mute:

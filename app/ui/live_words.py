@@ -8,7 +8,7 @@ from typing import Protocol
 from app.robots.description import Field, Robot, Sensor
 from app.ui.sensor_words import number_words, reading_of
 
-AWAY, SILENT = "away", "silent"
+SILENT = "silent"
 
 
 class Told(Protocol):
@@ -38,7 +38,7 @@ def live_words(fleet: Fleet, sensors: Iterable[tuple[str, str]]) -> tuple[dict[s
     for robot, name in sensors:
         link = fleet.link(robot)
         sensor = link.robot.sensor(name) if link is not None else None
-        if link is None or sensor is None or link.state == AWAY:
+        if link is None or sensor is None or not link.connected:
             continue
         told = _words(f"{robot}/{name}", sensor, link.values.get(name))
         words |= told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 from collections.abc import Iterator, Mapping
 from typing import cast
 
@@ -10,6 +11,7 @@ import pytest
 
 import nep
 from app.core.announcements import MOST_ROBOTS, Announcements
+from app.core.mailbox import Batch
 from app.core.robot_link import RobotLink
 from app.core.session import Session
 from app.core.watches import Watches
@@ -288,6 +290,56 @@ def test_a_flood_of_robots_is_bounded_and_told() -> None:
     assert opened == ["/new/description"]
     assert announcements.is_announced("/new/description")
     assert not announcements.claims
+
+
+def _two_programs(*announcing: str) -> GraphView:
+    """A graph in which these of the nodes "first" and "second" announce Pepper, in this order."""
+    ids = {"first": 1, "second": 2, **{f"crowd {number}": number for number in range(10, 30)}}
+    nodes = {name: NodeInfo(name, name, "here", ids[name], "python", "native", 0) for name in announcing}
+    publishers = tuple(
+        PublisherInfo(ids[name], name, ("tcp://127.0.0.1:1",), True, 0, 0, 0, None, None, None)
+        for name in announcing
+    )
+    topic = "/Pepper/description"
+    return GraphView(1, 1, nodes, {topic: TopicInfo(topic, DESCRIPTION_TYPE, "json", publishers)})
+
+
+def _said_by(publisher: int) -> Batch:
+    payload = json.dumps(description()).encode()
+    topic = "/Pepper/description"
+    return Batch([nep.Message(topic, payload, "json", DESCRIPTION_TYPE, publisher=publisher)])
+
+
+@pytest.mark.parametrize("crowd", [0, 20])
+def test_a_robot_that_slept_while_another_had_its_name_is_there_again(crowd: int) -> None:
+    """Its latched description came once, over a connection that lasts; nobody sends it again."""
+    opened: list[str] = []
+    announcements = Announcements(Watches(opened.append, opened.remove), Senders())
+    announcements.update(_two_programs("first"))
+    announcements.add({"/Pepper/description": _said_by(1)})
+    assert [identity.node_id for _, _, identity in announcements.robots] == ["first"]
+    others = [f"crowd {number}" for number in range(10, 10 + crowd)]
+    announcements.update(_two_programs("first", "second", *others))
+    announcements.update(_two_programs("second", *others))
+    for publisher in (2, *range(10, 10 + crowd)):
+        announcements.add({"/Pepper/description": _said_by(publisher)})
+    assert [identity.node_id for _, _, identity in announcements.robots] == ["second"]
+    announcements.update(_two_programs("second", "first"))
+    announcements.update(_two_programs("first"))
+    assert [identity.node_id for _, _, identity in announcements.robots] == ["first"]
+
+
+def test_a_robot_that_slept_is_there_again_though_somebody_else_kept_its_topic_subscribed() -> None:
+    opened: list[str] = []
+    watches = Watches(opened.append, opened.remove)
+    announcements = Announcements(watches, Senders())
+    announcements.update(_two_programs("first"))
+    announcements.add({"/Pepper/description": _said_by(1)})
+    watches.open(["/Pepper/description"])  # a panel that shows the topic
+    announcements.update(GraphView(1, 2))
+    assert list(announcements.robots) == []
+    announcements.update(_two_programs("first"))
+    assert [identity.node_id for _, _, identity in announcements.robots] == ["first"]
 
 
 def test_senders_do_not_believe_who_takes_a_publishers_id() -> None:

@@ -98,6 +98,27 @@ def test_a_person_who_says_that_it_is_still_is_believed(session: Session, arm: D
     assert link.state == "ready"
 
 
+def test_going_away_is_no_proof_and_nor_is_another_program_of_the_name(
+    session: Session, master: Master
+) -> None:
+    with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
+        link = the_link(session)
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "unanswered")
+    tick_until(session, lambda: not link.connected)
+    assert (link.state, link.chip.removeprefix("virtual, ")) == ("not stopped", "may still move")
+    assert robots_chip(session) == ("Arm: may still move", "error")
+    before = link.identity
+    other = WireRobot(master.address, "Arm")
+    try:
+        tick_until(session, lambda: link.connected and link.identity != before)
+        assert link.state == "not stopped", "the first program may still run"
+        session.runs.confirm_still()
+        assert link.state == "ready"
+    finally:
+        other.close()
+
+
 def test_one_robot_that_refuses_is_said_to_refuse(session: Session, arm: Driver) -> None:
     link = the_link(session)
     session.runs.stop_robot("Arm")

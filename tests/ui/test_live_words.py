@@ -14,6 +14,7 @@ class Link:
     robot: Robot = field(default_factory=robot)
     values: dict[str, object] = field(default_factory=dict)
     state: str = "ready"
+    connected: bool = True
 
 
 class Fleet:
@@ -40,4 +41,4 @@ def test_what_is_not_told_yet_is_blank() -> None:
 def test_a_robot_that_fell_silent_is_old_and_one_that_is_away_says_nothing() -> None:
     _, old = live_words(Fleet(Pepper=Link(values=TOLD, state="silent")), SENSORS)
     assert old == {"Pepper/battery", "Pepper/pose/x", "Pepper/sees_face"}
-    assert live_words(Fleet(Pepper=Link(values=TOLD, state="away")), SENSORS) == ({}, set())
+    assert live_words(Fleet(Pepper=Link(values=TOLD, connected=False)), SENSORS) == ({}, set())

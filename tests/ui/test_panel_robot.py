@@ -71,7 +71,7 @@ def test_one_that_fell_silent_is_grey_and_says_nothing_any_more(panel, window, m
     elif how == "mute":
         link.mute = True
     else:
-        link.state = "away"
+        link.connected = False
     panel.refresh()
     assert panel.view.stale
     assert panel.view.accessibleDescription() == ""
@@ -80,7 +80,7 @@ def test_one_that_fell_silent_is_grey_and_says_nothing_any_more(panel, window, m
     panel.view.show_state(link.drawing)
     assert panel.view.grab().toImage() == grey  # there is no bubble
     monkeypatch.undo()
-    link.state, link.mute, link.drawing = "ready", False, drawing(speech="Hello!")
+    link.connected, link.mute, link.drawing = True, False, drawing(speech="Hello!")
     panel.refresh()
     assert panel.view.grab().toImage() == speaking
     assert panel.view.accessibleDescription() == "Hello!"

@@ -108,7 +108,7 @@ def test_a_robot_that_went_away_feels_nothing(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 300))
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)
-    window.session.fleet.links[0].state = "away"
+    window.session.fleet.links[0].connected = False
     panel.refresh()
     assert {row.reading for row in panel.rows} == {Reading()}
 

@@ -179,7 +179,7 @@ class RobotPanel(PanelWidget):
             if link.drawing is not self._told:
                 self._told, self._told_s = link.drawing, now
             self.view.show_state(link.drawing)
-            self.view.set_stale(link.state == "away" or link.mute or now - self._told_s > STALE_AFTER_S)
+            self.view.set_stale(not link.connected or link.mute or now - self._told_s > STALE_AFTER_S)
             self.pages.setCurrentWidget(self.view)
 
     def _show_menu(self) -> None:

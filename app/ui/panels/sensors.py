@@ -127,7 +127,7 @@ class SensorsPanel(PanelWidget):
         link = fleet.link(self._robot) if self._robot else None
         if link is not None:
             now = time.monotonic()
-            there = link.state != "away"  # what it felt before it went is not true now
+            there = link.connected  # what it felt before it went is not true now
             for row in self.rows:
                 row.show_value(link.values.get(row.sensor.name) if there else None, now)
 
