@@ -61,7 +61,7 @@ def a_menu_of_a_panel(window: MainWindow) -> None:
 
 
 def a_context_menu_of_a_field(window: MainWindow) -> None:
-    field = window.bar.search
+    field = window.benches["developer"].docks["topics"].panel.filter
     place = QPoint(4, 4)
     event = QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, field.mapToGlobal(place))
     QApplication.sendEvent(field, event)
