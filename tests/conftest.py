@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import psutil
 import pytest
@@ -14,6 +14,7 @@ from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
 from nep.masters import Master
+from nep.text import escaped
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
@@ -53,6 +54,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:
     """How pytest-xdist gives tests to its processes."""
     return ByFile(config, log)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """What a test logged may have halves of letters, which pytest-xdist can't carry to its first process."""
+    report = yield
+    report.sections = [(title, escaped(text, lines=True)) for title, text in report.sections]
+    return report
 
 
 @pytest.fixture(autouse=True)
