@@ -12,9 +12,9 @@ import errno
 import os
 import sys
 from contextlib import suppress
-from io import TextIOWrapper
+from io import RawIOBase, TextIOWrapper
 
-__all__ = ["close_streams", "output_problem", "prepare_streams", "tell", "words_given"]
+__all__ = ["buffer_output", "close_streams", "output_problem", "prepare_streams", "tell", "words_given"]
 
 _PLAIN = {
     **dict.fromkeys("\u2010\u2011\u2013\u2014\u2212─━·", "-"),  # dashes, minus, lines
@@ -25,6 +25,8 @@ _PLAIN = {
 _HANDLER = "nep.plain"
 _GONE = frozenset({errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])})
 """What writing into a pipe gives that nobody reads any more; Windows calls it an invalid argument."""
+_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""What writing onto a disk gives that has no room, or is broken."""
 
 
 def prepare_streams() -> None:
@@ -40,6 +42,18 @@ def prepare_streams() -> None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - lives on
         elif mode == "w" and isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=_HANDLER)
+
+
+def buffer_output() -> None:
+    """Give the standard output a buffer where it has none (`python -u`, PYTHONUNBUFFERED in a container).
+
+    What cannot be written is there still, then, when `output_problem` asks why. For programs that flush.
+    """
+    stream = sys.stdout
+    if isinstance(stream, TextIOWrapper) and isinstance(stream.buffer, RawIOBase):
+        sys.stdout = open(  # noqa: SIM115 - lives on
+            stream.fileno(), "w", encoding=stream.encoding, errors=stream.errors, closefd=False
+        )
 
 
 def words_given() -> list[str]:
@@ -63,18 +77,25 @@ def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)  # noqa: T201 - it is a command's
 
 
-def output_problem() -> str | None:
+def output_problem(raised: OSError | None = None) -> str | None:
     """Why the standard output takes nothing more; "" when its reader has left, None when it does take it.
 
-    Asked after an OSError: what could not be written is still there, so that writing it fails again.
+    Asked after an OSError (`raised`): what could not be written is still there, so that writing it fails
+    again. Only what is larger than the buffer is dropped, and the error alone tells of it.
     """
     try:
         sys.stdout.flush()
     except OSError as error:
-        return "" if error.errno in _GONE else (error.strerror or str(error)).lower()
+        return _words_of(error)
     except ValueError:  # it was closed
         return ""
+    if raised is not None and raised.filename is None and raised.errno in _GONE | _FULL:
+        return _words_of(raised)
     return None
+
+
+def _words_of(error: OSError) -> str:
+    return "" if error.errno in _GONE else (error.strerror or str(error)).lower()
 
 
 def close_streams() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from nep.streams import close_streams, prepare_streams
+from nep.streams import buffer_output, close_streams, prepare_streams
 
 __all__ = ["main"]
 
@@ -15,6 +15,7 @@ INTERRUPTED = 130
 def main() -> None:
     """Run the command line and leave with its exit code. Ctrl+C ends it at once, from the first import on."""
     prepare_streams()
+    buffer_output()
     try:
         from nep.cli.app import run  # noqa: PLC0415 - typer is heavy: Ctrl+C must work while it loads
 

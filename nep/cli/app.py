@@ -58,16 +58,17 @@ def run() -> int:
 
     A reader that has enough (`| head`) ends it without a word, with 1.
     """
+    raised: OSError | None = None
     try:
         code = _code()
     except NepError as error:
         say_error(_sentence(error))
         code = 1
-    except OSError:
-        if output_problem() is None:
+    except OSError as error:
+        if output_problem(error) is None:
             raise
-        code = 1
-    problem = output_problem()
+        raised, code = error, 1
+    problem = output_problem(raised)
     if problem:
         say_error(f"the output cannot be written: {problem}")
     return code if problem is None else code or 1

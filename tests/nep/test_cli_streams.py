@@ -100,13 +100,13 @@ def test_words_that_came_in_another_alphabet_are_utf8_all_the_same(monkeypatch):
     assert words_given() == ["Größe", "plain", "Größe"]
 
 
-def command(*words, **more):
+def command(*words, env=None, **more):
     """The command as a shell starts it."""
     return subprocess.Popen(
         [sys.executable, "-m", "nep", *words],
         stdin=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
-        env=environment(PYTHONIOENCODING="utf-8"),
+        env=environment(PYTHONIOENCODING="utf-8", **(env or {})),
         **more,
     )
 
@@ -119,8 +119,10 @@ FULL = Path("/dev/full")
     "words",
     [("--help",), ("topic", "list"), ("topic", "list", "--json"), ("topic", "echo", TOPIC, "--csv", "said")],
 )
-def test_a_full_disk_is_a_sentence(talkers, words):
-    with FULL.open("w") as full, command(*words, stdout=full) as running:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_disk_is_a_sentence(talkers, words, unbuffered):
+    env = {"PYTHONUNBUFFERED": unbuffered}  # containers set it
+    with FULL.open("w") as full, command(*words, stdout=full, env=env) as running:
         said = running.stderr.read().decode()
     assert running.returncode == 1
     assert said == "nep: the output cannot be written: no space left on device\n"
@@ -198,3 +200,14 @@ def test_sentences_beside_the_results_never_end_a_command(monkeypatch):
     say("one")
     say_error("two")
     show_alerts([Alert("a", "three", "four")])
+
+
+def test_a_full_disk_is_a_sentence_also_when_more_came_than_a_buffer_holds(talkers):
+    if not FULL.exists():
+        pytest.skip("/dev/full is a device of Linux")
+    big = talkers.new_pub("big", latched=True)
+    big.publish({"long": "x" * 100_000})
+    with FULL.open("w") as full, command("topic", "echo", "big", "--json", stdout=full) as running:
+        said = running.stderr.read().decode()
+    assert running.returncode == 1
+    assert said == "nep: the output cannot be written: no space left on device\n"
