@@ -325,7 +325,11 @@ class Runs:
         elif run.state not in {"stopping", "unanswered"}:
             run.elapsed_s = None
         run.state, run.report, run.answered, run.finished = "stopping", None, [], False
-        everybody = tuple(link.name for link in self._fleet.links if link.connected or link.name in self.kept)
+        everybody = tuple(
+            link.name
+            for link in self._fleet.links
+            if link.connected or link.not_stopped or link.name in self.kept
+        )
         run.asked = names if names is not None else everybody
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1

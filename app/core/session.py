@@ -363,15 +363,15 @@ class Session:
         self._tries_to_reach = bool(problems)
 
     def _keep_within_reach(self) -> None:
-        """Whom a stop reaches: who is there, and who went away while a program used it."""
+        """Whom a stop reaches: who is there, and who went away while a program used it or without a stop."""
         kept = self.runs.kept
         for link in self.fleet.links:
-            if link.earlier and link.name not in kept and not link.left_busy:
+            if link.earlier and not (link.name in kept or link.left_busy or link.not_stopped):
                 link.earlier = ()  # nothing moved it when it was started anew
         targets = tuple(
             StopTarget(link.robot, link.identity, link.earlier, link.topics_before)
             for link in self.fleet.links
-            if link.connected or link.name in kept
+            if link.connected or link.not_stopped or link.name in kept
         )
         stopper = self.stopper
         if stopper is not None and (targets != self._reachable or self._tries_to_reach):

@@ -119,6 +119,22 @@ def test_going_away_is_no_proof_and_nor_is_another_program_of_the_name(
         other.close()
 
 
+def test_one_that_went_away_without_a_stop_is_asked_again_until_a_person_says_that_it_is_still(
+    session: Session, master: Master
+) -> None:
+    with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
+        link = the_link(session)
+        session.runs.stop_robot("Arm")
+        tick_until(session, lambda: link.not_stopped)
+    tick_until(session, lambda: not link.connected)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    assert session.runs.view().confirm == "Arm is still"
+    session.runs.confirm_still()
+    assert link.state == "away"
+    assert robots_chip(session) == ("No robot", "off")
+
+
 def test_one_robot_that_refuses_is_said_to_refuse(session: Session, arm: Driver) -> None:
     link = the_link(session)
     session.runs.stop_robot("Arm")
