@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
 from app.ui.theme import Theme
 from app.ui.widgets import (
@@ -28,6 +28,7 @@ from app.ui.widgets import (
     Switch,
     paint,
 )
+from app.ui.widgets.scrolled import Scrolled
 from app.ui.widgets.slider import decimals_of
 from app.ui.widgets.small import paint_sparkline
 
@@ -351,3 +352,22 @@ def test_a_hairline_is_as_thin_at_every_place_and_scale(
             {y for _x, y in dark} if edge in {Qt.Edge.TopEdge, Qt.Edge.BottomEdge} else {x for x, _y in dark}
         )
         assert len(across) == thick
+
+
+def test_what_scrolls_takes_the_height_of_longer_words(qtbot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    words = QLabel("short")
+    words.setWordWrap(True)
+    about = Scrolled(words)
+    column = QVBoxLayout(window)
+    column.addWidget(QWidget(), 1)
+    column.addWidget(about)
+    window.resize(300, 300)
+    window.show()
+    before = about.height()
+    words.setText("much longer words " * 8)
+    qtbot.waitUntil(lambda: about.height() > before)
+    assert about.height() >= words.heightForWidth(about.viewport().width())
+    words.setText("short")
+    qtbot.waitUntil(lambda: about.height() == before)
