@@ -7,6 +7,7 @@ all the same. What is not known to be harmless is never dropped.
 from __future__ import annotations
 
 import logging
+import os
 import re
 import sys
 from collections import deque
@@ -21,6 +22,7 @@ from nep import terminal
 
 FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
 QUIET = "--log-level=3"  # Chromium's own lines: only what ends it
+NO_WINDOW = "no Qt platform plugin could be initialized"
 KEPT = 200
 
 NOISE = re.compile(
@@ -49,7 +51,20 @@ def quiet_chromium(environ: MutableMapping[str, str]) -> None:
 
 
 def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> None:
-    """Log one line of Qt, unless it is known noise."""
+    """Log one line of Qt, unless it is known noise.
+
+    Where Qt finds that no window can open, which is before Studio has anything to lose, the program ends here
+    with the exit code 2: Qt would advise to reinstall, and abort.
+    """
+    if kind == QtMsgType.QtFatalMsg and NO_WINDOW in words:
+        _log.critical(
+            "no window can open; see that the screen is there and lets you in (DISPLAY is %r), and that the "
+            "libraries that Qt names above are installed, or run a behaviour with no window: "
+            "nep-studio run FILE",
+            os.environ.get("DISPLAY", ""),
+        )
+        logging.shutdown()
+        os._exit(2)
     if kind == QtMsgType.QtFatalMsg or NOISE.match(words) is None:
         _log.log(LEVELS.get(kind, logging.WARNING), "%s", words)
 

@@ -44,3 +44,22 @@ def test_without_a_screen_it_ends_with_a_sentence(tmp_path: Path) -> None:
     assert done.stdout == ""
     assert done.stderr.startswith("nep-studio: there is no screen here")
     assert "reinstall" not in done.stderr
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="screens have no name elsewhere")
+def test_with_a_screen_that_is_not_there_it_ends_with_a_sentence(tmp_path: Path) -> None:
+    environ = {
+        **{name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"},
+        "DISPLAY": ":64999",
+        "QT_QPA_PLATFORM": "xcb",
+        "QTWEBENGINE_DISABLE_SANDBOX": "1",
+        "NEP_STUDIO_HOME": str(tmp_path),
+    }
+    command = [sys.executable, "-m", "app"]
+    done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert (
+        "no window can open; see that the screen is there and lets you in (DISPLAY is ':64999')"
+        in done.stderr
+    )
+    assert "einstall" not in done.stderr
