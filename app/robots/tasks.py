@@ -270,7 +270,7 @@ class Tasks:
         except Canceled:
             done = Answer("canceled")
         except Failed as failed:
-            done = Answer("failed", error=str(failed))
+            done = Answer("failed", error=_said(failed))
         except BaseException as error:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
             done = Answer("failed", error=f"{task.action} broke off: {_said(error)}")
@@ -301,7 +301,7 @@ class Tasks:
         try:
             self._stop_body()
         except Failed as failed:
-            error = f"{self._name} may still move: {failed}"
+            error = f"{self._name} may still move: {_said(failed)}"
         except BaseException as failed:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
             error = f"{self._name} may still move: its stop broke off: {_said(failed)}"
@@ -333,4 +333,8 @@ def still_moving(name: str, actions: Sequence[str]) -> str:
 
 
 def _said(error: BaseException) -> str:
-    return str(error) or type(error).__name__
+    """What an error says, or its type; one that can't even be told must not keep its action from ending."""
+    try:
+        return str(error) or type(error).__name__
+    except BaseException:  # noqa: BLE001 - a driver's own words are a driver's code
+        return type(error).__name__

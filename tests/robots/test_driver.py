@@ -224,7 +224,16 @@ def test_a_robot_that_can_not_stop_says_why(turtle, caplog):
     assert ears.final("t", "stop")["state"] == "succeeded"
 
 
-@pytest.mark.parametrize("how", [SystemExit(3), KeyboardInterrupt(), GeneratorExit()], ids=repr)
+class SpeechlessError(Exception):
+    """Not even its words can be had."""
+
+    def __str__(self) -> str:
+        raise RuntimeError("no words")
+
+
+@pytest.mark.parametrize(
+    "how", [SystemExit(3), KeyboardInterrupt(), GeneratorExit(), SpeechlessError()], ids=repr
+)
 def test_a_function_that_ends_the_program_is_answered_and_can_be_stopped(turtle, how):
     body, ears, _ = turtle
     body.breaks = how
