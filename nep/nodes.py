@@ -8,6 +8,7 @@ import logging
 import os
 import platform
 import secrets
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -39,10 +40,15 @@ __all__ = ["Node"]
 FLUSH_S = 2.0
 """How long closing waits for what was published to be delivered."""
 
+_WORKER_PRIORITY = 10
+"""0 and more: before a worker waits for processes of its own, which may need what was published."""
+
 _alive: set[Node] = set()
 """Nodes live until they are closed or the interpreter ends: a publisher may outlive its node's variable."""
 _inherited: list[Node] = []
 """Nodes of the process that forked this one: closed, and kept, because nothing of them may be touched."""
+_closed_in = 0
+"""The process in which `multiprocessing` knows that nodes are to be closed."""
 
 
 class Node:
@@ -93,6 +99,7 @@ class Node:
         )
         self._carrier: Carrier = self._backend.open(record)
         _alive.add(self)
+        _close_with_worker()
         forks.watch(self)
 
     # ---- how to connect
@@ -392,6 +399,18 @@ def _close(nodes: Sequence[Node], timeout_s: float) -> None:
 
 def _close_all() -> None:
     _close(tuple(_alive), FLUSH_S)
+
+
+def _close_with_worker() -> None:
+    """Let a worker of `multiprocessing` close its nodes: one that was forked skips the interpreter's exit.
+
+    It forgets what was registered before it began, so this is done when a node is made.
+    """
+    global _closed_in  # noqa: PLW0603 - one for the process
+    parent_of_worker = getattr(sys.modules.get("multiprocessing.process"), "parent_process", None)
+    if _closed_in != os.getpid() and parent_of_worker is not None and parent_of_worker() is not None:
+        _closed_in = os.getpid()
+        sys.modules["multiprocessing.util"].Finalize(None, _close_all, exitpriority=_WORKER_PRIORITY)
 
 
 atexit.register(_close_all)

@@ -288,3 +288,30 @@ print(os.waitpid(pid, 0)[1])
         program.say("end")
         assert program.line() == "0"
         assert program.end()[1] == ""
+
+
+def test_what_a_worker_of_multiprocessing_publishes_last_arrives(master: Master) -> None:
+    code = """
+import multiprocessing, sys, nep
+
+def work(number):
+    pub = nep.node(f"worker {number}").new_pub("done")
+    for part in range(200):
+        pub.publish({"part": part, "long": "x" * 20_000})
+    if number:
+        sys.exit(number)
+
+node = nep.node("parent")
+sub = node.new_sub("done")
+for number in range(3):
+    child = multiprocessing.get_context("fork").Process(target=work, args=(number,))
+    child.start()
+    child.join(20)
+    parts = [sub.receive(5.0).payload["part"] for _ in range(200)]
+    assert (parts, child.exitcode) == (list(range(200)), number)
+assert sub.lost == 0
+print("all", flush=True)
+"""
+    with running(code) as program:
+        assert program.line() == "all"
+        assert program.end()[1] == ""
