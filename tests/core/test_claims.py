@@ -191,6 +191,8 @@ def test_who_takes_the_name_of_a_robot_in_motion_does_not_prove_its_stop(
     try:
         tick_until(session, lambda: link.connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
+        # the second that it has for its answer is not to go by while the new connection is made
+        tick_until(session, lambda: thief._answer.subscribers)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
         assert session.runs.view().title == "Pepper (“Pepper”) did not answer"
@@ -214,6 +216,8 @@ def test_nor_of_one_that_a_person_moved(session: Session, master: Master, pepper
     try:
         tick_until(session, lambda: link.connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
+        # the second that it has for its answer is not to go by while the new connection is made
+        tick_until(session, lambda: thief._answer.subscribers)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
         session.runs.confirm_still()
