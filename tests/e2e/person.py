@@ -79,7 +79,7 @@ class Person:
 
     def click(self, name: str = "", **wanted: object) -> Seen:
         """Click on a widget when it can be clicked."""
-        seen = self.find(name, enabled=True, **wanted)
+        seen = self.find(name, enabled=True, takes_mouse=True, **wanted)
         self.screen.click(*middle(seen["rect"]))
         return seen
 

@@ -113,6 +113,7 @@ def _tell(widget, application) -> dict:
         "tip": widget.toolTip(),
         "rect": _shown(widget),
         "enabled": widget.isEnabled(),
+        "takes_mouse": not _is_in_fresh_banner(widget),
         "focus": widget is application.focusWidget(),
         "checked": bool(getattr(widget, "isChecked", bool)()),
         "in": _panel(widget),
@@ -130,6 +131,16 @@ def _tell(widget, application) -> dict:
             if action.isVisible() and not action.isSeparator()
         ]
     return told
+
+
+def _is_in_fresh_banner(widget) -> bool:
+    """Whether it is in a banner that has just come and lets presses through: nobody aimed at it."""
+    from PySide6.QtCore import Qt
+
+    above = widget
+    while above is not None and type(above).__name__ != "BannerPlace":
+        above = above.parentWidget()
+    return above is not None and above.testAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
 
 def _shown(widget) -> list[int]:
