@@ -26,7 +26,8 @@ from app.core.document import read
 from app.core.moving import risky, wanted_by
 from app.core.processes import Processes
 from app.core.runner import Runner, RunnerEvent
-from app.core.stopping import RobotStopper, StopReport, StopTarget
+from app.core.stop_report import StopReport
+from app.core.stopping import RobotStopper, StopTarget
 from app.errors import AppError, DescriptionError
 from app.robots.description import Robot, parse
 from app.robots.identity import DESCRIPTION_TYPE

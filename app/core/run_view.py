@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from app.core.stopping import RobotStop, StopReport
+from app.core.stop_report import RobotStop, StopReport
 
 STOPPING_SHOWN_AFTER_S = 0.1
 MOST_NAMED = 4

@@ -27,8 +27,9 @@ from app.core.run_view import (
 from app.core.run_view import unanswered_words as unanswered_words_of
 from app.core.runner import Runner, RunnerEvent
 from app.core.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.stop_report import RobotStop, StopReport
 from app.core.stopping import STOP_TIMEOUT_S as STOP_TIMEOUT_S
-from app.core.stopping import RobotStop, RobotStopper, StopReport
+from app.core.stopping import RobotStopper
 from app.errors import AppError
 from app.robots.description import Robot
 

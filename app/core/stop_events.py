@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.core.stopping import RobotStop, StopReport
+from app.core.stop_report import RobotStop, StopReport
 
 
 @dataclass(frozen=True, slots=True)

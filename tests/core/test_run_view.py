@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.core.run_view import RunState, listed, seconds, stop_words, view_of
-from app.core.stopping import RobotStop, StopReport
+from app.core.stop_report import RobotStop, StopReport
 
 PEPPER = RobotStop("Pepper", True, 38.2)
 TURTLE = RobotStop("Turtle", True, 41.4)

@@ -9,7 +9,8 @@ import pytest
 from app.core.runner import Runner
 from app.core.session import Session
 from app.core.settings import Settings
-from app.core.stopping import RobotStopper, StopReport
+from app.core.stop_report import StopReport
+from app.core.stopping import RobotStopper
 
 
 class Steps:

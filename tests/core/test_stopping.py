@@ -7,7 +7,8 @@ import pytest
 import nep
 from app.blocks.compiler import compile_behaviour
 from app.core.runner import Runner
-from app.core.stopping import RobotStop, RobotStopper, StopReport
+from app.core.stop_report import RobotStop, StopReport
+from app.core.stopping import RobotStopper
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, say, started, workspace
 from tests.blocks.wire_robot import RizeRobot, WireRobot

@@ -1,0 +1,99 @@
+"""What became of a stop, robot by robot, and the words for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+BY_HAND = "Switch it off by hand."
+
+
+@dataclass(frozen=True)
+class RobotStop:
+    """What became of one robot's stop.
+
+    ``answered``: its own program said that it stands still. ``refused``: that said that it does not, and why
+    (``error``). ``error`` without ``refused``: it could not be told. ``can_confirm`` is False for robots that
+    never answer a stop (RIZE), and for programs that only listen to a robot's commands. ``program`` names
+    another program than the robot's own that serves its commands.
+    """
+
+    name: str
+    answered: bool
+    elapsed_ms: float | None
+    can_confirm: bool = True
+    error: str = ""
+    refused: bool = False
+    program: str = ""
+
+    @property
+    def who(self) -> str:
+        """The robot's name, and the program's when it is not the robot's own."""
+        return f"{self.name} (“{self.program}”)" if self.program else self.name
+
+    @property
+    def wrong(self) -> str:
+        """What is wrong, without a full stop: "Pepper did not answer"; nothing when it stopped."""
+        if self.answered or not self.can_confirm:
+            return ""
+        if self.program and self.refused:
+            return f"{self.error} (says “{self.program}”)"
+        return self.error or f"{self.who} did not answer"
+
+    @property
+    def sentence(self) -> str:
+        """In words: "Pepper stopped (41 ms)"."""
+        if self.answered:
+            return f"{self.who} stopped ({self.elapsed_ms or 0:.0f} ms)"
+        if self.program and not self.can_confirm:
+            return f"{self.who} hears the commands too and cannot confirm"
+        if not self.can_confirm:
+            return f"{self.name}: stop sent; this robot cannot confirm"
+        return f"{self.wrong}. {BY_HAND}"
+
+
+@dataclass(frozen=True)
+class StopReport:
+    """All robots' stops; ``elapsed_ms`` from the call to the last answer.
+
+    ``strangers``: whoever answered in a robot's name and is not that robot, as (robot, program).
+    """
+
+    robots: tuple[RobotStop, ...]
+    elapsed_ms: float
+    strangers: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def proven(self) -> bool:
+        """Whether every robot that can confirm has."""
+        return not self.unproven
+
+    @property
+    def unproven(self) -> tuple[RobotStop, ...]:
+        """Those that should have said that they stand still and did not."""
+        return tuple(robot for robot in self.robots if robot.can_confirm and not robot.answered)
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """The robots that are not proven to stand still, each once."""
+        return tuple(dict.fromkeys(robot.name for robot in self.unproven))
+
+    def with_asked(self, names: Iterable[str], why: str = "") -> StopReport:
+        """The same, and a line for each of these robots that has none: it was not reached."""
+        there = {robot.name for robot in self.robots}
+        missing = [not_reached(name, why) for name in dict.fromkeys(names) if name not in there]
+        return replace(self, robots=(*self.robots, *missing)) if missing else self
+
+    def with_late(self, late: RobotStop) -> StopReport:
+        """The same with what a robot said too late."""
+        lines = ((robot.name, robot.program) for robot in self.robots)
+        if (late.name, late.program) not in lines:
+            return self
+        same = (late.name, late.program)
+        robots = (late if (robot.name, robot.program) == same else robot for robot in self.robots)
+        return replace(self, robots=tuple(robots))
+
+
+def not_reached(name: str, why: str = "") -> RobotStop:
+    """The line of a robot that could not be told to stop, and why."""
+    return RobotStop(name, False, None, error=f"{name} was not told to stop{f': {why}' if why else ''}")
