@@ -69,7 +69,7 @@ class Desk:
             (self._ports.requests_b, "nep 0.5.4.8"),
         ):
             if port and port not in self._counters:
-                bound = self._bind(zmq.REP, port, f"programs of {who} cannot join")
+                bound = self._bind(zmq.ROUTER, port, f"programs of {who} cannot join")
                 if bound is not None:
                     self._counters[port] = bound
         if self._ports.broadcast and self._board is None:
@@ -86,9 +86,14 @@ class Desk:
     def answer(self, counter: zmq.Socket[bytes], port: int) -> None:
         """Answer the request that is waiting. Nothing that is asked can end this."""
         try:
-            asked = b"".join(counter.recv_multipart(zmq.NOBLOCK))
+            parts = counter.recv_multipart(zmq.NOBLOCK)
         except zmq.Again:
             return
+        # Not a REP: when who sent no envelope has gone, libzmq 4.3.5 gives the next answer to nobody.
+        if b"" not in parts:
+            return
+        end = parts.index(b"") + 1
+        envelope, asked = parts[:end], b"".join(parts[end:])
         try:
             request = read_request(asked, port)
             reply = grant(request, self._decide(request))
@@ -97,7 +102,7 @@ class Desk:
         except Exception:  # an answer is owed, or the port would be dead for everybody
             _logger.exception("the gateway could not carry out a request")
             reply = refuse(RequestError("the gateway could not carry this out; its log says why"))
-        counter.send(reply)
+        counter.send_multipart([*envelope, reply])
 
     def tell(self, members: Iterable[Member]) -> None:
         """Broadcast all topics to the originals' tools."""
