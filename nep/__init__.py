@@ -7,30 +7,42 @@ pub = node.new_pub("example", "json")
 pub.publish({"message": "hello"})
 """
 
-from nep.configuration import Configuration, Direct, Hybrid
-from nep.encoded import Encoded
-from nep.errors import (
-    AddressInUseError,
-    BackendUnavailableError,
-    BadNameError,
-    BadTopicError,
-    ClosedError,
-    DecodeError,
-    EncodeError,
-    MasterUnreachable,
-    NepError,
-    RequestRefusedError,
-    TooManyFilesError,
-    UnknownBackendError,
-    WaitTimeoutError,
-)
-from nep.graph import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
-from nep.images import raw_image
-from nep.masters import Master, is_running, master_address, start_process
-from nep.message import Message
-from nep.nodes import Node
-from nep.pubsub import Publisher, Subscriber
-from nep.version import __version__
+import importlib
+
+TYPE_CHECKING = False
+"""As `typing` has it, whose import would take ten times as long as this module."""
+
+if TYPE_CHECKING:
+    from nep.configuration import Configuration, Direct, Hybrid
+    from nep.encoded import Encoded
+    from nep.errors import (
+        AddressInUseError,
+        BackendUnavailableError,
+        BadNameError,
+        BadTopicError,
+        ClosedError,
+        DecodeError,
+        EncodeError,
+        MasterUnreachable,
+        NepError,
+        RequestRefusedError,
+        TooManyFilesError,
+        UnknownBackendError,
+        WaitTimeoutError,
+    )
+    from nep.graph import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+    from nep.images import raw_image
+    from nep.masters import Master, is_running, master_address, start_process
+    from nep.message import Message
+    from nep.nodes import Node
+    from nep.pubsub import Publisher, Subscriber
+    from nep.version import __version__
+
+    node = Node
+    """A node; see `Node`. The paper's spelling."""
+
+    master = Master
+    """A master; see `Master`."""
 
 __all__ = [
     "AddressInUseError",
@@ -70,8 +82,69 @@ __all__ = [
     "start_process",
 ]
 
-node = Node
-"""A node; see `Node`. The paper's spelling."""
+_FROM = {
+    "nep.configuration": ("Configuration", "Direct", "Hybrid"),
+    "nep.encoded": ("Encoded",),
+    "nep.errors": (
+        "AddressInUseError",
+        "BackendUnavailableError",
+        "BadNameError",
+        "BadTopicError",
+        "ClosedError",
+        "DecodeError",
+        "EncodeError",
+        "MasterUnreachable",
+        "NepError",
+        "RequestRefusedError",
+        "TooManyFilesError",
+        "UnknownBackendError",
+        "WaitTimeoutError",
+    ),
+    "nep.graph": ("Alert", "GraphView", "NodeInfo", "PublisherInfo", "SubscriberInfo", "TopicInfo"),
+    "nep.images": ("raw_image",),
+    "nep.masters": ("Master", "is_running", "master_address", "start_process"),
+    "nep.message": ("Message",),
+    "nep.nodes": ("Node",),
+    "nep.pubsub": ("Publisher", "Subscriber"),
+    "nep.version": ("__version__",),
+}
+"""The imports above, for `_imported`."""
 
-master = Master
-"""A master; see `Master`."""
+_PAPER = {"node": "Node", "master": "Master"}
+
+
+def _imported(name: str) -> object:
+    """What the package has under this name, imported when it is first asked for.
+
+    So `import nep` takes a millisecond, and the command `nep`, which begins with it, can be told what Ctrl+C
+    does before it imports the rest. Raises `AttributeError`.
+    """
+    known = _PAPER.get(name, name)
+    for module, names in _FROM.items():
+        if known in names:
+            found: object = getattr(importlib.import_module(module), known)
+            break
+    else:
+        found = _submodule(name)
+    globals()[name] = found
+    return found
+
+
+def _submodule(name: str) -> object:
+    """`nep.errors` and the like, which `import nep` alone has always given."""
+    whole = f"nep.{name}"
+    try:
+        if not name.startswith("_"):
+            return importlib.import_module(whole)
+    except ModuleNotFoundError as error:
+        if error.name != whole:
+            raise
+    raise AttributeError(f"module 'nep' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+if not TYPE_CHECKING:  # which would take any name for one of ours
+    __getattr__ = _imported

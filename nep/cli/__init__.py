@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import sys
 
-from nep.streams import buffer_output, close_streams, prepare_streams
-
 __all__ = ["main"]
 
 INTERRUPTED = 130
@@ -13,15 +11,28 @@ INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the command line and leave with its exit code. Ctrl+C ends it at once, from the first import on."""
+    """Run the command line and leave with its exit code. Ctrl+C ends it quietly at any moment."""
+    try:
+        from nep.cli import interrupts  # noqa: PLC0415 - a traceback could be seen only before this line
+
+        interrupts.end_at_once()
+        code = _run()
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    sys.exit(code)
+
+
+def _run() -> int:
+    from nep.cli import interrupts  # noqa: PLC0415 - see `main`
+    from nep.streams import buffer_output, close_streams, prepare_streams  # noqa: PLC0415
+
     prepare_streams()
     buffer_output()
     try:
-        from nep.cli.app import run  # noqa: PLC0415 - typer is heavy: Ctrl+C must work while it loads
+        from nep.cli.app import run  # noqa: PLC0415 - typer and ZeroMQ are heavy
 
-        code = run()
-    except KeyboardInterrupt:
-        code = INTERRUPTED
+        interrupts.ask_first()
+        return run()
     finally:
+        interrupts.end_at_once()
         close_streams()
-    sys.exit(code)
