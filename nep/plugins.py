@@ -59,7 +59,7 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
     for point in metadata.entry_points(group=package):
         try:
             bound = point.load()
-        except Exception:
+        except (Exception, SystemExit):
             _logger.exception("the plug-in '%s' of '%s' cannot be loaded", point.name, package)
             continue
         if isinstance(bound, kind):

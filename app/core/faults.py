@@ -21,6 +21,8 @@ import platformdirs
 
 FILE_BYTES, FILES_KEPT = 1_000_000, 3
 FAULTS_KEPT = 500
+IN_CONSOLE: dict[str, object] = {"in_console": True}
+"""The `extra` of a record that the Console has in words of its own: it is for the log file."""
 FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
 _log = logging.getLogger("studio")

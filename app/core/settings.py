@@ -67,11 +67,13 @@ class Settings:
     def set(self, key: str, value: object) -> None:
         """Keep ``value`` (anything JSON can say) and write the file. Raises SettingsError.
 
-        What another Studio on this computer has kept meanwhile stays, but for this key. What could not be
-        written stays here, and is written with the next value.
+        Raises TypeError or ValueError for what JSON can't say: not kept, as nothing else could be written
+        beside it. What another Studio on this computer has kept meanwhile stays, but for this key. What could
+        not be written stays here, and is written with the next value.
         """
         if key in self._values and self._values[key] == value and self.not_kept is None:
             return
+        json.dumps(value)
         self._values[key] = self._unwritten[key] = value
         with locked(self.path):
             self._values = self._of_others()
@@ -140,8 +142,10 @@ class Settings:
 
     def _write(self) -> None:
         text = json.dumps(self._values, indent=1, ensure_ascii=False, sort_keys=True)
+        # A file's name that is no UTF-8 has lone surrogates: JSON has them as backslash, u and four digits.
+        data = text.encode("utf-8", "backslashreplace")
         try:
-            write_atomically(self.path, text.encode("utf-8"), durable=False, private=True)
+            write_atomically(self.path, data, durable=False, private=True)
         except OSError as error:
             failed = SettingsError(self.path, error.strerror or str(error))
             self.not_kept = str(failed)

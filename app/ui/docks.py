@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import logging
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
@@ -17,9 +19,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.core.faults import IN_CONSOLE, words_of
 from app.ui.dock_title import DockTitle
 from app.ui.focus_chain import proxy_of, tab_stops
-from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelWidget
+from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
 from app.ui.widgets.menus import Menu, drop_below
@@ -27,6 +30,9 @@ from app.ui.widgets.menus import Menu, drop_below
 LEAST_BODY = QSize(160, 60)
 RESTS_AFTER_S = 2.0
 """A panel that is hidden for a moment, by a quick change of tabs, stays subscribed."""
+FAULTS = (Exception, SystemExit)
+"""What a panel may raise without ending the window; one of a plug-in may call `sys.exit`."""
+SENTENCE_LIMIT = 400
 
 _log = logging.getLogger(__name__)
 
@@ -105,6 +111,35 @@ class DockBody(QWidget):
         painter.end()
 
 
+class Unmade(PanelWidget):
+    """Has the place of a panel that could not be made, and keeps what that is to be given back.
+
+    Its first refresh raises what the making raised; each one after that makes the panel.
+    """
+
+    def __init__(self, context: PanelContext, description: Panel, error: BaseException) -> None:
+        super().__init__(context, description.title)
+        self._description = description
+        self._error: BaseException | None = error
+        self._state: Mapping[str, object] = {}
+        self.take: Callable[[PanelWidget], object] = lambda _panel: None
+        """What is done with the panel when it could be made."""
+
+    def refresh(self) -> None:
+        error, self._error = self._error, None
+        if error is not None:
+            raise error
+        panel = self._description.make(self.context)
+        self.take(panel)
+        panel.restore_state(self._state)
+
+    def save_state(self) -> dict[str, object]:
+        return dict(self._state)
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self._state = state
+
+
 class Dock(QDockWidget):
     """One panel in a workbench: moves, floats, closes, shares its place; `failed` panels are skipped."""
 
@@ -114,18 +149,29 @@ class Dock(QDockWidget):
         self.failed = False
         self.front = False
         self._seen_s = -RESTS_AFTER_S
-        self._theme = theme
+        self._theme, self._density = theme, density
         self.setObjectName(f"panel.{description.name}")
         self.setAccessibleName(description.title)
-        self.title = DockTitle(theme, panel, density)
-        self.body = DockBody(theme, panel)
-        self.setTitleBarWidget(self.title)
-        self.setWidget(self.body)
-        self.title.menu_wanted.connect(self._show_menu)
+        self._hold(panel)
         self.visibilityChanged.connect(self._visibility)
-        panel.set_density(density)
-        panel.setFont(panel.text_font())
         theme.changed.connect(self._restyle)
+
+    def _hold(self, panel: PanelWidget) -> None:
+        title, body = DockTitle(self._theme, panel, self._density), DockBody(self._theme, panel)
+        panel.set_density(self._density)
+        panel.setFont(panel.text_font())
+        title.menu_wanted.connect(self._show_menu)
+        self.panel, self.title, self.body = panel, title, body
+        self.setTitleBarWidget(title)
+        self.setWidget(body)
+
+    def replace(self, panel: PanelWidget) -> None:
+        """Hold another panel from now on, in the place of one that could not be made."""
+        old = (self.title, self.body)
+        self._hold(panel)
+        for each in old:
+            each.deleteLater()
+        self.visibilityChanged.emit(self.front)  # whose tabs are in the new title, too
 
     def _restyle(self) -> None:
         self.panel.setFont(self.panel.text_font())
@@ -159,11 +205,14 @@ class Dock(QDockWidget):
     def _try(self, act: Callable[[], object]) -> str | None:
         try:
             act()
-        except Exception as error:  # noqa: BLE001  whatever a panel raises, the window lives on
+        except FAULTS as error:  # whatever a panel raises, the window lives on
             self.failed = True
-            with suppress(Exception):  # it shows nothing now, so it looks at nothing
+            with suppress(*FAULTS):  # it shows nothing now, so it looks at nothing
                 self.panel.rest()
-            sentence = f"{type(error).__name__}: {error}"
+            sentence = words_of(error)[:SENTENCE_LIMIT]
+            said = ("the panel '%s' stopped: %s", self.description.name, sentence)
+            _log.error(*said, exc_info=error, extra=IN_CONSOLE)
+            traceback.clear_frames(error.__traceback__)
             self.body.fail(sentence, self.try_again)
             return sentence
         return None
@@ -175,18 +224,30 @@ class Dock(QDockWidget):
             self.body.show_panel()
 
     def saved_state(self) -> dict[str, object]:
-        """What the panel wants back at the next start; nothing of one that can't tell."""
+        """What the panel wants back at the next start; nothing of one that can't tell.
+
+        What JSON can't say would keep everything else from being kept, too.
+        """
         try:
-            return self.panel.save_state()
-        except Exception:  # noqa: BLE001  as in `refresh`
+            found = self.panel.save_state()
+            json.dumps(found)
+        except FAULTS:
             _log.exception("the panel '%s' can't tell its state", self.description.name)
             return {}
+        return found
+
+    def give_back(self, state: Mapping[str, object]) -> None:
+        """Let the panel be as it was; one that can't does not keep its layout from coming back."""
+        try:
+            self.panel.restore_state(state)
+        except FAULTS:
+            _log.exception("the panel '%s' can't be as it was", self.description.name)
 
     def shut(self) -> None:
         """The window closes: the panel ends its watches; one that fails does not keep the window open."""
         try:
             self.panel.shut()
-        except Exception:  # noqa: BLE001  as in `refresh`
+        except FAULTS:
             _log.exception("the panel '%s' can't end in order", self.description.name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -203,7 +264,11 @@ class Dock(QDockWidget):
     def menu(self) -> Menu:
         """The panel's own actions, then floating and closing."""
         menu = Menu(self._theme, self)
-        own: list[QAction] = list(self.panel.more_actions())
+        own: list[QAction] = []
+        try:
+            own.extend(self.panel.more_actions())
+        except FAULTS:  # it can still be closed
+            _log.exception("the panel '%s' can't tell what it can do", self.description.name)
         menu.addActions(own)
         if own:
             menu.addSeparator()
@@ -243,6 +308,18 @@ class Dock(QDockWidget):
             drop_below(menu, anchor)
         else:
             menu.popup(QCursor.pos())
+
+
+def made(description: Panel, context: PanelContext, density: Density) -> Dock:
+    """A dock with a new panel; when that can't be made, what stands in its place says so when it is seen."""
+    try:
+        return Dock(context.theme, description, description.make(context), density)
+    except FAULTS as error:
+        traceback.clear_frames(error.__traceback__)
+        unmade = Unmade(context, description, error)
+    dock = Dock(context.theme, description, unmade, density)
+    unmade.take = dock.replace
+    return dock
 
 
 def on_screen(window: QWidget) -> bool:

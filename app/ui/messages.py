@@ -79,6 +79,8 @@ class Log(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep one line; what happens again and again is kept with its count."""
+        if getattr(record, "in_console", False):
+            return
         told = self._once.told(record)
         if told is not None:
             level = "error" if told.levelno >= logging.ERROR else "warn"

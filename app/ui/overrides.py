@@ -89,7 +89,7 @@ def guarded(made: Callable[..., object], answer: Callable[[], object]) -> Callab
     def override(*given: object, **named: object) -> object:
         try:
             return made(*given, **named)
-        except Exception as error:  # noqa: BLE001  whatever it is, it ends the process if Qt gets it
+        except (Exception, SystemExit) as error:  # noqa: BLE001  whatever it is, it ends the process if Qt gets it
             sys.excepthook(type(error), error, error.__traceback__)
             traceback.clear_frames(error.__traceback__)  # a painter that is kept would paint for ever
             return answer()

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 from app.ui import dock_state
 from app.ui.dock_places import AREA, join
 from app.ui.dock_sizes import fit
-from app.ui.docks import Dock
+from app.ui.docks import Dock, made
 from app.ui.layouts import Layout
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Panel, PanelContext
 from app.ui.theme import Theme
 
 ACROSS = Qt.Orientation.Horizontal
@@ -122,8 +122,7 @@ class Workbench(QMainWindow):
         description = self._panels.get(name)
         if description is None:
             return None
-        panel: PanelWidget = description.make(self._context)
-        dock = Dock(self._theme, description, panel, self._layout.density)
+        dock = made(description, self._context, self._layout.density)
         dock.dockLocationChanged.connect(self._tabs_soon)
         dock.topLevelChanged.connect(self._tabs_soon)
         dock.visibilityChanged.connect(self._tabs_soon)
@@ -290,7 +289,7 @@ class Workbench(QMainWindow):
         for name, dock in self.docks.items():
             state_of = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(state_of, Mapping):
-                dock.panel.restore_state(state_of)
+                dock.give_back(state_of)
         self._tabs_soon()
         return True
 

@@ -77,3 +77,28 @@ def test_what_could_not_be_written_is_known_until_it_can_be(tmp_path: Path) -> N
     assert (again.get("theme", ""), again.get("text_percent", 0), again.get("layout", "")) == (
         "dark", 125, "developer",
     )  # fmt: skip
+
+
+def test_a_file_whose_name_is_no_utf_8_is_remembered_and_keeps_nothing_else_from_being_kept(
+    tmp_path: Path,
+) -> None:
+    """A disk of another system has such names; Python gives them as lone surrogates."""
+    name = "Begr\udcfc\udcdfung.nepb"
+    settings = Settings(tmp_path / "home")
+    settings.add_recent(tmp_path / name)
+    settings.set("theme", "dark")
+    again = Settings(tmp_path / "home")
+    assert [file.path.name for file in again.recent_known] == [name]
+    assert again.get("theme", "light") == "dark"
+    assert again.damaged is None
+
+
+@pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, {("a", "b"): 1}])
+def test_what_json_cant_say_is_refused_and_keeps_nothing_else_from_being_kept(
+    tmp_path: Path, value: object
+) -> None:
+    settings = Settings(tmp_path)
+    with pytest.raises(TypeError):
+        settings.set("panels", value)
+    settings.set("theme", "dark")
+    assert Settings(tmp_path).get("theme", "light") == "dark"

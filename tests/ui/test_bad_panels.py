@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import logging
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import ClassVar
 
 import pytest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QApplication, QWidget
 
+from app.core.session import Session
+from app.core.settings import Settings
 from app.ui.docks import Dock
 from app.ui.main_window import MainWindow
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.theme import Theme
+from tests.ui.shell_parts import PANELS, PlainPanel, free_address
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -76,3 +87,196 @@ def test_one_that_cant_end_or_tell_its_state_does_not_keep_the_window_open(
         "the panel 'topics' can't tell its state",
         "the panel 'topics' can't end in order",
     }
+
+
+class Bad(PlainPanel):
+    """Does what the window asks of it until ``raises`` names it; then it raises that."""
+
+    raises: ClassVar[dict[str, BaseException]] = {}
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Bad")
+        self._maybe("make")
+
+    def _maybe(self, what: str) -> None:
+        if what in self.raises:
+            raise self.raises[what]
+
+    def header_widgets(self) -> Sequence[QWidget]:
+        self._maybe("header_widgets")
+        return super().header_widgets()
+
+    def more_actions(self) -> Sequence[QAction]:
+        self._maybe("more_actions")
+        return ()
+
+    def refresh(self) -> None:
+        self._maybe("refresh")
+        super().refresh()
+
+    def sizeHint(self) -> QSize:
+        self._maybe("sizeHint")
+        return super().sizeHint()
+
+    def save_state(self) -> dict[str, object]:
+        self._maybe("save_state")
+        return {"kept": "yes"}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self._maybe("restore_state")
+        super().restore_state(state)
+
+
+@pytest.fixture
+def bad(monkeypatch: pytest.MonkeyPatch) -> dict[str, BaseException]:
+    """What the panel "bad" raises, by where; nothing at first."""
+    raises: dict[str, BaseException] = {}
+    monkeypatch.setattr(Bad, "raises", raises)
+    return raises
+
+
+def with_bad(qtbot, theme: Theme, home: Path) -> MainWindow:
+    """A window with the panel "bad" beside the plain ones, as Studio starts it."""
+    session = Session(
+        Settings(home), address=free_address(), journal_folder=home / "journal", start_companions=False
+    )
+    panels = {**PANELS, "bad": Panel("bad", "Bad", "bot", (), Bad)}
+    window = MainWindow(session, theme, panels, [])
+    qtbot.addWidget(window)
+    window.resize(1440, 900)
+    window.show()
+    return window
+
+
+def seen(qtbot, window: MainWindow, name: str = "bad") -> Dock:
+    """The dock of a panel, opened, seen and refreshed."""
+    bench = window.show_layout("developer")
+    dock = bench.open(name)
+    assert dock is not None
+    qtbot.waitUntil(dock.shown)
+    window.tick()
+    return dock
+
+
+def told(window: MainWindow) -> list[str]:
+    return [record.text for record in window.session.console.records]
+
+
+@pytest.mark.parametrize("where", ["make", "header_widgets"])
+def test_one_that_cant_be_made_says_so_in_its_place_until_it_can_be(
+    qtbot, theme: Theme, home: Path, bad: dict[str, BaseException], where: str
+) -> None:
+    window = with_bad(qtbot, theme, home)
+    bad[where] = RuntimeError("no such luck")
+    dock = seen(qtbot, window)
+    for _ in range(3):
+        window.tick()
+    assert dock.failed
+    assert told(window).count("RuntimeError: no such luck") == 1
+    dock.try_again()
+    window.tick()
+    assert dock.failed
+    assert told(window).count("RuntimeError: no such luck") == 2
+    bad.clear()
+    dock.try_again()
+    window.tick()
+    window.tick()
+    assert not dock.failed
+    assert isinstance(dock.panel, Bad)
+    qtbot.waitUntil(dock.panel.isVisible)
+    assert dock.panel.refreshed == 1
+    window.close()
+
+
+@pytest.mark.parametrize("where", ["make", "restore_state"])
+def test_one_that_fails_at_the_start_costs_nobody_the_layout(
+    qtbot, theme: Theme, home: Path, bad: dict[str, BaseException], where: str
+) -> None:
+    first = with_bad(qtbot, theme, home)
+    seen(qtbot, first)
+    assert first.bench is not None
+    first.bench.docks["console"].close()
+    first.bench.docks["topics"].setFloating(True)
+    opened = set(first.bench.open_names())
+    first.close()
+    bad[where] = ValueError("no such luck")
+    again = with_bad(qtbot, theme, home)
+    bench = again.show_layout("developer")
+    assert set(bench.open_names()) == opened
+    assert bench.docks["topics"].isFloating()
+    assert bench.docks["inspector"].panel.state == {"filter": ""}
+    again.close()
+    bad.clear()
+    last = with_bad(qtbot, theme, home)
+    dock = seen(qtbot, last)
+    assert isinstance(dock.panel, Bad)
+    assert dock.panel.state == {"kept": "yes"}, "what it had is kept also while it could not be made"
+    last.close()
+
+
+def test_one_that_is_made_later_gets_what_it_had(
+    qtbot, theme: Theme, home: Path, bad: dict[str, BaseException]
+) -> None:
+    first = with_bad(qtbot, theme, home)
+    seen(qtbot, first)
+    first.close()
+    bad["make"] = ValueError("no such luck")
+    again = with_bad(qtbot, theme, home)
+    dock = seen(qtbot, again)
+    bad.clear()
+    dock.try_again()
+    again.tick()
+    assert isinstance(dock.panel, Bad)
+    assert dock.panel.state == {"kept": "yes"}
+    again.close()
+
+
+def test_one_whose_state_json_cant_say_keeps_nothing_else_from_being_kept(
+    qtbot, theme: Theme, home: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    window = with_bad(qtbot, theme, home)
+    seen(qtbot, window)
+    monkeypatch.setattr(Bad, "save_state", lambda _panel: {"when": object()})
+    with caplog.at_level(logging.ERROR):
+        window.close()
+    assert [record.getMessage() for record in caplog.records] == ["the panel 'bad' can't tell its state"]
+    layouts: dict[str, dict[str, object]] = Settings(home).get("layouts", {})
+    assert "bad" in layouts["developer"]["open"]
+
+
+def test_one_that_cant_tell_what_it_can_do_can_be_closed(
+    qtbot, theme: Theme, home: Path, bad: dict[str, BaseException]
+) -> None:
+    window = with_bad(qtbot, theme, home)
+    dock = seen(qtbot, window)
+    bad["more_actions"] = RuntimeError("no such luck")
+    menu = dock.menu()
+    assert [action.text() for action in menu.actions()] == ["Float", "Close"]
+    menu.deleteLater()
+    window.close()
+
+
+@pytest.mark.parametrize("where", ["make", "refresh", "sizeHint"])
+def test_one_that_calls_exit_does_not_end_the_window(
+    qtbot,
+    theme: Theme,
+    home: Path,
+    bad: dict[str, BaseException],
+    where: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    heard: list[str] = []
+    monkeypatch.setattr(sys, "excepthook", lambda _kind, error, _trace: heard.append(repr(error)))
+    window = with_bad(qtbot, theme, home)
+    bad[where] = SystemExit("so long")
+    dock = seen(qtbot, window)
+    if where == "sizeHint":
+        dock.panel.updateGeometry()
+        assert dock.panel.sizeHint() == QSize()
+        assert set(heard) == {"SystemExit('so long')"}
+    else:
+        assert dock.failed
+        assert told(window).count("SystemExit: so long") == 1
+    other = seen(qtbot, window, "console").panel
+    assert other.refreshed
+    window.close()

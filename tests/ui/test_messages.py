@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import logging
 import threading
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMessageLogContext, QtMsgType
 
+from app.core.faults import IN_CONSOLE, LogFile
 from app.ui.messages import FLAGS, Log, Terminal, on_qt_message, quiet_chromium
 
 
@@ -87,3 +89,19 @@ def test_a_terminal_that_takes_nothing_does_not_stop_the_window():
     stuck.may_go_on.set()
     handler.close()
     assert stuck.getvalue().splitlines() == [f"qt: no. {n}\\x1b[2J" for n in range(1000)]
+
+
+def test_what_the_console_has_in_its_own_words_is_in_the_log_file_only(tmp_path: Path) -> None:
+    logger, log, file = logging.getLogger("studio.test_messages"), Log(), LogFile(tmp_path)
+    for handler in (log, file):
+        logger.addHandler(handler)
+    try:
+        logger.error("the panel 'a' stopped", extra=IN_CONSOLE)
+    finally:
+        for handler in (log, file):
+            logger.removeHandler(handler)
+            handler.close()
+    told: list[str] = []
+    log.take(lambda _level, _origin, words: told.append(words))
+    assert told == []
+    assert "the panel 'a' stopped" in (tmp_path / "studio.log").read_text("utf-8")
