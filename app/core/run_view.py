@@ -165,7 +165,8 @@ def _stopping_early(run: RunState, now: float) -> RunView:
 
 def _stopping(run: RunState, now: float) -> RunView:
     # one that refuses, or that somebody else serves too, is done only when all of it has stopped
-    done = {robot.name for robot in run.answered if robot.answered}
+    newest = {robot.name: robot for robot in run.answered}
+    done = {robot.name for robot in run.answered if robot.answered and not newest[robot.name].waits}
     done -= {robot.name for robot in run.answered if robot.wrong}
     waiting = [name for name in run.asked if name not in done]
     detail = f"Waiting for {listed(waiting)}, {now - run.pressed_s:.1f} s" if waiting else ""
@@ -225,19 +226,18 @@ def connected_words(names: Sequence[str]) -> str:
 
 def result_words(report: StopReport) -> tuple[str, bool]:
     """``all 2 robots stopped (41 ms)`` and whether every robot that can answer did."""
-    robots = report.robots
-    unsure = [robot.who for robot in robots if not robot.can_confirm]
-    proven = [robot.who for robot in robots if robot.can_confirm and robot.answered]
+    names, still = report.names, report.still
+    unsure = [robot.who for robot in report.robots if not robot.can_confirm]
     if report.unproven:
-        return f"{len(proven)} of {len(robots)} robots stopped", False
-    if not robots:
+        return f"{len(still)} of {len(names)} robots stopped", False
+    if not names:
         return "no robot to stop", True
-    if not proven:
+    if not still:
         return f"stop sent; {_cannot_confirm(unsure)}", True
     time_ms = max(1, round(report.elapsed_ms))
-    everyone = f"{proven[0]} stopped" if len(robots) == 1 else f"all {len(robots)} robots stopped"
+    everyone = f"{still[0]} stopped" if len(names) == 1 else f"all {len(names)} robots stopped"
     if unsure:
-        return f"{listed(proven)} stopped ({time_ms} ms); {_cannot_confirm(unsure)}", True
+        return f"{listed(still)} stopped ({time_ms} ms); {_cannot_confirm(unsure)}", True
     return f"{everyone} ({time_ms} ms)", True
 
 
@@ -250,12 +250,12 @@ def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
 
     What a robot said itself ("Arm may still move: the brake is stuck") comes first, in its own words.
     """
-    proven = [robot for robot in report.robots if robot.can_confirm and robot.answered]
+    still = report.still
     names = listed(report.silent)
     stopped = ""
-    if proven:
-        slowest = max(1, round(max(robot.elapsed_ms or 0 for robot in proven)))
-        stopped = f"{listed([robot.who for robot in proven])} stopped ({slowest} ms). "
+    if still:
+        slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in still)
+        stopped = f"{listed(still)} stopped ({max(1, round(slowest))} ms). "
     them = names if len(report.silent) <= 2 else "them"
     title = _wrong_words(report)
     return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -11,6 +12,7 @@ from app.blocks.publishing import guarded
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.document import Document
+from app.core.faults import survived, words_of
 from app.core.fleet import Fleet
 from app.core.moving import wanted_by
 from app.core.run_needs import Behaviours, Network
@@ -35,6 +37,8 @@ from app.robots.description import Robot
 
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 NO_NETWORK = "there is no connection to the network yet"
+
+_log = logging.getLogger("studio")
 
 
 class Runs:
@@ -127,8 +131,8 @@ class Runs:
 
     def stop(self) -> None:
         """End the program and stop every robot; what they answer is the run bar's result."""
-        self._fleet.moving.withdraw()
         self._stop(None)
+        self._fleet.moving.withdraw()
 
     def stop_robot(self, name: str) -> None:
         """Stop one robot; while a program runs this is `stop`, because it would move the robot again."""
@@ -138,10 +142,7 @@ class Runs:
         stopper, post = self._network.stopper, self._post_event
 
         def stop_it() -> None:
-            report = StopReport((), 0.0).with_asked([name], NO_NETWORK)
-            if stopper is not None:
-                report = stopper.stop_all([name], on_late=lambda late: post(LateAnswer(None, late)))
-            post(OneStopped(report))
+            post(OneStopped(_asked(stopper, (name,), on_late=lambda late: post(LateAnswer(None, late)))))
 
         threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
 
@@ -235,15 +236,16 @@ class Runs:
             if isinstance(event, RobotAnswered):
                 run.answered.append(event.robot)
             else:
-                self._take_report(event.report)
                 run.dashed = bool(self.stopped_blocks)
+                self._take_report(event.report)
 
     def _take_report(self, report: StopReport) -> None:
+        """How it stands is taken over before any words are made: no fault in them leaves it "stopping"."""
         run = self._run
-        run.report, (run.last_words, good) = report, result_words(report)
+        run.state, run.report = "proven" if report.proven else "unanswered", report
         self.kept = frozenset(report.silent)
-        run.state = "proven" if good else "unanswered"
         self._tell_fleet(report)
+        run.last_words, _ = result_words(report)
         self._tell_person(report, run.name or "stop")
 
     def _on_late(self, event: LateAnswer) -> None:
@@ -308,14 +310,14 @@ class Runs:
         self._runner = None
         if not self.active:
             return  # Stop was first
-        if not event.ok and not self.block_errors:
-            self._alerts.put("program", "error", "The behaviour ended by itself.", event.text)
         finished = event.ok and not self.block_errors
         if finished:
             self._mark()
         # the end of a program is a stop like any other: every robot that it used is told and must answer
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run.finished = finished
+        if not event.ok and not self.block_errors:
+            self._alerts.put("program", "error", "The behaviour ended by itself.", event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
         """Stop these robots, or all."""
@@ -361,12 +363,15 @@ class Runs:
 
         if runner is not None:
             if stopper is not None:
-                stopper.send_stop(ends=ends)  # at once; told again below for robots that don't know `ends`
-            runner.stop()
-        report = StopReport((), 0.0).with_asked(names, NO_NETWORK)
-        if stopper is not None:
-            report = stopper.stop_all(names, on_answer=answered, ends=ends, on_late=late)
-        self._post_event(StopDone(number, report))
+                with survived(
+                    "tell the robots at once"
+                ):  # they are told again below, also those without `ends`
+                    stopper.send_stop(ends=ends)
+            with survived("end the program"):
+                runner.stop()
+        self._post_event(
+            StopDone(number, _asked(stopper, names, on_answer=answered, ends=ends, on_late=late))
+        )
 
     def _tell_person(self, report: StopReport, origin: str) -> None:
         for name, program in report.strangers:
@@ -397,3 +402,22 @@ class Runs:
     def _mark(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
         self.running_blocks, self.stopped_blocks = running, stopped
         self.blocks_revision += 1
+
+
+def _asked(
+    stopper: RobotStopper | None,
+    names: tuple[str, ...],
+    *,
+    on_late: Callable[[RobotStop], object],
+    on_answer: Callable[[RobotStop], object] | None = None,
+    ends: str | None = None,
+) -> StopReport:
+    """Stop these robots. There is a report whatever happens: without one the run would stay "stopping"."""
+    why = NO_NETWORK
+    if stopper is not None:
+        try:
+            return stopper.stop_all(names, on_answer=on_answer, ends=ends, on_late=on_late)
+        except Exception as error:  # noqa: BLE001  whatever it is: these robots are not proven to stand still
+            _log.exception("can't stop the robots")
+            why = words_of(error)
+    return StopReport((), 0.0).with_asked(names, why)

@@ -15,7 +15,8 @@ class RobotStop:
     ``answered``: its own program said that it stands still. ``refused``: that said that it does not, and why
     (``error``). ``error`` without ``refused``: it could not be told. ``can_confirm`` is False for robots that
     never answer a stop (RIZE), and for programs that only listen to a robot's commands. ``program`` names
-    another program than the robot's own that serves its commands.
+    another program than the robot's own that serves its commands. ``waits`` says that other programs of the
+    same robot had not answered yet when this was told.
     """
 
     name: str
@@ -25,6 +26,7 @@ class RobotStop:
     error: str = ""
     refused: bool = False
     program: str = ""
+    waits: bool = False
 
     @property
     def who(self) -> str:
@@ -77,6 +79,18 @@ class StopReport:
     def silent(self) -> tuple[str, ...]:
         """The robots that are not proven to stand still, each once."""
         return tuple(dict.fromkeys(robot.name for robot in self.unproven))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The robots, each once, however many programs serve one."""
+        return tuple(dict.fromkeys(robot.name for robot in self.robots))
+
+    @property
+    def still(self) -> tuple[str, ...]:
+        """The robots that are proven to stand still: all of their programs that must answer said so."""
+        silent = self.silent
+        said = (robot.name for robot in self.robots if robot.can_confirm and robot.answered)
+        return tuple(dict.fromkeys(name for name in said if name not in silent))
 
     def with_asked(self, names: Iterable[str], why: str = "") -> StopReport:
         """The same, and a line for each of these robots that has none: it was not reached."""

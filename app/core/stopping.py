@@ -12,7 +12,7 @@ import uuid
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from app.core.stop_report import RobotStop, StopReport
@@ -171,8 +171,9 @@ class _Asked:
 
     def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
         """What has been said and was not told on yet, by node."""
-        found = self.serving.items()
-        return [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
+        found, waits = self.serving.items(), None in self.serving.values()
+        said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
+        return [(node, replace(each, waits=waits)) for node, each in said]
 
     def results(self) -> list[RobotStop]:
         """A line for each program; those that have said nothing did not answer."""

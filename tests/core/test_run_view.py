@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from app.core.run_view import RunState, listed, seconds, stop_words, view_of
@@ -107,6 +109,28 @@ def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
         RobotStop(f"R{n}", False, 1.0, error=f"R{n} may still move: no", refused=True) for n in range(9)
     ]
     assert view_of(after(*refused), [], 0).title.endswith("R3 may still move: no; 5 more may still move")
+
+
+def test_robots_are_counted_not_the_programs_that_serve_them() -> None:
+    twin = RobotStop("Pepper", False, None, program="pepper 2")
+    view = view_of(after(PEPPER, twin, TURTLE), [], 0)
+    assert view.title == "Pepper (“pepper 2”) did not answer"
+    assert view.result == "1 of 2 robots stopped"
+    assert view.detail == "Turtle stopped (41 ms). Switch Pepper off by hand."
+    ears = RobotStop("Pepper", False, None, can_confirm=False, program="nep-topic-echo")
+    view = view_of(after(PEPPER, ears), [], 0)
+    assert view.result == "Pepper stopped (41 ms); Pepper (“nep-topic-echo”) cannot confirm"
+    both = RobotStop("Pepper", True, 3.0, program="pepper 2")
+    assert view_of(after(PEPPER, both), [], 0).result == "Pepper stopped (41 ms)"
+
+
+def test_a_robot_is_not_called_stopped_while_another_of_its_programs_is_waited_for() -> None:
+    run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper",))
+    run.answered.append(replace(PEPPER, waits=True))
+    view = view_of(run, [], 10.2)
+    assert (view.detail, view.result) == ("Waiting for Pepper, 0.2 s", "0 of 1 robots stopped")
+    run.answered.append(RobotStop("Pepper", True, 90.0, program="pepper 2"))
+    assert view_of(run, [], 10.2).result == "1 of 1 robots stopped"
 
 
 def test_a_robot_of_rize_is_never_called_stopped() -> None:

@@ -93,7 +93,9 @@ def test_two_robots_of_one_name_must_both_answer(master, stopper, pepper) -> Non
         assert report.proven
         assert [robot.who for robot in report.robots] == ["Pepper", "Pepper (“Pepper”)"]
         twin.silent = {"stop"}
-        report = stopper.stop_all(timeout_s=SHORT_S)
+        told: list[RobotStop] = []
+        report = stopper.stop_all(timeout_s=SHORT_S, on_answer=told.append)
+        assert [(each.answered, each.waits) for each in told] == [(True, True), (False, False)]
         assert (report.proven, report.silent) == (False, ("Pepper",))
         assert report.robots[1].sentence == "Pepper (“Pepper”) did not answer. Switch it off by hand."
         twin.silent, pepper.silent = set(), {"stop"}
