@@ -6,10 +6,9 @@ over what they posted.
 
 from __future__ import annotations
 
-import contextlib
-import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from app.core.console import Console
 from app.core.doctor import doctor_of
 from app.core.document import Document
 from app.core.documents import Documents
-from app.core.faults import survived, words_of
+from app.core.faults import survived
 from app.core.fleet import Fleet
 from app.core.health import ASK_DOCTOR, Health
 from app.core.images import Images
@@ -30,6 +29,7 @@ from app.core.kept_tabs import KeptTabs
 from app.core.mailbox import Batch, Drained, Mailbox
 from app.core.master_state import Learning, MasterState
 from app.core.nodes import Nodes
+from app.core.own_faults import OwnFaults
 from app.core.processes import Processes
 from app.core.reach import Reach, ReachChanged
 from app.core.runner import RunnerEvent
@@ -59,8 +59,6 @@ CHECK_S = 1.0
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """What the Console shows."""
 
-_log = logging.getLogger("studio")
-
 
 class Session:
     """Everything that the panels show. One thread uses it (the window's); `close` ends its threads."""
@@ -85,6 +83,7 @@ class Session:
         self._start_companions = start_companions
         self.settings = settings if settings is not None else Settings()
         self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
+        self._faults = OwnFaults(self.alerts, clock)
         self.traffic = Traffic(self.topics)
         self.nodes = Nodes()
         self._mailbox, self._checks = Mailbox(), Checks()
@@ -171,29 +170,16 @@ class Session:
             self._check(now)
         self.tick_ms = (self._clock() - began) * 1000
 
-    @contextlib.contextmanager
-    def surviving(self, what: str) -> Iterator[None]:
+    def surviving(self, what: str) -> AbstractContextManager[None]:
         """One thing of a tick: when it raises, the log and an alert say so, and the next has its turn.
 
         ``what`` completes the sentence "can't ...".
         """
-        try:
-            yield
-        except Exception as error:  # noqa: BLE001  whatever it is: what comes after must still arrive
-            _log.exception("can't %s", what)
-            if self.alerts.has("studio"):
-                return  # the log counts how often
-            self.alerts.put(
-                "studio",
-                "error",
-                "Studio has a fault and may show old values.",
-                f"It can't {what}: {words_of(error)}",
-                button="Show the log",
-                action="help.log",
-            )
+        return self._faults.surviving(what)
 
     def _check(self, now: float) -> None:
         """What is looked at once a second."""
+        self._faults.check()
         with self.surviving("check what was started here"):
             self.companions.check()
             if self.master.kind == "none" and self._start_companions:

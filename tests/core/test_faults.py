@@ -14,6 +14,7 @@ import pytest
 import nep
 from app.core import faults
 from app.core.faults import LogFile, SaidOnce, words_of
+from app.core.own_faults import OwnFaults
 from app.core.runner import RunnerEvent
 from app.core.session import Session
 from app.core.settings import Settings
@@ -217,6 +218,53 @@ def test_whatever_raises_in_a_tick_a_stop_and_messages_arrive(
     if place != "topics.add":
         assert session.topics["/faces"].received == 2
     watch.close()
+
+
+def test_the_alert_of_a_fault_is_cured_when_what_failed_goes_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    session = Session(
+        Settings(tmp_path),
+        address=ADDRESS,
+        journal_folder=tmp_path / "j",
+        start_companions=False,
+        clock=lambda: now[0],
+    )
+
+    def seconds(count: int) -> None:
+        for _ in range(count):
+            now[0] += 1.0
+            session.tick()
+
+    with monkeypatch.context() as broken:
+        broken.setattr(session.nodes, "age", raising)
+        broken.setattr(session.traffic, "add", raising)
+        seconds(90)
+        assert session.alerts.has("studio"), "it goes on"
+    with monkeypatch.context() as broken:
+        broken.setattr(session.traffic, "add", raising)
+        seconds(6)
+        (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
+        assert alert.detail.startswith("It can't count messages: "), "the other one is over"
+    seconds(4)
+    assert session.alerts.has("studio"), "what fails now and then does not flicker"
+    seconds(2)
+    assert not session.alerts.has("studio")
+
+
+def test_a_fault_that_nothing_can_repeat_is_over_after_a_while(session: Session) -> None:
+    now = [0.0]
+    alerts = session.alerts
+    faults = OwnFaults(alerts, lambda: now[0])
+    for number in range(300):
+        with faults.surviving(f"take over messages of /t{number}"):
+            raising()
+    faults.check()
+    assert alerts.has("studio")
+    now[0] = 61.0
+    faults.check()
+    assert not alerts.has("studio")
 
 
 def test_closing_ends_everything_whatever_fails(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
