@@ -428,6 +428,9 @@ class Fleet:
     def _away(self, link: RobotLink) -> None:
         link.connected, link.gone_s = False, self._clock()
         link.left_busy = link.left_busy or bool(link.running)
+        if not link.virtual:  # a robot goes on when its program ends; a virtual one is its program
+            link.not_stopped = link.not_stopped or link.goes_on
+        link.goes_on = ""
         self.known.saw([link.robot])
         self._alive.rest(link.name)
         if link.watch is not None:

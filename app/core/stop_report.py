@@ -105,7 +105,7 @@ class StopReport:
             return self
         same = (late.name, late.program)
         robots = (late if (robot.name, robot.program) == same else robot for robot in self.robots)
-        return replace(self, robots=tuple(robots))
+        return replace(self, robots=tuple(robots), elapsed_ms=max(self.elapsed_ms, late.elapsed_ms or 0.0))
 
 
 def not_reached(name: str, why: str = "") -> RobotStop:

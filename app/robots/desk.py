@@ -14,7 +14,7 @@ from app.robots.inputs import near_miss
 from app.robots.members import as_part, text
 from app.robots.parts import Action, Robot
 from app.robots.task import Answer, Program, Task
-from app.robots.tasks import NOTHING_RUNS, Tasks, still_moving
+from app.robots.tasks import NOTHING_RUNS, Tasks
 from app.robots.typed_values import given
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
@@ -70,14 +70,14 @@ class Desk:
             error = f"there is no “{operation}”; a command is invoke, cancel, stop or alive"
             self._answering(wanted, str(operation), "")(Answer("failed", error=error))
 
-    def beat(self, not_ended: Sequence[str] = ()) -> None:
+    def beat(self, not_ended: Sequence[str] = (), error: str | None = None) -> None:
         """Tell that the robot lives while it does something: programs notice when it no longer does.
 
-        `not_ended` are the actions whose functions go on although they were told to end.
+        `not_ended` are the actions whose functions go on although they were told to end, `error` the sentence
+        for it.
         """
-        error = still_moving(self._robot.name, not_ended) if not_ended else None
         told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
-        self._publish(told | {"not_ended": list(not_ended), "error": error})
+        self._publish(told | {"not_ended": list(not_ended), "error": _sendable(error)})
 
     def task(
         self,

@@ -97,8 +97,8 @@ class Driver:
         stop_function: Callable[[], object] = getattr(body, stop)
         answer = partial(self._publish, self.robot.topics.answer)
 
-        def beat(not_ended: tuple[str, ...]) -> None:
-            desk.beat(not_ended)  # which is made with the tasks, below
+        def beat(not_ended: tuple[str, ...], error: str | None) -> None:
+            desk.beat(not_ended, error)  # which is made with the tasks, below
 
         self._tasks = tasks = Tasks(
             self.name,

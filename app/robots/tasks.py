@@ -26,6 +26,7 @@ _GRACE_S = 1.0
 _LONGEST_QUEUE = 50
 _MOST_RUNNING = 50
 """What uses nothing runs side by side, each in a thread of its own."""
+THE_STOP = "the stop itself"
 NOTHING_RUNS = "nothing with this id runs"
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
@@ -42,17 +43,21 @@ class Tasks:
         *,
         within_s: float,
         watchdog_s: float | None,
-        beat: Callable[[tuple[str, ...]], None] | None = None,
+        beat: Callable[[tuple[str, ...], str | None], None] | None = None,
     ) -> None:
-        """`beat` is called in the deciding thread twice a second while anything runs or waits.
+        """`beat` is called in the deciding thread twice a second while anything runs, waits or did not stop.
 
-        It is given the actions whose functions were told to end and go on, and is called once more with none
-        of them as soon as the last one has ended.
+        It is given the actions whose functions were told to end and go on, with the sentence for it, and is
+        called once more with none of them as soon as the last one has ended. A stop that nobody asked for (of
+        the watchdog) and that failed is among them until a stop succeeds: there is no other answer to it.
         """
         self._name, self._stop_body, self._clock, self._beat = name, stop, clock, beat
         self._next_beat_s = 0.0
-        self._told_not_ended: tuple[str, ...] = ()
+        self._told_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
         self._stop_is_late = False
+        self._not_stopped: str | None = (
+            None  # what the last stop said that failed and had nobody to answer to
+        )
         self._patience_s = max(STOP_ANSWER_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
         self._inbox: deque[Callable[[], None]] = deque()
@@ -83,7 +88,12 @@ class Tasks:
     def close(self) -> None:
         """Stop the robot, end everything and join the threads; a function that never ends is left behind."""
         stopped = threading.Event()
-        self.call_soon(lambda: self.stop(lambda _: stopped.set(), "the driver ends"))
+
+        def take(answer: Answer) -> None:
+            self._take_unasked(answer)
+            stopped.set()
+
+        self.call_soon(lambda: self.stop(take, "the driver ends"))
         stopped.wait(self._patience_s + _GRACE_S)
         self._closing.set()
         self._wake.set()
@@ -174,13 +184,17 @@ class Tasks:
         due = [task.due_s for task in self._running if task.due_s is not None]
         due += [limit for limit, _ in self._stop_answers]
         due += self._watchdog.due()
-        if self._beat is not None and self._is_busy:
+        if self._beat is not None and self._has_to_tell:
             due.append(self._next_beat_s)
         return max(0.0, min(due) - self._clock.now()) if due else None
 
     @property
     def _is_busy(self) -> bool:
         return bool(self._running or self._queue or self._stopper is not None)
+
+    @property
+    def _has_to_tell(self) -> bool:
+        return self._is_busy or self._not_stopped is not None
 
     def _refusal(self) -> str | None:
         """Why nothing is accepted now; None when it is."""
@@ -192,16 +206,23 @@ class Tasks:
     def _not_ended(self) -> tuple[str, ...]:
         """What goes on although it should have ended, and was answered so."""
         names = [task.action for task in self._running if task.answered]
-        return tuple(names + ["the stop itself"] * self._stop_is_late)
+        return tuple(names + [THE_STOP] * self._stop_is_late)
+
+    def _still_moving(self) -> tuple[tuple[str, ...], str | None]:
+        """What a sign of life tells: what has not ended, and the sentence for it."""
+        not_ended = self._not_ended()
+        if not_ended:
+            return not_ended, still_moving(self._name, not_ended)
+        return ((THE_STOP,) if self._not_stopped is not None else ()), self._not_stopped
 
     def _tell_beat(self, now: float) -> None:
         """Say in time that the robot lives, and at once when a function that would not end has ended."""
         if self._beat is None:
             return
-        not_ended = self._not_ended()
-        if (self._is_busy and now >= self._next_beat_s) or not_ended != self._told_not_ended:
-            self._next_beat_s, self._told_not_ended = now + BEAT_S, not_ended
-            self._beat(not_ended)
+        told = self._still_moving()
+        if (self._has_to_tell and now >= self._next_beat_s) or told != self._told_not_ended:
+            self._next_beat_s, self._told_not_ended = now + BEAT_S, told
+            self._beat(*told)
 
     def _look_at_clock(self, now: float) -> None:
         for task in self._running:
@@ -215,8 +236,16 @@ class Tasks:
             answer(Answer("failed", error=still_moving(self._name, self._not_ended())))
         acting = [task.program for task in (*self._running, *self._queue)]
         if self._watchdog.bites(now, acting):
-            self.stop(None, f"no sign of life from its program for {self._watchdog.patience_s:g} s")
+            self.stop(
+                self._take_unasked, f"no sign of life from its program for {self._watchdog.patience_s:g} s"
+            )
         self._tell_beat(now)
+
+    def _take_unasked(self, answer: Answer) -> None:
+        """The answer to a stop that nobody asked for: a failure is logged, and told by each sign of life."""
+        if answer.state == "failed":
+            _log.error("%s", answer.error)
+            self._not_stopped = answer.error
 
     def _end(self, task: Task, how: Answer) -> None:
         """Ask for the end; of a function that goes on all the same it is said after a second."""
@@ -312,11 +341,16 @@ class Tasks:
             self._stopper.join(_JOIN_S)
         self._stopper, self._stop_is_late = None, False
         if error is not None:
+            failed = Answer("failed", error=error)
             if not self._stop_answers:
-                _log.error("%s", error)  # nobody asked who could be answered
+                self._take_unasked(failed)  # who asked was answered already that it had not ended
+            elif self._not_stopped is not None:
+                self._not_stopped = error
             answers, self._stop_answers = self._stop_answers, []
             for _, answer in answers:
-                answer(Answer("failed", error=error))
+                answer(failed)
+        else:
+            self._not_stopped = None
         self._settle()
 
     def _settle(self) -> None:

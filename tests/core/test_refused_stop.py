@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -191,6 +192,31 @@ def test_an_action_that_goes_on_is_shown_until_the_robot_says_that_it_has_ended(
     tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
 
 
+def test_one_that_says_that_it_may_still_move_and_goes_away_stays_red(
+    session: Session, master: Master
+) -> None:
+    with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node) as arm:
+        link = the_link(session)
+        told = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": ["the stop itself"]}
+        arm._publish(arm.robot.topics.answer, {**told, "error": SAID})
+        tick_until(session, lambda: link.state == "not stopped")
+    tick_until(session, lambda: not link.connected)
+    assert (link.state, link.not_stopped) == ("not stopped", SAID)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    session.runs.confirm_still()
+    assert link.state == "away"
+
+
+def test_a_virtual_robot_that_goes_away_moves_nothing_any_more(session: Session, pepper: WireRobot) -> None:
+    link = the_link(session, "Pepper")
+    lives(pepper, "turn")
+    tick_until(session, lambda: link.state == "not stopped")
+    link.robot = replace(link.robot, virtual=True)
+    session.fleet._away(link)
+    assert link.state == "away"
+
+
 def test_an_action_that_goes_on_after_a_time_out_needs_no_stop(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
     lives(pepper, "turn")
@@ -211,6 +237,9 @@ def test_a_late_answer_changes_what_stands_there(session: Session, pepper: WireR
     pepper._say(pepper.heard("stop")[0], "succeeded")
     tick_until(session, lambda: session.runs.view().state == "proven")
     assert not session.alerts.has("stop")
+    report = session.runs._run.report
+    assert report is not None
+    assert report.elapsed_ms >= (report.robots[0].elapsed_ms or 0) > 1000
 
 
 def test_the_programs_own_silent_robots_are_asked_again(session: Session, pepper: WireRobot) -> None:

@@ -306,6 +306,64 @@ def test_a_program_that_falls_silent_stops_the_robot(turtle):
     assert not body.moving
 
 
+def told_of_itself(ears):
+    """What the newest sign of life says: what has not ended, and why it may still move."""
+    signs = [a for a in list(ears.heard["answer"]) if a["op"] == "alive"]
+    return (signs[-1]["not_ended"], signs[-1]["error"]) if signs else None
+
+
+def test_a_stop_of_the_watchdog_that_fails_is_told_until_one_succeeds(turtle, caplog):
+    """Nobody asked for it, so there is nobody to answer to: whoever listens is told."""
+    body, ears, clock = turtle
+    body.stop_fails = Failed("the brake does not answer")
+    ears.invoke("1", "move", program="p")
+    eventually(lambda: body.moving)
+    clock.advance(1.1)
+    still = (["the stop itself"], "Turtle may still move: the brake does not answer")
+    eventually(lambda: told_of_itself(ears) == still)
+    assert [record.getMessage() for record in caplog.records] == [still[1]]
+    count = len(ears.heard["answer"])
+    eventually(lambda: clock.advance(0.1) or len(ears.heard["answer"]) > count + 1)  # for who comes later
+    assert told_of_itself(ears) == still
+    body.stop_fails = Failed("the brake is stuck")
+    ears.command(id="s", op="stop")
+    assert ears.final("s", "stop")["error"] == "Turtle may still move: the brake is stuck"
+    eventually(lambda: told_of_itself(ears) == (still[0], "Turtle may still move: the brake is stuck"))
+    body.stop_fails = None
+    ears.command(id="t", op="stop")
+    assert ears.final("t", "stop")["state"] == "succeeded"
+    eventually(lambda: told_of_itself(ears) == ([], None))
+
+
+def test_a_stop_of_the_watchdog_that_hangs_is_told(turtle):
+    body, ears, clock = turtle
+    body.may_stop.clear()
+    ears.invoke("1", "move", program="p")
+    eventually(lambda: body.moving)
+    clock.advance(1.1)
+    still = (["the stop itself"], "Turtle may still move: the stop itself has not ended")
+    eventually(lambda: clock.advance(0.1) or told_of_itself(ears) == still)
+    body.may_stop.set()
+    eventually(lambda: told_of_itself(ears) == ([], None))
+
+
+def test_a_stop_that_hangs_and_then_fails_is_told(turtle):
+    body, ears, clock = turtle
+    body.may_stop.clear()
+    ears.command(id="s", op="stop")
+    eventually(lambda: clock.advance(0.1) or ears.states("s"))
+    body.stop_fails = Failed("the brake is stuck")
+    body.may_stop.set()
+    still = (["the stop itself"], "Turtle may still move: the brake is stuck")
+    eventually(lambda: told_of_itself(ears) == still)
+
+
+def test_a_stop_at_the_drivers_end_that_fails_is_logged(node, caplog):
+    with Driver(TURTLE, "Turtle", node) as driver:
+        driver.body.stop_fails = Failed("the brake is stuck")
+    assert [record.getMessage() for record in caplog.records] == ["Turtle may still move: the brake is stuck"]
+
+
 def test_a_forged_sign_of_life_keeps_no_robot_going(turtle, node):
     body, ears, clock = turtle
     attacker = node.new_pub("/Turtle/command", "robot/command")
