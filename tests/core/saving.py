@@ -1,7 +1,8 @@
 """A process that saves a behaviour again and again and is killed in the middle, for `test_bad_days`.
 
-Reads one line for each life: how many milliseconds it lasts. A child of it saves in a loop until it is killed
-with signal 9; then one line tells what is in the file: "whole N", or what is wrong with it.
+Reads one line for each life: how often it saves, and how many milliseconds it lasts from then on. A child of it
+saves in a loop until it is killed with signal 9; then one line tells what is in the file: "whole N", or what is
+wrong with it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ def blocks(number: int) -> dict[str, object]:
     return {"blocks": {"languageVersion": 0, "blocks": tops}}
 
 
-def save_for_ever(path: Path, journals: Path, begin: int) -> None:
+def save_for_ever(path: Path, journals: Path, begin: int, saved: int) -> None:
     document = Document(lambda: Journal(journals))
     if path.exists():
         document.open(path)
@@ -33,6 +34,7 @@ def save_for_ever(path: Path, journals: Path, begin: int) -> None:
         number += 1
         document.edited(blocks(number))
         document.save(path)
+        os.write(saved, b"s")
 
 
 def look(path: Path) -> str:
@@ -46,12 +48,18 @@ def look(path: Path) -> str:
 
 def main(path: Path, journals: Path) -> None:
     for life, line in enumerate(sys.stdin):
+        saves, last_ms = map(int, line.split())
+        reading, saved = os.pipe()
         child = os.fork()
         if child == 0:
-            save_for_ever(path, journals, life * 1000)
-        threading.Event().wait(int(line) / 1000)
+            save_for_ever(path, journals, life * 1000, saved)
+        for _ in range(saves):  # a busy computer takes its time
+            os.read(reading, 1)
+        threading.Event().wait(last_ms / 1000)
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
+        os.close(reading)
+        os.close(saved)
         sys.stdout.write(look(path) + "\n")
         sys.stdout.flush()
 

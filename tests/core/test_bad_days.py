@@ -134,7 +134,7 @@ def test_killed_100_times_while_saving_the_file_is_whole_every_time(tmp_path: Pa
     path = tmp_path / "Mine.nepb"
     behaviour(path, {"type": "events_started", "id": "first"})
     dice = random.Random(9)
-    lives = "".join(f"{dice.randint(1, 60)}\n" for _ in range(100))
+    lives = "".join(f"{dice.randint(0, 2)} {dice.randint(0, 20)}\n" for _ in range(100))
     done = subprocess.run(
         [sys.executable, "-m", "tests.core.saving", path, tmp_path / "journal"],
         input=lives, capture_output=True, text=True, timeout=80, check=True, cwd=ROOT,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -79,6 +81,7 @@ def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address:
         lambda: studio.page(f"!!document.querySelector(\"[data-id='{hat}'] .robot_pepper_do_turn\")"),
         "the block is snapped under the hat",
     )
+    type_angle(studio, f"[data-id='{hat}'] .robot_pepper_do_turn .blocklyInputField", 180)  # time to look
     with nep.node("listener", master=address) as node:
         pose = node.new_sub("/Pepper/pose", "json", keep="latest", max_messages=1)
         answers = node.new_sub("/Pepper/answer", "robot/answer")
@@ -87,8 +90,8 @@ def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address:
         (turning,) = until(lambda: [i for i in studio.outlined("running") if i != hat], "its block glows")
         web = studio.find(kind="QWebEngineView")
         until(lambda: amber(studio.picture(web)) > amber(quiet) + 200, "the glow can be seen on the screen")
-        studio.says("Pepper turns left by 30 °")
-        until(lambda: 0 < (pose.listen()[1] or {}).get("theta", 0) < 30, "the robot turns")
+        studio.says("Pepper turns left by 180 °")
+        until(lambda: 0 < (pose.listen()[1] or {}).get("theta", 0) < 180, "the robot turns")
         studio.click("Stop", kind="StopButton")
         studio.says("Pepper stopped (")
         proof = studio.find(kind="Result")
@@ -98,7 +101,18 @@ def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address:
         until(lambda: turning in studio.outlined("stopped"), "the block where it stopped is outlined")
         assert not studio.outlined("running")
         resting = until(lambda: pose.listen()[1], "the robot says where it is")["theta"]
-        assert 0 < resting < 30
+        assert 0 < resting < 180
+
+
+def type_angle(studio: Studio, field: str, angle: int) -> None:
+    """Click into a block's number, and type another one."""
+    studio.point(field, dx=10, dy=10)
+    typing = "document.activeElement && document.activeElement.classList.contains('blocklyHtmlInput')"
+    until(lambda: studio.page(typing), "the number is edited")
+    studio.screen.type(str(angle))
+    studio.screen.key("Return")
+    shown = f"document.querySelector({json.dumps(field)}).textContent"
+    until(lambda: str(studio.page(shown)).startswith(str(angle)), "the block has the number")
 
 
 def green(picture: Picture) -> bool:
