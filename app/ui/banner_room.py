@@ -1,6 +1,6 @@
 """Where the banner is without moving anything under the mouse.
 
-It lies over the upper edge of the pages as soon as it is wanted, or over the lower one where the mouse is at
+It lies over the upper edge of the pages as soon as it is wanted, or over the lower one while the mouse is at
 the upper. Room is made for it, and taken away, only while the mouse is neither over the pages nor pressed:
 then a click that was aimed at something lands there.
 """
@@ -61,6 +61,8 @@ class BannerRoom(QWidget):
             self.setFixedHeight(wanted)
             self._is_low = False
         if wanted:
+            if self._is_low and self._may_rise(mouse, wanted):
+                self._is_low = False
             self._lay(wanted)
             fresh = self.clock() < self._fresh_until
             self._place.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, fresh)
@@ -88,6 +90,16 @@ class BannerRoom(QWidget):
         if wanted and not self._is_low and self._place.geometry().contains(mouse):
             return mouse.y() < self.y() + wanted  # the banner stays where it is
         return not self.geometry().united(self._pages.geometry()).contains(mouse)
+
+    def _may_rise(self, mouse: QPoint, wanted: int) -> bool:
+        """Whether the mouse is neither where the banner is, at the lower edge, nor where it would go.
+
+        Nothing that it covers down there can be uncovered by going to it, as it can be at the upper edge.
+        """
+        if QApplication.mouseButtons() or QApplication.activePopupWidget() is not None:
+            return False
+        above = QRect(self.x(), self.y(), self.width(), wanted)
+        return not above.contains(mouse) and not self._place.geometry().contains(mouse)
 
     def _lay(self, wanted: int) -> None:
         top = self._pages.geometry().bottom() + 1 - wanted if self._is_low else self.y()

@@ -97,6 +97,27 @@ def test_it_comes_below_where_the_mouse_is_at_its_place(window: MainWindow, mous
     assert window.room.height() == window.banner.height() > 50
 
 
+def test_it_leaves_the_lower_edge_when_the_mouse_leaves_the_upper_one(
+    window: MainWindow, mouse: Mouse
+) -> None:
+    """What it covers down there, such as the newest line of the Console, is wanted again."""
+    mouse.over(window.pages, down=20)
+    before = places(window)
+    say(window)
+    low = window.banner.geometry()
+    assert low.bottom() == window.pages.geometry().bottom()
+    mouse.over(window.pages, down=window.pages.height() - 20)
+    assert window.banner.geometry() == low, "the mouse went straight to it"
+    mouse.over(window.pages, down=20)
+    assert window.banner.geometry() == low
+    mouse.over(window.pages)
+    assert window.banner.geometry().top() == window.pages.geometry().top()
+    assert places(window) == before
+    mouse.over(window.pages, down=20)
+    QApplication.processEvents()
+    assert window.room.height() == window.banner.height(), "what it covers up there is below it then"
+
+
 def test_going_to_what_it_covers_makes_room_while_the_mouse_is_on_it(
     window: MainWindow, mouse: Mouse
 ) -> None:
