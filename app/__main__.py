@@ -91,11 +91,13 @@ def _main(given: Sequence[str]) -> int:
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
     allow_many()
+    from app.core.last_threads import end_process  # noqa: PLC0415  for a window only
     from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
-    return run(
+    code = run(
         Options(tuple(options.files), options.demo, options.theme, options.self_drive, options.new_window)
     )
+    return end_process(code)
 
 
 def run_behaviour(arguments: Sequence[str]) -> int:

@@ -1,0 +1,52 @@
+"""A thread that never ends does not keep a Studio without a window."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+
+from app.core.last_threads import still_running
+
+PROGRAM = """
+import logging, sys, threading
+from app.core.last_threads import end_process
+logging.basicConfig()
+wait = threading.Event().wait
+threading.Thread(target=wait, name="{name}", daemon={daemon}).start()
+print("kept", flush=False)
+sys.exit(end_process(3, 0.1))
+"""
+
+
+def ran(name: str, *, daemon: bool) -> subprocess.CompletedProcess[str]:
+    program = PROGRAM.format(name=name, daemon=daemon)
+    return subprocess.run(
+        [sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=60
+    )
+
+
+def test_the_process_ends_and_the_log_says_without_whom() -> None:
+    done = ran("never ends", daemon=False)
+    assert (done.returncode, done.stdout) == (3, "kept\n")
+    assert "Studio ends without 'never ends', which goes on" in done.stderr
+
+
+def test_a_daemon_is_nobody_to_wait_for() -> None:
+    done = ran("a daemon", daemon=True)
+    assert (done.returncode, done.stdout, done.stderr) == (3, "kept\n", "")
+
+
+def test_one_that_ends_in_time_is_waited_for() -> None:
+    go, gone = threading.Event(), threading.Event()
+
+    def last() -> None:
+        go.wait(30)
+        gone.set()
+
+    thread = threading.Thread(target=last, name="last")
+    thread.start()
+    assert "last" in still_running(0.0)
+    go.set()
+    assert "last" not in still_running(30.0)
+    assert gone.is_set()
