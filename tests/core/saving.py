@@ -1,8 +1,8 @@
 """A process that saves a behaviour again and again and is killed in the middle, for `test_bad_days`.
 
-Reads one line for each life: how often it saves, and how many milliseconds it lasts from then on. A child of it
-saves in a loop until it is killed with signal 9; then one line tells what is in the file: "whole N", or what is
-wrong with it.
+Reads one line for each life: how often it saves, and how many milliseconds it lasts from then on. A child of
+it saves in a loop until it is killed with signal 9; then one line tells what is in the file: "whole N", or
+what is wrong with it.
 """
 
 from __future__ import annotations
