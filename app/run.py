@@ -20,6 +20,7 @@ import nep
 from app.blocks import Program, compile_behaviour
 from app.blocks.fleet_search import Found, find_robots
 from app.blocks.publishing import guarded
+from app.blocks.undisturbed import undisturbed
 from app.blocks.workspace import Workspace, parse_workspace
 from app.core.companions import VIRTUAL_ROBOTS
 from app.core.document import read
@@ -208,24 +209,23 @@ def _run(program: Program, found: Found, reach: _Reach, say: _Lines, interrupted
     if interrupted.is_set():
         return FAILED if say.is_lost else INTERRUPTED
     owners = {name: owner.node_id for name, owner in found.owners.items()}
-    runner.start(program, [robot.source for robot in found.robots], reach.master, owners=owners)
-    was_interrupted = False
     late = _LateRobots(reach.node, runner) if program.publishes else None
     try:
+        runner.start(program, [robot.source for robot in found.robots], reach.master, owners=owners)
         while not runner.wait(SLICE_S) and not interrupted.is_set():
             if late is not None:
                 late.look()
         was_interrupted = interrupted.is_set()
     except KeyboardInterrupt:
         was_interrupted = True
-    stopper.send_stop(
-        ends=runner.program_id
-    )  # at once; and again when the program is gone and can't move them any more
-    runner.close()
-    names = [*(robot.name for robot in found.robots if robot.name in program.robots), *told.silent]
-    report = stopper.stop_all(names, ends=runner.program_id)
-    for line in stop_lines(report):
-        say(line)
+    with undisturbed():
+        # at once; and again when the program is gone and can't move them any more
+        stopper.send_stop(ends=runner.program_id)
+        runner.close()
+        names = [*(robot.name for robot in found.robots if robot.name in program.robots), *told.silent]
+        report = stopper.stop_all(names, ends=runner.program_id)
+        for line in stop_lines(report):
+            say(line)
     if was_interrupted:
         return INTERRUPTED if report.proven and not say.is_lost else FAILED
     return OK if told.ok and report.proven else FAILED

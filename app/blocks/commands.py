@@ -12,6 +12,7 @@ from app.blocks import calls, lists, values
 from app.blocks.fleet_search import find_robots
 from app.blocks.network import Network
 from app.blocks.runtime import Runtime
+from app.blocks.undisturbed import undisturbed
 from nep import node as new_node
 from nep.streams import prepare_streams
 
@@ -84,10 +85,11 @@ def run(name: str) -> None:
         except KeyboardInterrupt:
             pass
         finally:
-            _runtime.scheduler.stop()
-            moving = network.stop_robots(STOP_ANSWER_S)
-            wrong = [network.stop_words(robot) for robot in moving]
-            network.close()
+            with undisturbed():
+                _runtime.scheduler.stop()
+                moving = network.stop_robots(STOP_ANSWER_S)
+                wrong = [network.stop_words(robot) for robot in moving]
+                network.close()
     for words in wrong:
         _say(f"{words}. Switch it off by hand.")
     if _runtime.error is not None:

@@ -6,6 +6,7 @@ import errno
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -89,6 +90,32 @@ def test_an_interrupt_stops_it_and_proves_it(pepper, saved):
     thread.join(15)
     assert found[0][0] == INTERRUPTED
     assert "Pepper stopped (" in found[0][1]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+@pytest.mark.parametrize("how", ["a file of Studio", "a program file"])
+def test_ctrl_c_pressed_again_does_not_cut_the_stop_short(pepper, saved, master, tmp_path, how):
+    """The second one comes while the robots' answers are waited for; it is not a robot's answer."""
+    pepper.silent, pepper.slow = {"stop"}, {"say"}
+    path = saved(workspace(started(say("Hi"))))
+    command = [sys.executable, "-m", "app", "run", str(path)]
+    if how == "a program file":
+        path = tmp_path / "greeting.py"
+        path.write_text(SAYS, encoding="utf-8")
+        command = [sys.executable, str(path)]
+    root = str(Path(__file__).resolve().parents[2])
+    environ = {**os.environ, "PYTHONPATH": root, "NEP_MASTER": master.address}
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environ, text=True
+    )
+    until(lambda: bool(pepper.heard("invoke")))
+    process.send_signal(signal.SIGINT)
+    until(lambda: bool(pepper.heard("stop")))
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    assert "Pepper did not answer. Switch it off by hand." in out
+    assert "Traceback" not in out
+    assert process.returncode == (FAILED if how == "a file of Studio" else 0)
 
 
 def test_a_robot_that_does_not_stop_is_named(pepper, saved):
@@ -215,7 +242,7 @@ LAST = {
 
 @pytest.mark.parametrize("name", LAST)
 @pytest.mark.slow
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(240)
 def test_the_examples_run_on_the_virtual_robot(master, virtual_pepper, name):
     files = sorted(resources.path("examples").glob("*.nepb"))
     (path,) = [each for each in files if json.loads(each.read_text("utf-8"))["name"] == name]
@@ -237,7 +264,7 @@ STROKED = {"Reaction to touch", "A quiz"}
 
 @pytest.mark.parametrize("name", SAID)
 @pytest.mark.slow
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(240)
 def test_the_examples_that_listen_do_so_on_the_virtual_robot(master, virtual_pepper, name):
     """Somebody strokes the robot where it asks for that and tells the weather; it ends when all was said."""
     (path,) = [
@@ -269,7 +296,7 @@ def test_the_examples_that_listen_do_so_on_the_virtual_robot(master, virtual_pep
     assert "Pepper stopped (" in out.getvalue()
 
 
-@pytest.mark.timeout(60)
+@pytest.mark.timeout(240)
 def test_the_program_text_runs_as_a_file(master, pepper, tmp_path):
     from app.blocks import compile_behaviour
 
@@ -346,6 +373,17 @@ from app.blocks.commands import on_start, run, write
 @on_start
 def greet():
     write("\u2013 “😀”")
+
+run("greeting")
+"""
+
+
+SAYS = """
+from app.blocks.commands import on_start, robot, run
+
+@on_start
+def greet():
+    robot("Pepper").do("say", text="Hi")
 
 run("greeting")
 """
