@@ -15,13 +15,14 @@ from xdist.scheduler import LoadScopeScheduling
 
 from nep.masters import Master
 from nep.text import escaped
+from tests.nep.programs import GREETINGS_S
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
-_GRACE_S = 1.0
+_GRACE_S = 20.0
 _OURS = ("nep-", "studio-", "runner ", "deep json")
 
 
@@ -80,6 +81,15 @@ def _nothing_is_left() -> Iterator[None]:
         threading.Event().wait(0.02)
     if opened:
         pytest.fail(f"listening sockets are left behind: {sorted(opened)}")
+
+
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes of this process wait long for greetings: however busy the computer is, they come in time.
+
+    Whoever had to give up waiting needs this long.
+    """
+    monkeypatch.setattr("nep.backends.zeromq.HANDSHAKE_S", GREETINGS_S)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from app.blocks.runtime import Runtime
 from app.robots.description import Robot
 from tests.blocks.samples import robot
 
-LONG_S = 10.0
+LONG_S = 30.0
 
 
 class FakeLink:

@@ -14,7 +14,7 @@ from app.blocks.compiler import compile_behaviour
 from tests.blocks.samples import block, number, say, stack, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
 
-LONG_S = 10.0
+LONG_S = 30.0
 
 
 class Pipe(io.TextIOBase):

@@ -103,7 +103,7 @@ def test_sensors_events_topics(network, pepper, node):
 
     subscriber = node.new_sub("/out")
     network.publish("/out", "tired")
-    message = subscriber.receive(5)
+    message = subscriber.receive(30.0)
     assert message is not None
     assert message.payload == "tired"
     with nep.node("other") as other:

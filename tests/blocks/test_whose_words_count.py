@@ -17,6 +17,7 @@ from tests.blocks.fakes import until
 from tests.blocks.samples import robot
 from tests.blocks.wire_robot import WireRobot
 
+pytestmark = pytest.mark.usefixtures("patient")
 SHORT_S = 0.3
 
 
@@ -95,14 +96,14 @@ def test_a_stranger_proves_no_stop_and_says_no_stop_of_others(
 def test_a_refusal_is_told_in_the_robots_words(network: Network, pepper: WireRobot) -> None:
     say_ = pepper._say
     pepper._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")  # type: ignore[method-assign]
-    assert network.stop_robots(5.0) == ("Pepper",)
+    assert network.stop_robots(30.0) == ("Pepper",)
     assert network.stop_words("Pepper") == "Pepper may still move: the brake is stuck"
 
 
 def test_a_twin_must_answer_too(network: Network, pepper: WireRobot, master: Master) -> None:
     twin = WireRobot(master.address)
     try:
-        assert network.stop_robots(5.0) == ()
+        assert network.stop_robots(30.0) == ()
         twin.silent = {"stop"}
         assert network.stop_robots(SHORT_S) == ("Pepper",)
     finally:
@@ -184,7 +185,7 @@ def test_a_description_on_another_topic_is_left_out(
     node: nep.Node, pepper: WireRobot, evil: nep.Node
 ) -> None:
     announce(evil, "/Evil/description", "Pepper", command="/Evil/command")
-    found = find_robots(node, 5.0)
+    found = find_robots(node, 30.0)
     assert [each.topics.command for each in found.robots] == ["/Pepper/command"]
     assert found.owners["Pepper"].node_id == pepper._node.id
     assert "/Evil/description says that it is Pepper" in found.claims[0]
@@ -192,7 +193,7 @@ def test_a_description_on_another_topic_is_left_out(
 
 def test_the_first_program_of_a_name_is_found(node: nep.Node, pepper: WireRobot, evil: nep.Node) -> None:
     announce(evil, "/Pepper/description", "Pepper", command="/Evil/command")
-    found = find_robots(node, 5.0, wanted=["Pepper"])
+    found = find_robots(node, 30.0, wanted=["Pepper"])
     assert found.robots[0].topics.command == "/Pepper/command"
     assert found.claims[0].startswith("2 programs say that they are Pepper: “Pepper”")
     assert "“evil”" in found.claims[0]
@@ -202,7 +203,7 @@ def test_a_robot_with_the_topics_of_another_is_left_out(
     node: nep.Node, pepper: WireRobot, evil: nep.Node
 ) -> None:
     announce(evil, "/Evil/description", "Evil", command="/Pepper/command")
-    found = find_robots(node, 5.0)
+    found = find_robots(node, 30.0)
     assert [each.name for each in found.robots] == ["Pepper"]
     assert found.claims == (
         "Evil says that /Pepper/command is its own, which belongs to Pepper; Evil is left out.",

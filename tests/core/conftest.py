@@ -14,7 +14,11 @@ from nep.masters import Master
 
 @pytest.fixture
 def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
-    """A session on the test's own master, with everything that it keeps in the test's folder."""
+    """A session on the test's own master, with everything that it keeps in the test's folder.
+
+    Robots have longer than a second to answer a stop: on a busy computer they may need it.
+    """
+    monkeypatch.setattr("app.core.stopping.STOP_TIMEOUT_S", 3.0)
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     made = Session(
         Settings(tmp_path),

@@ -157,7 +157,7 @@ def test_a_second_studio_uses_the_pepper_that_is_there(master: Master, tmp_path:
         try:
             second.companions.start_virtual_robot()  # in its first moment: it knows nobody yet
             assert second.graph is None
-            tick_until(second, lambda: second.fleet.connected, 20)
+            tick_until(second, lambda: second.fleet.connected)
             assert second.companions._robots == {}
         finally:
             second.close()

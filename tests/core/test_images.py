@@ -23,7 +23,7 @@ def jpeg(colour: tuple[int, int, int], topic: str = "/camera", seq: int = 1) -> 
     )
 
 
-def until(true: Callable[[], bool], seconds: float = 5) -> None:
+def until(true: Callable[[], bool], seconds: float = 30) -> None:
     ended = threading.Event()
     for _ in range(int(seconds * 100)):
         if true():

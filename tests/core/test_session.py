@@ -102,7 +102,7 @@ def test_bad_messages_are_one_alert_that_a_good_one_cures(session: Session) -> N
 
 def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) -> None:
     session.companions.start_virtual_robot("Pepper")
-    tick_until(session, lambda: session.fleet.connected, 20)
+    tick_until(session, lambda: session.fleet.connected)
     link = session.fleet.link("Pepper")
     assert link is not None
     assert (link.virtual, link.chip) == (True, "virtual, ready")
@@ -130,25 +130,25 @@ def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) 
 
 def test_a_virtual_robot_that_died_is_told_with_its_next_step(session: Session) -> None:
     session.companions.start_virtual_robot("Pepper")
-    tick_until(session, lambda: session.fleet.connected, 20)
+    tick_until(session, lambda: session.fleet.connected)
     session.companions._robots["Pepper"][0].kill()
     tick_until(session, lambda: session.alerts.has("companion:Pepper"))
     (alert,) = [alert for alert in session.alerts.active if alert.id == "companion:Pepper"]
     assert (alert.button, alert.action) == ("Start it again", "connect:Pepper")
     tick_until(session, lambda: not session.fleet.connected)
     session.companions.start_virtual_robot("Pepper")
-    tick_until(session, lambda: not session.alerts.has("companion:Pepper"), 20)
+    tick_until(session, lambda: not session.alerts.has("companion:Pepper"))
 
 
 def test_a_virtual_robot_that_hangs_can_be_connected_again(session: Session) -> None:
     session.companions.start_virtual_robot("Pepper")
-    tick_until(session, lambda: session.fleet.connected, 20)
+    tick_until(session, lambda: session.fleet.connected)
     hung = session.companions._robots["Pepper"][0]
     psutil.Process(hung.pid).suspend()
     tick_until(session, lambda: not session.fleet.connected)
     session.companions.restart_virtual_robot("Pepper")
     assert hung.poll() is not None
-    tick_until(session, lambda: session.fleet.connected, 20)
+    tick_until(session, lambda: session.fleet.connected)
 
 
 def test_a_journal_that_cant_be_written_is_an_alert_until_it_can(session: Session, tmp_path: Path) -> None:
@@ -177,14 +177,14 @@ def test_a_wrong_input_is_refused_before_it_is_sent(session: Session) -> None:
 
 def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
     session.companions.start_virtual_robot("Pepper")
-    tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots, 20)
+    tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
     session.document.example(EXAMPLES / "1-greeting.nepb")
     assert not [p for p in session.document.problems() if p.severity == "error"]
     session.runs.run()
     tick_until(session, lambda: session.runs.running_blocks)
     assert session.runs.view().state == "running"
     session.runs.pause()
-    tick_until(session, lambda: session.runs.view().state == "paused", 20)
+    tick_until(session, lambda: session.runs.view().state == "paused")
     session.runs.go_on()
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "proven")
@@ -202,13 +202,13 @@ def test_an_example_runs_and_stop_is_proven(session: Session) -> None:
 
 def test_a_virtual_robot_whose_process_is_gone_needs_no_hand_to_switch_it_off(session: Session) -> None:
     session.companions.start_virtual_robot("Pepper")
-    tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots, 20)
+    tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
     session.document.example(EXAMPLES / "1-greeting.nepb")
     session.runs.run()
     tick_until(session, lambda: session.runs.running_blocks)
     session.companions._robots["Pepper"][0].kill()
-    tick_until(session, lambda: not session.runs.active, 20)
-    tick_until(session, lambda: session.runs.view().can_run, 20)
+    tick_until(session, lambda: not session.runs.active)
+    tick_until(session, lambda: session.runs.view().can_run)
     assert not session.alerts.has("stop")
     assert session.alerts.has("companion:Pepper")
     session.companions.start_virtual_robot("Pepper")
@@ -279,7 +279,7 @@ def test_a_robot_that_does_not_answer_is_named_and_run_stays_locked(session: Ses
     with nep.node("mute") as node:
         description = node.new_pub("/Mute/description", "robot/description", latched=True)
         description.publish(td_for(LAMP.thing_model, "Mute"))
-        tick_until(session, lambda: session.stopper and session.stopper.robots, 20)
+        tick_until(session, lambda: session.stopper and session.stopper.robots)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().stop_word == "Stopping")
         tick_until(session, lambda: session.runs.view().state == "unanswered")

@@ -95,7 +95,7 @@ def test_what_a_program_prints_stands_there_once_though_it_is_on_the_bus(session
             heard.extend(payload for ok, payload in [records.listen()] if ok)
             return len(heard) >= 2 and not session.runs.active
 
-        tick_until(session, both, 20)
+        tick_until(session, both)
         name = session.document.name
         assert [record["text"] for record in heard] == ["hello", "7"]  # type: ignore[index]
         assert {record["node"] for record in heard} == {f"program {name}"}  # type: ignore[index]

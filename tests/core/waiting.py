@@ -9,7 +9,7 @@ from collections.abc import Callable
 from app.core.session import Session
 
 
-def tick_until(session: Session, true: Callable[[], object], timeout_s: float = 10.0) -> None:
+def tick_until(session: Session, true: Callable[[], object], timeout_s: float = 60.0) -> None:
     """Tick 30 times a second, as the window does; fails when it never comes true."""
     pause = threading.Event()
     end = time.monotonic() + timeout_s

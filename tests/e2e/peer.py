@@ -28,6 +28,6 @@ with nep.node(f"{what}er", wait_s=20) as node:
         subscriber = node.new_sub(topic, "json")
         print("ready", flush=True)
         while True:
-            message = subscriber.receive(1.0)
+            message = subscriber.receive(30.0)
             if message is not None:
                 print(message.payload["n"], flush=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from tests.e2e.waiting import until
 from tests.e2e.x11 import Picture, Screen
 
-STEP_S = 20.0
+STEP_S = 40.0
 RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
 Seen = Mapping[str, object]
 

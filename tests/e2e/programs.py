@@ -14,7 +14,7 @@ from pathlib import Path
 from tests.e2e.waiting import until
 
 ROOT = Path(__file__).resolve().parents[2]
-END_S = 10.0
+END_S = 30.0
 
 
 class Program:

@@ -19,7 +19,7 @@ from tests.e2e.x11 import Screen
 
 ROOT = Path(__file__).resolve().parents[2]
 EYES = Path(__file__).parent / "eyes"
-START_S, END_S = 40.0, 10.0
+START_S, END_S = 60.0, 30.0
 
 
 class Studio(Person):

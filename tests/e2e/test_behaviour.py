@@ -13,7 +13,7 @@ from tests.e2e.behaviours import block, forever, number, say, started, turn, wri
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(110)
+pytestmark = pytest.mark.timeout(240)
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_a_robot_that_dies_is_missed_and_comes_back(with_robot: Callable[[dict],
     until(lambda: "turn" in studio.outlined("running"), "its blocks run again")
     with nep.node("listener", master=studio.master) as node:
         states = node.new_sub("/Pepper/state", "json")
-        until(lambda: states.receive(1.0).payload["moving"], "it moves")
+        until(lambda: states.receive(30.0).payload["moving"], "it moves")
     studio.screen.key("F12")
     studio.says("Pepper stopped (")
 

@@ -7,7 +7,7 @@ import pytest
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(110)
+pytestmark = pytest.mark.timeout(240)
 FIELD = "Find a command, panel, topic, robot or file"
 
 

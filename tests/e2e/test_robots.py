@@ -10,7 +10,7 @@ from tests.e2e.programs import Program
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(110)
+pytestmark = pytest.mark.timeout(240)
 
 
 def press(studio: Studio, name: str) -> None:

@@ -11,7 +11,7 @@ T = TypeVar("T")
 LOOK_S = 0.05
 
 
-def until(true: Callable[[], T], what: str | Callable[[], str], within_s: float = 20.0) -> T:
+def until(true: Callable[[], T], what: str | Callable[[], str], within_s: float = 40.0) -> T:
     """Ask until the answer is true, and return it; fails with `what`, or what it says then."""
     pause = threading.Event()
     end = time.monotonic() + within_s

@@ -23,7 +23,7 @@ def node(master):
 def graph_shows(node):
     """Waits until the graph is as wanted; the view that was."""
 
-    def wait(wanted, timeout_s=10.0):
+    def wait(wanted, timeout_s=30.0):
         watch = nep.node("watch")
         with watch, watch.new_sub("nothing") as idle:
             for _ in range(int(timeout_s / 0.1)):

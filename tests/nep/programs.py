@@ -16,6 +16,8 @@ from time import monotonic
 import psutil
 
 ROOT = Path(__file__).parents[2]
+GREETINGS_S = 40.0
+"""For how long the nodes of a test that uses the fixture `patient` wait for greetings."""
 
 
 class Program:
@@ -55,7 +57,7 @@ class Program:
         process = psutil.Process(self.process.pid)
         eventually(lambda: process.status() == psutil.STATUS_STOPPED)
 
-    def end(self, timeout_s: float = 10.0) -> tuple[str, str]:
+    def end(self, timeout_s: float = 50.0) -> tuple[str, str]:
         """Wait for its end; what else it printed."""
         return self.process.communicate(timeout=timeout_s)
 
@@ -75,7 +77,7 @@ def running(code: str, *args: str, before: Sequence[str] = (), **environment: st
         program.kill()
 
 
-def eventually(is_met: Callable[[], bool], timeout_s: float = 5.0) -> float:
+def eventually(is_met: Callable[[], bool], timeout_s: float = 30.0) -> float:
     """Seconds until `is_met()`; an AssertionError when it takes too long. Looks 100 times a second."""
     started, never = monotonic(), Event()
     while not is_met():

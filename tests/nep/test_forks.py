@@ -52,12 +52,12 @@ node.new_callback("topic", "json", print)
 node.new_sub("topic", sink=len)
 waiting = node.new_sub("topic")
 pub.publish("read ahead"); pub.publish("not read")
-assert waiting.listen(timeout_s=5.0) == (True, "read ahead")
+assert waiting.listen(timeout_s=30.0) == (True, "read ahead")
 node.log.warning("hello")
 
 def use():
     sentences = [closed(lambda: pub.publish(1)), closed(lambda: pub.publish_bytes(b"1")), closed(sub.listen),
-        closed(waiting.listen), closed(lambda: sub.listen(True)), closed(lambda: sub.receive(1.0)),
+        closed(waiting.listen), closed(lambda: sub.listen(True)), closed(lambda: sub.receive(30.0)),
         closed(node.spin), closed(lambda: node.spin(1.0)), closed(lambda: node.new_pub("x")),
         closed(lambda: node.new_sub("x")), closed(lambda: node.new_callback("x", "json", print)),
         closed(node.graph)]
@@ -73,14 +73,14 @@ def use():
         own, heard = mine.new_pub("own"), mine.new_sub("own")
         for payload in (1, "x" * 200_000):
             own.publish(payload)
-            assert heard.listen(timeout_s=5.0) == (True, payload)
+            assert heard.listen(timeout_s=30.0) == (True, payload)
         mine.log.warning("the child is heard")
     left = nep.node("left open", sys.argv[1])
     left.new_pub("left").publish("x" * 200_000)
 
 print(child(use))
 pub.publish("after")
-while sub.listen(timeout_s=5.0) != (True, "after"):
+while sub.listen(timeout_s=30.0) != (True, "after"):
     pass
 print(len(node.graph().nodes))
 """
@@ -127,9 +127,9 @@ process = context.Process(target=target)
 process.start()
 process.join(20)
 print(process.exitcode)
-print([sub.listen(timeout_s=5.0)[1] for _ in range(2)])
+print([sub.listen(timeout_s=30.0)[1] for _ in range(2)])
 pub.publish("still here")
-print(sub.listen(timeout_s=5.0)[1], sub.lost)
+print(sub.listen(timeout_s=30.0)[1], sub.lost)
 """
     )
     with running(code) as program:
@@ -307,7 +307,7 @@ for number in range(3):
     child = multiprocessing.get_context("fork").Process(target=work, args=(number,))
     child.start()
     child.join(20)
-    parts = [sub.receive(5.0).payload["part"] for _ in range(200)]
+    parts = [sub.receive(30.0).payload["part"] for _ in range(200)]
     assert (parts, child.exitcode) == (list(range(200)), number)
 assert sub.lost == 0
 print("all", flush=True)

@@ -9,7 +9,7 @@ from nep.gateway.native import Native
 from nep.message import Message
 from tests.nep.bad_pictures import BOMBS
 
-LONG_S = 10
+LONG_S = 30
 
 
 class Scene:

@@ -228,7 +228,7 @@ def test_a_nodes_log_arrives_at_who_subscribes_and_closing_flushes_it(master):
             assert LOG_TOPIC not in robot.graph().topics or not robot.graph().topics[LOG_TOPIC].publishers
             robot.log.warning("hello")
             robot.log.debug("unheard")
-        assert sub.listen(timeout_s=5)[1]["text"] == "hello"
+        assert sub.listen(timeout_s=30.0)[1]["text"] == "hello"
         assert sub.listen(timeout_s=0) == (False, {})
 
 

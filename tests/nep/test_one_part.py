@@ -86,7 +86,7 @@ def test_a_debugger_that_says_nothing_gets_three_parts(
     sub = node.new_sub("t", "bytes")
     debugger = stranger("t", filter_)
     heard(pub, debugger, b"for all to read", 3)
-    message = sub.receive(2.0)
+    message = sub.receive(30.0)
     assert message is not None
     assert bytes(message.data) == b"for all to read"
     debugger.close()
@@ -116,7 +116,7 @@ def test_every_size_arrives_as_it_was(node: nep.Node, size: int) -> None:
     payload = bytes(range(256)) * (size // 256 + 1)
     for data in (payload[:size], memoryview(payload)[:size], payload[:size]):
         pub.publish_bytes(data)
-        message = sub.receive(2.0)
+        message = sub.receive(30.0)
         assert message is not None
         assert message.data == payload[:size]
         assert message.data.readonly

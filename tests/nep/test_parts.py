@@ -177,14 +177,14 @@ def test_the_io_thread_serves_on_descriptors_orders_and_times() -> None:
     io.start()
     bell = Bell([Rest(), Rest(is_quiet=True, due=0.05), Rest(), Rest()])
     io.add(bell)
-    assert bell.served.acquire(timeout=2.0)
+    assert bell.served.acquire(timeout=30.0)
     bell.waker.wake()
-    assert bell.served.acquire(timeout=2.0)
+    assert bell.served.acquire(timeout=30.0)
     bell.waker.wake()  # it is quiet: the descriptor is not looked at
     assert not bell.served.acquire(timeout=0.01)
-    assert bell.served.acquire(timeout=2.0)
+    assert bell.served.acquire(timeout=30.0)
     io.serve_soon(bell)
-    assert bell.served.acquire(timeout=2.0)
+    assert bell.served.acquire(timeout=30.0)
     io.remove(bell)
     bell.waker.wake()
     assert not bell.served.acquire(timeout=0.02)
@@ -198,10 +198,10 @@ def test_one_broken_socket_does_not_silence_the_others(caplog: pytest.LogCapture
     broken, fine = Bell([Rest(due=-1.0)]), Bell([])
     io.add(broken)
     io.add(fine)
-    assert broken.served.acquire(timeout=2.0)
-    assert fine.served.acquire(timeout=2.0)
+    assert broken.served.acquire(timeout=30.0)
+    assert fine.served.acquire(timeout=30.0)
     fine.waker.wake()
-    assert fine.served.acquire(timeout=2.0)
+    assert fine.served.acquire(timeout=30.0)
     io.close()
     assert "a socket could not be served" in caplog.text
     for each in (broken, fine):
@@ -301,13 +301,13 @@ def test_the_io_thread_outlives_errors_of_its_poll(caplog: pytest.LogCaptureFixt
     io.start()
     bell = Bell([])
     io.add(bell)
-    assert bell.served.acquire(timeout=5.0)
+    assert bell.served.acquire(timeout=30.0)
     made[0].is_broken = True
     io.serve_soon(bell)
-    assert bell.served.acquire(timeout=5.0)
-    assert bell.served.acquire(timeout=5.0)  # by the new poll, the second that was tried
+    assert bell.served.acquire(timeout=30.0)
+    assert bell.served.acquire(timeout=30.0)  # by the new poll, the second that was tried
     bell.waker.wake()
-    assert bell.served.acquire(timeout=5.0)
+    assert bell.served.acquire(timeout=30.0)
     io.remove(bell)
     io.close()
     bell.waker.close()
@@ -326,10 +326,10 @@ def test_what_cannot_be_polled_is_served_each_second_and_the_others_at_once(
     io.add(bad)
     io.add(fine)
     for _ in range(2):
-        assert bad.served.acquire(timeout=5.0)
-    assert fine.served.acquire(timeout=5.0)
+        assert bad.served.acquire(timeout=30.0)
+    assert fine.served.acquire(timeout=30.0)
     fine.waker.wake()
-    assert fine.served.acquire(timeout=5.0)
+    assert fine.served.acquire(timeout=30.0)
     io.close()
     assert "a socket cannot be polled" in caplog.text
     for each in (bad, fine):

@@ -109,7 +109,7 @@ def advertised(computers: Computers) -> str:
         return asking.line()
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(240)
 def test_two_computers_hear_each_other_also_after_a_new_address_and_a_pulled_plug(
     computers: Computers,
 ) -> None:

@@ -28,7 +28,7 @@ from app.robots.kit import (
 )
 
 
-def eventually(true: Callable[[], object], timeout_s: float = 3.0) -> None:
+def eventually(true: Callable[[], object], timeout_s: float = 30.0) -> None:
     """Wait until something is true; fails when it never is."""
     never = threading.Event()
     end = time.monotonic() + timeout_s
@@ -185,7 +185,7 @@ class Ears:
     def states(self, wanted: str) -> list[object]:
         return [a["state"] for a in self.answers(wanted)]
 
-    def final(self, wanted: str, op: str = "invoke", timeout_s: float = 5.0) -> dict[str, object]:
+    def final(self, wanted: str, op: str = "invoke", timeout_s: float = 30.0) -> dict[str, object]:
         """The last answer to a command, when it has come."""
 
         def ends() -> list[dict[str, object]]:

@@ -20,11 +20,11 @@ from tests.robots.conftest import TURTLE, Ears, eventually
 def test_the_description_is_there_for_whoever_comes_later(turtle, node):
     _, _, _ = turtle
     with nep.node("late", "memory") as late:
-        message = late.new_sub("/Turtle/description", "robot/description").receive(2.0)
+        message = late.new_sub("/Turtle/description", "robot/description").receive(30.0)
         assert message is not None
         assert message.payload["title"] == "Turtle"
         assert late.graph().topics["/Turtle/description"].msg_type == "robot/description"
-        ready = late.new_sub("rize_event").receive(2.0)
+        ready = late.new_sub("rize_event").receive(30.0)
         assert ready is not None
         assert ready.payload == {"robot": "ready", "name": "Turtle"}
 

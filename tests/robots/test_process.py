@@ -61,7 +61,7 @@ def test_the_virtual_robot_runs_and_leaves_when_told(network):
             message = node.new_sub("/Miss_Pepper/description", "robot/description").receive(15.0)
             assert message is not None
             assert parse(message.payload).name == "Miss Pepper"
-            picture = node.new_sub("/Miss_Pepper/camera", "image").receive(5.0)
+            picture = node.new_sub("/Miss_Pepper/camera", "image").receive(30.0)
             assert picture is not None
             assert picture.codec == "image"
             ears = Ears(node, "Miss_Pepper")

@@ -20,7 +20,7 @@ PICTURE = json.loads((DATA / "picture.json").read_text("utf-8"))
 UNKNOWN = json.loads((DATA / "unknown.json").read_text("utf-8"))
 TOKENS = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
 START = {"type": "events_started", "id": "start", "x": 56, "y": 56}
-WAIT_MS = 10_000
+WAIT_MS = 30_000
 
 
 def workspace(*blocks: dict) -> dict:

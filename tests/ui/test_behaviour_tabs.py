@@ -92,7 +92,7 @@ def test_keys_go_along_the_tabs_and_close(tabs) -> None:
 def test_the_focus_follows_the_tab_that_shows(qtbot, tabs) -> None:
     tabs.activateWindow()
     tabs.tabs["a"].setFocus()
-    qtbot.waitUntil(tabs.tabs["a"].hasFocus, timeout=2000)
+    qtbot.waitUntil(tabs.tabs["a"].hasFocus)
     tabs.show_tabs([A, B, C], "b")
     assert tabs.tabs["b"].hasFocus()
 

@@ -363,7 +363,7 @@ def test_the_newest_picture_of_a_topic_at_the_moment_of_try_is_sent(qtbot, theme
     choice.use_topic("/Pepper/camera")
     assert form.input() == {}  # none has come yet
     cameras.made.picture = fakes.picture(320, 240)
-    qtbot.waitUntil(lambda: choice.thumbnail.image is not None, timeout=2000)
+    qtbot.waitUntil(lambda: choice.thumbnail.image is not None)
     cameras.made.picture = fakes.picture(160, 120)
     sent = decoded(form.input()["p"])
     assert (sent.width(), sent.height()) == (160, 120)

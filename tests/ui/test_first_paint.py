@@ -36,7 +36,7 @@ def test_nothing_is_done_before_the_first_paint(qtbot: QtBot) -> None:
     qtbot.wait(50)
     assert (done, soon.began) == ([], False)
     window.show()
-    qtbot.waitUntil(lambda: soon.done, timeout=5000)
+    qtbot.waitUntil(lambda: soon.done)
     assert done == ["begin", "meeting", "panels", "editor"]
 
 
@@ -64,7 +64,7 @@ def test_a_click_comes_between_two_steps(qtbot: QtBot) -> None:
 
     soon = AfterFirstPaint(window, [one, lambda: seen.append("two")])
     window.show()
-    qtbot.waitUntil(lambda: soon.done, timeout=5000)
+    qtbot.waitUntil(lambda: soon.done)
     assert seen == ["one", "click", "two"]
 
 
@@ -73,7 +73,7 @@ def test_a_window_that_is_not_painted_begins_a_little_later(qtbot: QtBot) -> Non
     qtbot.addWidget(window)
     done: list[int] = []
     soon = AfterFirstPaint(window, [lambda: done.append(1)])
-    qtbot.waitUntil(lambda: soon.done, timeout=10_000)
+    qtbot.waitUntil(lambda: soon.done)
     assert done == [1]
 
 
@@ -88,7 +88,7 @@ def test_a_step_that_fails_stops_none_of_the_others(qtbot: QtBot, caplog: pytest
     soon = AfterFirstPaint(window, [fail, lambda: done.append(1)])
     with caplog.at_level(logging.ERROR):
         window.show()
-        qtbot.waitUntil(lambda: soon.done, timeout=5000)
+        qtbot.waitUntil(lambda: soon.done)
     assert done == [1]
     assert "no such file" in caplog.text
 

@@ -40,7 +40,7 @@ def test_it_settles_a_while_after_the_last_start(qtbot: object, qapp: object) ->
     settling.setInterval(20)
     before = gc.get_freeze_count()
     settling.start()
-    with qtbot.waitSignal(settling.timeout, timeout=5000):  # type: ignore[attr-defined]
+    with qtbot.waitSignal(settling.timeout):  # type: ignore[attr-defined]
         settling.start()
     assert gc.get_freeze_count() > before
     assert not settling.isActive()

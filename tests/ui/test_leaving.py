@@ -60,5 +60,5 @@ def test_the_window_takes_the_newest_edit_with_it(qtbot, window: MainWindow, com
     assert (shut, window.isVisible()) == ([], True)
     window.session.document.edited(BLOCKS)
     editor.done[0]()
-    qtbot.waitUntil(lambda: shut == [True], timeout=5000)
+    qtbot.waitUntil(lambda: shut == [True])
     assert not window.isVisible()

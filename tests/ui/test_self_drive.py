@@ -19,7 +19,7 @@ def drive(qtbot, window: MainWindow, commands: Commands, folder: Path, steps: li
     done: list[str] = []
     window.on_shut = lambda: done.append("shut")
     driver = SelfDrive(window, commands, folder, steps)
-    qtbot.waitUntil(lambda: bool(done), timeout=10_000)
+    qtbot.waitUntil(lambda: bool(done))
     return driver
 
 

@@ -16,7 +16,7 @@ from PySide6.QtNetwork import QLocalSocket
 from app.ui import single_window
 from app.ui.single_window import Asked, Meeting, hand_over, is_ours, parse, peer_of, place
 
-WAIT_MS = 5000
+WAIT_MS = 30_000
 SECOND = """
 import sys
 from pathlib import Path

@@ -12,7 +12,7 @@ import zmq
 from nep.gateway.gateway import Gateway
 from nep.gateway.processes import SystemProcesses
 
-LONG_MS = 10_000
+LONG_MS = 30_000
 
 
 class FakeNative:
@@ -34,7 +34,7 @@ class FakeNative:
 
     def wait(self, done):
         with self._news:
-            assert self._news.wait_for(done, 10), vars(self)
+            assert self._news.wait_for(done, 60), vars(self)
 
     def start(self, inbox):
         self.inbox = inbox
@@ -108,7 +108,7 @@ class Original:
     def publish_until(self, publisher, frame, done):
         """Publish until the slow joiner has joined."""
         waited = threading.Event()
-        for _ in range(200):
+        for _ in range(1200):
             publisher.send(frame)
             if done():
                 return
