@@ -21,6 +21,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from nep.text import escaped, shortened
+
+LONGEST_NAME, LONGEST_PROBLEM = 40, 300
+
 
 class AppError(Exception):
     """Anything that Studio can explain in one sentence: ``str(error)``."""
@@ -69,13 +73,13 @@ class DescriptionError(AppError):
     """A robot's description can't be understood; ``problems`` holds every sentence."""
 
     def __init__(self, name: str, problems: tuple[str, ...]) -> None:
-        """Make the sentence from the first problem."""
+        """Make the sentence from the first problem, without what a stranger's text may do to a reader."""
         self.name = name
         self.problems = problems
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        super().__init__(
-            f"the description of '{name}' can't be used: {problems[0] if problems else 'empty'}{more}"
-        )
+        shown = shortened(escaped(name), LONGEST_NAME)
+        first = shortened(escaped(problems[0]), LONGEST_PROBLEM) if problems else "empty"
+        super().__init__(f"the description of '{shown}' can't be used: {first}{more}")
 
 
 class DeclarationError(DescriptionError):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -73,6 +72,7 @@ class _Topic:
     subscription: Subscription
     owner: Identity
     told: list[Message] = field(default_factory=list)
+    read: Message | None = None
     twins: tuple[str, ...] = ()
     robot: Robot | None = None
     wrong: str = ""
@@ -129,7 +129,7 @@ def _follow(node: Node, view: GraphView, asked: dict[str, _Topic]) -> None:
             asked[topic] = _Topic(node.new_sub(topic, DESCRIPTION_TYPE), identity_of(view, nodes[0]))
         each = asked[topic]
         if each.owner.node_id not in nodes:
-            each.owner, each.robot = identity_of(view, nodes[0]), None
+            each.owner, each.robot, each.read = identity_of(view, nodes[0]), None, None
         each.twins = tuple(identity_of(view, id).words for id in nodes if id != each.owner.node_id)
 
 
@@ -139,13 +139,18 @@ def _hear(each: _Topic, topic: str, senders: Senders) -> None:
     while message is not None:
         each.told = [*each.told[1 - MOST_TOLD :], message]
         message = each.subscription.receive(0.0)
-    for message in each.told:
-        if senders.node_of(message) != each.owner.node_id:
-            continue
-        with suppress(NepError, DescriptionError):
-            robot = announced(message)
-            each.wrong = wrong_topic(robot, topic) or ""
-            each.robot = None if each.wrong else robot
+    its_own = (told for told in reversed(each.told) if senders.node_of(told) == each.owner.node_id)
+    newest = next(its_own, None)
+    if newest is None or newest is each.read:
+        return
+    each.read, each.wrong = newest, ""
+    try:
+        robot = announced(newest)
+    except (NepError, DescriptionError) as error:
+        each.wrong = f"{topic}: {error}"  # what it said before still counts
+        return
+    each.wrong = wrong_topic(robot, topic) or ""
+    each.robot = None if each.wrong else robot
 
 
 def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> Found:

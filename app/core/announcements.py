@@ -6,7 +6,8 @@ when the master does not list its announcement any more.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from app.core.mailbox import Batch
@@ -22,6 +23,10 @@ MOST_ROBOTS = 200
 MOST_CLAIMANTS = 8
 MOST_OWNERS = 4
 """Programs of one robot whose descriptions are kept, should one of them come back."""
+READING_SHARE = 0.2
+"""So much of the window's time may go into reading descriptions in the long run, whoever sends how many."""
+READING_S = 1.0
+"""So much may be read at once after a rest: all robots of a room that come together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,16 +51,20 @@ class _Announced:
     told: dict[int, Message] = field(default_factory=dict)
     parsed: Message | None = None
     robot: Robot | None = None
-    wrong: str = ""
+    wrong: Claim | None = None
     twins: tuple[Identity, ...] = ()
 
 
 class Announcements:
     """The descriptions on the network, each with the program that it counts from. One thread uses it."""
 
-    def __init__(self, watches: Watches, senders: Senders) -> None:
+    def __init__(
+        self, watches: Watches, senders: Senders, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """``watches`` subscribes description topics; ``senders`` learns who publishes them."""
-        self._watches, self._senders = watches, senders
+        self._watches, self._senders, self._clock = watches, senders, clock
+        self._may_read_s, self._looked_s = READING_S, clock()
+        self._waiting: set[str] = set()
         self._topics: dict[str, _Announced] = {}
         self._left_out = 0
 
@@ -85,8 +94,8 @@ class Announcements:
                     f"{len(known.twins) + 1} programs say that they are {name}.",
                     f"{known.owner.words} was first and is the robot; {others} changes nothing. Close one.",
                 )
-            elif known.wrong:
-                found[topic] = Claim(f"{known.wrong}.", "Find out what this program is and close it.")
+            elif known.wrong is not None:
+                found[topic] = known.wrong
         if self._left_out:
             title = f"{self._left_out} more robots than the {MOST_ROBOTS} that Studio shows are announced."
             found["robots"] = Claim(title, "Find out which program announces them and close it.")
@@ -123,10 +132,11 @@ class Announcements:
                 for id, message in known.told.items()
                 if id in ids or self._senders.node_of(message) in known.owners
             }
-            self._read(topic, known)
+            self._waiting.add(topic)
+        self._read()
 
-    def add(self, batches: Mapping[str, Batch]) -> None:
-        """Take over the descriptions that arrived."""
+    def add(self, batches: Mapping[str, Batch]) -> bool:
+        """Take over the descriptions that arrived; whether any was read, also one that came before."""
         for topic in batches.keys() & self._topics.keys():
             known = self._topics[topic]
             for message in batches[topic].messages:
@@ -135,7 +145,8 @@ class Announcements:
                     known.told[message.publisher] = message
             while len(known.told) > MOST_CLAIMANTS:
                 self._drop_one(known)
-            self._read(topic, known)
+            self._waiting.add(topic)
+        return self._read()
 
     # -- inside ----------------------------------------------------------------------------------------------
 
@@ -170,15 +181,52 @@ class Announcements:
     def _is_owners(self, known: _Announced, message: Message) -> bool:
         return known.owner is not None and self._senders.node_of(message) == known.owner.node_id
 
-    def _read(self, topic: str, known: _Announced) -> None:
-        """Parse the newest description of the robot's own program, once."""
+    def _read(self) -> bool:
+        """Parse those that wait, first of who has just come, then the shortest; whether there were any.
+
+        When too much time went into them lately the rest waits: a program that changes a long description
+        again and again must not hold up the window, with its Stop.
+        """
+        now = self._clock()
+        self._may_read_s = min(READING_S, self._may_read_s + (now - self._looked_s) * READING_SHARE)
+        self._looked_s = now
+        wait = {topic: newest for topic in self._waiting if (newest := self._unread(topic)) is not None}
+        self._waiting = set(wait)
+
+        def turn(each: tuple[str, Message]) -> tuple[bool, int]:
+            return self._topics[each[0]].parsed is not None, len(each[1].data)
+
+        for topic, newest in sorted(wait.items(), key=turn):
+            if self._may_read_s <= 0:
+                break
+            began = self._clock()
+            self._parse(topic, newest)
+            self._may_read_s -= self._clock() - began
+            self._waiting.discard(topic)
+        return len(self._waiting) < len(wait)
+
+    def _unread(self, topic: str) -> Message | None:
+        """The newest description of the robot's own program, if nobody has parsed it yet."""
+        known = self._topics.get(topic)
+        if known is None or known.watch is None:
+            return None
         newest = next((told for told in reversed(known.told.values()) if self._is_owners(known, told)), None)
-        if newest is None or newest is known.parsed:
-            return
-        known.parsed, known.wrong = newest, ""
+        return None if newest is known.parsed else newest
+
+    def _parse(self, topic: str, newest: Message) -> None:
+        known = self._topics[topic]
+        known.parsed, known.wrong = newest, None
         try:
             robot = announced(newest)
-        except (NepError, DescriptionError):
+        except NepError:
             return  # the session's alert `message:<topic>` says so; what it said before still counts
-        known.wrong = wrong_topic(robot, topic) or ""
-        known.robot = None if known.wrong else robot
+        except DescriptionError as error:
+            said = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
+            whose = known.owner.words if known.owner is not None else topic
+            before = "" if known.robot is None else " What it said before still counts."
+            known.wrong = Claim(said, f"It comes from {whose}, whose driver is to be mended.{before}")
+            return
+        wrong = wrong_topic(robot, topic)
+        known.robot = robot if wrong is None else None
+        if wrong is not None:
+            known.wrong = Claim(f"{wrong}.", "Find out what this program is and close it.")

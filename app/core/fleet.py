@@ -89,7 +89,7 @@ class Fleet:
         self._links: dict[str, RobotLink] = {}
         self._processes = processes if processes is not None else Believed()
         self._senders = Senders()
-        self._announcements = Announcements(watches, self._senders)
+        self._announcements = Announcements(watches, self._senders, clock)
         self._names: dict[str, str] = {}
         self._view = GraphView(0, 0)
         self._held: deque[tuple[str, Message]] = deque(maxlen=MOST_HELD)
@@ -251,8 +251,7 @@ class Fleet:
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Take over what arrived: descriptions, answers, sensor values."""
-        self._announcements.add(batches)
-        if any(self._announcements.is_announced(topic) for topic in batches):
+        if self._announcements.add(batches):
             self._follow_announced()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():

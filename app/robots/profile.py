@@ -9,11 +9,13 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from itertools import count, islice
 from typing import TYPE_CHECKING
 
 from app import resources
 from app.robots.inputs import parameter_of, wrong_value
 from app.robots.members import as_part, names, part
+from nep.text import control_in
 
 if TYPE_CHECKING:
     from jsonschema import Draft7Validator
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
 _MOST_PROBLEMS = 20
 _DEEPEST = 40
+MOST_VALUES = 20_000
+"""A description with more values is not looked at further: each takes some 0.05 ms. Pepper has 900."""
 _LARGEST = 1e15
 _RESERVED = {"description", "command", "answer", "state", "world"}
 
@@ -40,31 +44,40 @@ def validate(model: object) -> tuple[str, ...]:
     if not isinstance(model, Mapping):
         return ("a description must be a JSON object",)
     model = dict(model)
-    strange = _not_json(model)
+    strange = _not_json(model, count(1))
     if strange is not None:
         return (strange,)
-    problems = [_sentence(error) for error in _validator().iter_errors(model)]
+    problems = [_sentence(error) for error in islice(_validator().iter_errors(model), _MOST_PROBLEMS)]
+    control = control_in(str(model.get("title")))
+    if control:
+        problems.append(f"title: '{control}' can't be used in a name, which would look like another one")
     if not problems:
         problems = list(_contradictions(model))
     return tuple(dict.fromkeys(problems))[:_MOST_PROBLEMS]
 
 
-def _not_json(value: object, path: str = "", depth: int = 0) -> str | None:
-    """The first thing in it that JSON does not have, that never ends, or that points elsewhere."""
-    if depth > _DEEPEST:
-        return f"{path or 'the description'} is nested too deeply"
+def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
+    """The first thing in it that JSON does not have, that never ends, or that points elsewhere.
+
+    `seen` counts the values.
+    """
+    if next(seen) > MOST_VALUES or depth > _DEEPEST:
+        deep = f"{path} is nested too deeply"
+        return deep if depth > _DEEPEST else f"the description has more than {MOST_VALUES} values"
     if isinstance(value, dict):
         for key, item in value.items():
             if not isinstance(key, str):
                 return f"{path or 'the description'} has a name that is not text: {key!r}"
             if key == "$ref":
                 return f"{path or 'the description'} uses $ref, which is not allowed here; write the part out"
-            found = _not_json(item, f"{path}.{key}" if path else key, depth + 1)
+            found = _not_json(item, seen, f"{path}.{key}" if path else key, depth + 1)
             if found is not None:
                 return found
         return None
     if isinstance(value, list):
-        found_items = (_not_json(item, f"{path}[{index}]", depth + 1) for index, item in enumerate(value))
+        found_items = (
+            _not_json(item, seen, f"{path}[{index}]", depth + 1) for index, item in enumerate(value)
+        )
         return next((found for found in found_items if found is not None), None)
     if isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
         return f"{path} is no usable number"

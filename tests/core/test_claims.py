@@ -47,6 +47,15 @@ def the_link(session: Session, name: str = "Pepper") -> RobotLink:
     return link
 
 
+class Clock:
+    """Stands still until somebody moves it."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
 def description(name: str = "Pepper", **topics: str) -> dict[str, object]:
     made = copy.deepcopy(dict(robot(name).source))
     made["rb:topics"] = {**cast("Mapping[str, object]", made.get("rb:topics") or {}), **topics}
@@ -344,6 +353,49 @@ def test_a_robot_that_slept_is_there_again_though_somebody_else_kept_its_topic_s
     assert list(announcements.robots) == []
     announcements.update(_two_programs("first"))
     assert [identity.node_id for _, _, identity in announcements.robots] == ["first"]
+
+
+def test_a_description_that_cant_be_used_is_told_and_what_was_said_before_counts(
+    session: Session, pepper: WireRobot, evil: nep.Node
+) -> None:
+    the_link(session)
+    wrong = description("Rover")
+    wrong["actions"] = {"do it": {}}
+    described = announce(evil, "/Rover/description", wrong)
+    said = claimed(session, "/Rover/description")
+    assert "The description of 'Rover' can't be used: actions" in said
+    assert "It comes from “evil” on" in said
+    assert "before" not in said
+    described.publish(description("Rover"))
+    tick_until(session, lambda: not session.alerts.has("claim:/Rover/description"))
+    the_link(session, "Rover")
+    described.publish(wrong)
+    assert "What it said before still counts." in claimed(session, "/Rover/description")
+    assert session.fleet.link("Rover").connected
+
+
+def test_descriptions_that_come_again_and_again_take_a_fifth_of_the_window_at_most() -> None:
+    """And whoever has just come is read before those who repeat themselves."""
+    clock = Clock()
+    announcements = Announcements(Watches(len, len), Senders(), clock)
+    topics = {"/Pepper/description": 1, "/Again/description": 2}
+    announcements.update(_view(topics))
+    reads: list[str] = []
+
+    def parse(topic: str, newest: nep.Message) -> None:
+        reads.append(topic)
+        announcements._topics[topic].parsed = newest
+        clock.now += 0.5
+
+    announcements._parse = parse  # the real one takes as long as the machine likes
+    for tick in range(1000):
+        again = nep.Message("/Again/description", b"x", "json", DESCRIPTION_TYPE, publisher=2)
+        announcements.add({"/Again/description": Batch([again])})
+        if tick == 500:
+            announcements.add({"/Pepper/description": _said_by(1)})
+        clock.now += 0.033
+    assert "/Pepper/description" in reads
+    assert 0.1 < 0.5 * len(reads) / clock.now < 0.25
 
 
 def test_senders_do_not_believe_who_takes_a_publishers_id() -> None:

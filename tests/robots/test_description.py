@@ -13,6 +13,7 @@ from app.robots.description import Parameter, announced, parse, td_for, topic_of
 from app.robots.inputs import check_input, from_words, parameter_of, to_words
 from nep.errors import NepError
 from nep.message import UNDECODED, Message
+from nep.text import control_in
 
 MODELS = sorted(resources.path("robots").glob("*.tm.jsonld"))
 
@@ -308,3 +309,34 @@ def test_a_huge_description_is_refused_before_it_is_decoded():
     with pytest.raises(DescriptionError, match=r"it has 1\.0 MB, and at most 1 MB are read"):
         announced(message)
     assert message.decoded is UNDECODED
+
+
+def test_of_a_description_with_more_values_than_any_robot_has_nothing_is_checked():
+    """Checking all of it took the window six seconds, and its Stop with it."""
+    described = td_for(model("pepper"), "Pepper")
+    described["actions"] = {f"do {number}": {"title": number} for number in range(25_000)}
+    with pytest.raises(DescriptionError, match="the description has more than 20000 values"):
+        announced(message_of(json.dumps(described).encode()))
+
+
+def test_only_so_many_problems_are_looked_for():
+    described = td_for(model("pepper"), "Pepper")
+    described["actions"] = {f"do {number}": {} for number in range(3000)}
+    assert len(validate(described)) <= 20
+
+
+@pytest.mark.parametrize("name", ["Arm\n", "Arm\u202e", "A\u200brm", "\x1b[2J"])
+def test_a_name_that_looks_like_another_one_is_refused_in_words_that_harm_nobody(name):
+    described = {**td_for(model("pepper"), "Pepper"), "title": name}
+    with pytest.raises(DescriptionError, match=r"title: '.*' can't be used in a name") as refused:
+        parse(described)
+    assert control_in(str(refused.value)) == ""
+
+
+def test_the_sentence_about_a_description_is_short_and_harmless():
+    described = {**td_for(model("pepper"), "Pepper"), "title": "\x1b" + "A" * 100_000}
+    described["actions"] = {"B" * 100_000: {"rb:block": 7}}
+    with pytest.raises(DescriptionError) as refused:
+        parse(described)
+    assert len(str(refused.value)) < 600
+    assert control_in(str(refused.value)) == ""
