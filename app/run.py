@@ -220,10 +220,10 @@ def _run(program: Program, found: Found, reach: _Reach, say: _Lines, interrupted
         was_interrupted = True
     with undisturbed():
         # at once; and again when the program is gone and can't move them any more
-        stopper.send_stop(ends=runner.program_id)
+        stopper.send_stop(ends=runner.program_key)
         runner.close()
         names = [*(robot.name for robot in found.robots if robot.name in program.robots), *told.silent]
-        report = stopper.stop_all(names, ends=runner.program_id)
+        report = stopper.stop_all(names, ends=runner.program_key)
         for line in stop_lines(report):
             say(line)
     if was_interrupted:

@@ -18,6 +18,7 @@ from app.core.child_process import MOST_BYTES, ChildProcess, home
 from app.core.child_process import child_command as child_command
 from app.core.runner_event import RunnerEvent as RunnerEvent
 from app.errors import RunnerError
+from app.robots.identity import program_of
 
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
@@ -54,8 +55,10 @@ class Runner:
     ) -> None:
         """`command` starts the child, by default this Python or this frozen Studio."""
         self.run = next(_runs)
-        self.program_id = f"program-{uuid.uuid4().hex[:8]}"
-        """Who the robots' commands are from; a stop names it, so that nothing it sent moves a robot later."""
+        self.program_key = uuid.uuid4().hex
+        """A stop with it ends the program: nothing it sent moves a robot later. Not told before."""
+        self.program_id = program_of(self.program_key)
+        """Who the robots' commands are from."""
         self.state: State = "ready"
         self._on_event = on_event
         self._command = tuple(command) if command is not None else child_command()

@@ -62,7 +62,7 @@ class Runs:
         self.pace_s = 0.0
         self._runner: Runner | None = None
         self._used: tuple[str, ...] = ()
-        self._program_id: str | None = None  # the last one's: robots refuse what still comes from it
+        self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
         self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
         self._labels: Mapping[str, str] = {}
         self._wanted: list[tuple[Robot, Sequence[str]]] = []  # what the program asks of its robots
@@ -293,7 +293,7 @@ class Runs:
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._wanted, self._told_owners, self._robots_told = wanted, owners, self._fleet.revision
-        self.kept, self._program_id = frozenset(program.robots), runner.program_id
+        self.kept, self._program_key = frozenset(program.robots), runner.program_key
         self._console.leave_out(runner.pid)
         last = self._run.last_words
         self._run = RunState("running", document.name, started_s=self._clock(), last_words=last)
@@ -342,7 +342,7 @@ class Runs:
             self._runner,
             self._network.stopper,
             run.asked,
-            self._program_id,
+            self._program_key,
         )
         self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
         self._stop_thread.start()

@@ -262,8 +262,8 @@ class RobotStopper:
     def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
         """Tell the robots to stop and do not wait.
 
-        `ends` is the id of a program: robots refuse what it still sends. A robot that can't (RIZE) must be
-        told again when the program is gone.
+        `ends` is the key of a program (`app.robots.identity`): robots refuse what it still sends. A robot
+        that can't (RIZE) must be told again when the program is gone.
         """
         for line in self._chosen(names):
             self._tell(line, _id(), ends)

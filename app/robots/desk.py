@@ -10,6 +10,7 @@ from typing import TypeAlias
 from app.errors import RobotValueError
 from app.robots.calls import Call, Failed
 from app.robots.declare import ActionSpec
+from app.robots.identity import program_of
 from app.robots.inputs import near_miss
 from app.robots.members import as_part, text
 from app.robots.parts import Action, Robot
@@ -59,7 +60,7 @@ class Desk:
         if operation == "stop":
             ended = text(message.get("ends"))
             if ended is not None:
-                self._ended.append(ended)
+                self._ended.append(program_of(ended))
             self._tasks.stop(self._answering(wanted, "stop", self._robot.safe_stop.action))
         elif operation == "cancel":
             self._cancel(wanted, str(message.get("action") or ""), publisher)

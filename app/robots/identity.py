@@ -7,6 +7,7 @@ do not lie to the master (docs/trust.md).
 
 from __future__ import annotations
 
+import hashlib
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -92,6 +93,15 @@ def reserved(robot: Robot) -> tuple[str, ...]:
     """The topics with which a robot is moved, or answers: no other robot may have them, too."""
     topics = robot.topics
     return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
+
+
+def program_of(key: str) -> str:
+    """The name that a program has in ``from`` when it is to be ended by nobody but who knows its key.
+
+    A stop whose ``ends`` is that key makes robots refuse what comes under this name from then on. Everybody
+    can read names: if a name were enough, one message of a stranger would lock a program out for good.
+    """
+    return f"program-{hashlib.sha256(key.encode('utf-8', 'replace')).hexdigest()[:16]}"
 
 
 def is_home(robot_name: str, topic: str) -> bool:

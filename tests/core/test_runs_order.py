@@ -20,7 +20,7 @@ from tests.blocks.fakes import until
 class Steps:
     """Writes down in which order it is called; stands for a runner and for a stopper."""
 
-    program_id = "p1"
+    program_key = "p1"
 
     def __init__(self) -> None:
         self.done: list[tuple[str, str | None]] = []

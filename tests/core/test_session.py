@@ -244,7 +244,7 @@ def test_a_killed_program_still_stops_its_robots(session: Session) -> None:
             while (message := commands.receive(0.0)) is not None:
                 heard.append(message.payload)
             stops = [command for command in heard if command["op"] == "stop"]
-            assert {stop["ends"] for stop in stops} == {runner.program_id}
+            assert {stop["ends"] for stop in stops} == {runner.program_key}
             assert [alert.id for alert in session.alerts.active] == ["program"]
         finally:
             driver.close()

@@ -21,6 +21,7 @@ from app import resources
 from app.robots import simulated, turtle
 from app.robots.description import Action, Parameter, Robot, parse, validate
 from app.robots.driver import Driver
+from app.robots.identity import program_of
 from app.robots.kit import Kind
 from tests.robots.conftest import Ears, FakeClock, eventually
 
@@ -114,9 +115,9 @@ class Bench:
     def running(self, wanted: str) -> None:
         eventually(lambda: "running" in self.ears.states(wanted))
 
-    def stop(self) -> dict[str, object]:
+    def stop(self, **more: object) -> dict[str, object]:
         wanted = self.new_id()
-        self.ears.command(id=wanted, op="stop")
+        self.ears.command(id=wanted, op="stop", **more)
         return self.ears.final(wanted, "stop", PATIENCE_S + self.robot.safe_stop.within_s)
 
     def finals(self, wanted: str) -> list[dict[str, object]]:
@@ -244,10 +245,17 @@ def test_the_stop_action_is_a_stop_too(bench) -> None:
 
 
 def test_a_stop_that_ends_a_program_refuses_what_it_sent_before(bench) -> None:
-    bench.ears.command(id=bench.new_id(), op="stop", ends="gone")
-    late = bench.invoke(bench.any_action(), "gone")
+    bench.ears.command(id=bench.new_id(), op="stop", ends="the key of a program")
+    late = bench.invoke(bench.any_action(), program_of("the key of a program"))
     assert bench.ears.final(late)["state"] == "canceled"
     assert "running" not in bench.ears.states(late)
+
+
+def test_nobody_else_ends_a_program(bench) -> None:
+    """Its name can be read by everybody: a stop that only names it stops the robot, and no more."""
+    assert bench.stop(ends="studio")["state"] == "succeeded"
+    asked = bench.invoke(bench.any_action(), "studio")
+    bench.running(asked)
 
 
 # ---- actions ---------------------------------------------------------------------------------------

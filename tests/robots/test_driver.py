@@ -10,6 +10,7 @@ import pytest
 import nep
 from app.core.runs import STOP_TIMEOUT_S
 from app.robots.driver import Driver
+from app.robots.identity import program_of
 from app.robots.kit import Failed
 from app.robots.task import Program, Task
 from app.robots.tasks import STOP_ANSWER_S
@@ -273,14 +274,27 @@ def test_the_kit_answers_a_stop_well_before_studio_gives_up():
 def test_a_late_command_of_a_stopped_program_moves_nothing(turtle):
     """A command that was on its way when its program was ended comes after the stop."""
     body, ears, _ = turtle
-    ears.command(id="s", op="stop", ends="p1")
+    ears.command(id="s", op="stop", ends="key")
     assert ears.final("s", "stop")["state"] == "succeeded"
-    ears.invoke("1", "move", program="p1")
+    ears.invoke("1", "move", program=program_of("key"))
     assert ears.final("1")["state"] == "canceled"
     assert not body.moving
     ears.invoke("2", "say", program="p2", text="hi")
     body.go_on.set()
     assert ears.final("2")["state"] == "succeeded"
+
+
+def test_a_stop_of_a_stranger_locks_no_program_out(turtle):
+    """Everybody reads who a command is from: that name alone, or anything like it, ends no program."""
+    body, ears, _ = turtle
+    name = program_of("key")
+    for number, ends in enumerate((name, "studio", "", name[8:], "x" * 100_000)):
+        ears.command(id=f"s{number}", op="stop", ends=ends)
+        assert ears.final(f"s{number}", "stop")["state"] == "succeeded"
+    body.go_on.set()
+    for number, program in enumerate((name, "studio")):
+        ears.invoke(f"{number}", "say", program=program, text="hi")
+        assert ears.final(f"{number}")["state"] == "succeeded"
 
 
 def test_the_stop_can_also_be_invoked_as_an_action(turtle):
