@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
+from shiboken6 import isValid
 
 from app.core.files import private_folder
 from nep.later import later
@@ -190,7 +191,8 @@ class Meeting(QObject):
 
     def _gone(self, socket: QtNetwork.QLocalSocket) -> None:
         self._heard.pop(socket, None)
-        socket.deleteLater()
+        if isValid(socket):  # not one that goes with the window
+            socket.deleteLater()
 
     def close(self) -> None:
         """Nobody finds this window any more."""

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalSocket
 
 from app.ui import single_window
@@ -209,3 +210,21 @@ def test_one_that_never_answers_does_not_hold_a_start_up(qtbot, name: str, monke
 def test_a_start_is_read() -> None:
     assert parse(b'{"files": ["/a.nepb"], "demo": true}') == Asked((Path("/a.nepb"),), True)
     assert parse(b"\xff") is None
+
+
+def test_a_window_that_goes_while_a_later_start_talks_to_it_raises_nothing(
+    qtbot, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Qt deletes the connection with the window, and says then that it is disconnected."""
+    raised: list[BaseException] = []
+    monkeypatch.setattr(sys, "excepthook", lambda _kind, error, _trace: raised.append(error))
+    window = QObject()
+    meeting = Meeting(name, lambda _asked: None, window)
+    line = QLocalSocket()
+    line.connectToServer(name)
+    assert line.waitForConnected(WAIT_MS)
+    qtbot.waitUntil(lambda: bool(meeting._heard), timeout=WAIT_MS)
+    with qtbot.waitSignal(window.destroyed, timeout=WAIT_MS):
+        window.deleteLater()
+    qtbot.waitUntil(lambda: line.state() == QLocalSocket.LocalSocketState.UnconnectedState, timeout=WAIT_MS)
+    assert raised == []
