@@ -25,22 +25,25 @@ _PLAIN = {
 _HANDLER = "nep.plain"
 _GONE = frozenset({errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])})
 """What writing into a pipe gives that nobody reads any more; Windows calls it an invalid argument."""
-_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
-"""What writing onto a disk gives that has no room, or is broken."""
+_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
+"""What writing onto a disk gives that has no room, or is broken, and into a stream that was closed before."""
 
 
 def prepare_streams() -> None:
     """Let the standard streams take every letter; what their encoding does not have becomes a plainer one.
 
-    A stream that was closed before the program started becomes the null device: its descriptor must not be
-    given to a socket, which would then be written to.
+    The descriptor of a stream that was closed before the program started must not be given to a socket, which
+    would then be written to: the null device takes it. Reading and writing what is closed fails, as it does
+    for every program; what is only said beside the results goes nowhere.
     """
     codecs.register_error(_HANDLER, _plainer)
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+    ways = {"stdin": os.O_WRONLY, "stdout": os.O_RDONLY, "stderr": os.O_WRONLY}
+    for name, way in ways.items():
         stream = getattr(sys, name)
         if stream is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - lives on
-        elif mode == "w" and isinstance(stream, TextIOWrapper):
+            mode, nowhere = "r" if name == "stdin" else "w", os.open(os.devnull, way)
+            setattr(sys, name, open(nowhere, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - lives on
+        elif name != "stdin" and isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=_HANDLER)
 
 
@@ -95,6 +98,8 @@ def output_problem(raised: OSError | None = None) -> str | None:
 
 
 def _words_of(error: OSError) -> str:
+    if error.errno == errno.EBADF:
+        return "it is closed"
     return "" if error.errno in _GONE else (error.strerror or str(error)).lower()
 
 

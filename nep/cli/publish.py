@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
 import sys
 import threading
@@ -17,7 +18,7 @@ import typer
 from nep.cli.complete import complete_topic
 from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
-from nep.cli.screen import say
+from nep.cli.screen import say, size
 from nep.codecs import CODECS, codec_for
 from nep.encoded import Encoded
 from nep.errors import EncodeError, NepError
@@ -25,6 +26,8 @@ from nep.pubsub import Publisher
 from nep.views import TopicInfo
 
 _SHOWN = 40
+_MOST_BYTES = 10**9
+"""What a file may have: far more than a message, but a device such as /dev/zero has no end."""
 _TEXT_TYPES = frozenset({"string"})
 _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 
@@ -135,11 +138,17 @@ def value_of(text: str, msg_type: str) -> object:
 
 def _read(file: Path, msg_type: str) -> bytes:
     try:
-        return file.read_bytes()
+        with file.open("rb") as opened:  # it may be a pipe, or a device that has no end
+            data = opened.read(_MOST_BYTES + 1)
     except OSError as error:
         raise EncodeError(msg_type, "file", f"'{file}' cannot be read: {error.strerror}") from error
     except ValueError as error:  # letters that no file's name has here
         raise EncodeError(msg_type, "file", f"'{file}' is no name of a file here") from error
+    if len(data) > _MOST_BYTES:
+        raise EncodeError(
+            msg_type, "file", f"'{file}' has more than the {size(_MOST_BYTES)} that a message may have"
+        )
+    return data
 
 
 def _publish_lines(publisher: Publisher, msg_type: str) -> None:
@@ -158,9 +167,15 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
 
 
 def _lines() -> Iterator[bytes]:
-    if sys.stdin.isatty():  # the console of Windows has letters, not bytes
-        return (line.encode("utf-8", "surrogateescape") for line in sys.stdin)
-    return iter(sys.stdin.buffer)
+    """Raises `NepError` when they cannot be read."""
+    try:
+        if sys.stdin.isatty():  # the console of Windows has letters, not bytes
+            yield from (line.encode("utf-8", "surrogateescape") for line in sys.stdin)
+        else:
+            yield from sys.stdin.buffer
+    except OSError as error:
+        why = "it is closed" if error.errno == errno.EBADF else (error.strerror or str(error)).lower()
+        raise NepError(f"the standard input cannot be read: {why}") from error
 
 
 def _repeat(publisher: Publisher, value: object, rate_hz: float, count: int) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -102,3 +103,10 @@ def test_a_file_can_be_published(tmp_path):
         value_of("@/nowhere/at/all", "bytes")
     with pytest.raises(EncodeError, match=r"@picture\.jpg"):
         value_of("hello", "image")
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="/dev/zero is a device of Unix")
+def test_a_device_without_end_is_no_file(monkeypatch):
+    monkeypatch.setattr("nep.cli.publish._MOST_BYTES", 1000)
+    with pytest.raises(EncodeError, match=r"more than the 1\.0 kB"):
+        value_of("@/dev/zero", "bytes")
