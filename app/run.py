@@ -32,8 +32,7 @@ from app.core.stopping import RobotStopper, StopTarget
 from app.errors import AppError, DescriptionError
 from app.robots.description import Robot, parse
 from app.robots.identity import DESCRIPTION_TYPE
-from nep.errors import MasterUnreachable, NepError
-from nep.network import unknown_host
+from nep.errors import NepError
 from nep.streams import tell
 from nep.text import escaped
 
@@ -92,8 +91,7 @@ def run_file(
     except KeyboardInterrupt:
         return INTERRUPTED
     except (AppError, NepError) as error:
-        unknown = unknown_host(error.address) if isinstance(error, MasterUnreachable) else None
-        say(f"{unknown or error}.")
+        say(f"{error}.")
         return UNUSABLE
     finally:
         say.tell_problem()

@@ -31,12 +31,12 @@ def master_address(address: str | None = None) -> str:
     if address is not None and not isinstance(address, str):
         raise TypeError(f"an address is a 'str' such as '{DEFAULT_MASTER}', not a '{type(address).__name__}'")
     chosen = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
-    if "[" in chosen or chosen.count(":") > 1:
+    if "://" not in chosen and ("[" in chosen or chosen.count(":") > 1):
         checked_host(chosen)
     host, colon, port = chosen.rpartition(":")
     if not colon:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
-    if not _HOST.fullmatch(host) or not port.isdigit() or int(port) > 65535:
+    if not _HOST.fullmatch(host) or not _is_possible(host) or not port.isdigit() or int(port) > 65535:
         raise NepError(f"'{chosen}' is no address of a master; write it as '{DEFAULT_MASTER}'")
     return chosen
 

@@ -147,7 +147,7 @@ class MasterUnreachable(NepError):  # noqa: N818 - the name that the specificati
         self.is_known = is_known
         if not is_known:
             super().__init__(
-                f"no computer is called '{address.rpartition(':')[0]}' here (waited {waited_s:g} s); "
+                f"no computer is called '{address.rpartition(':')[0]}' here; "
                 "look for a typing error, or write its address in numbers",
             )
             return

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 else:
     psutil = later("psutil")
 
-__all__ = ["ANY", "OwnAddress", "has_address", "nearest", "own_addresses", "unknown_host"]
+__all__ = ["ANY", "OwnAddress", "has_address", "nearest", "own_addresses"]
 
 ANY = "0.0.0.0"  # noqa: S104 - bound only where a person asked for it
 """All addresses of a computer, now and later."""
@@ -67,21 +67,6 @@ def nearest(endpoints: Sequence[str], master: str) -> str:
         if not is_loopback(address):
             return endpoint
     return ""
-
-
-def unknown_host(address: str) -> str | None:
-    """The sentence for an address whose host's name nobody knows here; None when it is known.
-
-    It asks the system, which may take seconds: for when nobody has answered anyway.
-    """
-    host = host_of(address).strip("[]")
-    try:
-        socket.getaddrinfo(host, None)
-    except (OSError, UnicodeError):
-        return (
-            f"no computer is called '{host}' here; look for a typing error, or write its address in numbers"
-        )
-    return None
 
 
 def _is_hidden(host: str) -> bool:

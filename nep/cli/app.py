@@ -10,8 +10,7 @@ import typer
 from nep.addresses import MASTER_VARIABLE, master_address
 from nep.cli import doctor, log, masters, nodes, topics
 from nep.cli.screen import say_error, write
-from nep.errors import MasterUnreachable, NepError
-from nep.network import unknown_host
+from nep.errors import NepError
 from nep.streams import output_problem, words_given
 from nep.version import __version__
 
@@ -62,7 +61,7 @@ def run() -> int:
     try:
         code = _code()
     except NepError as error:
-        say_error(_sentence(error))
+        say_error(str(error))
         code = 1
     except OSError as error:
         if output_problem(error) is None:
@@ -81,9 +80,3 @@ def _code() -> int:
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else 0 if ended.code is None else 1
     return 0
-
-
-def _sentence(error: NepError) -> str:
-    """What went wrong; of a master that is not reached, whether its name is known at all."""
-    unknown = unknown_host(error.address) if isinstance(error, MasterUnreachable) else None
-    return unknown or str(error)

@@ -16,7 +16,7 @@ import typer
 from nep.cli.complete import complete_more, complete_topic
 from nep.cli.graphs import Waiting, node_for
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, console, json_painter, say, show_json, size, write
+from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json, size, write
 from nep.cli.table_file import Fields, Table
 from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
@@ -186,7 +186,7 @@ class Lines:
         head = _head(message)
         if self._names_topic:
             head += f"  {escaped(message.topic)}"
-        room = self._console.width - len(head) - 2
+        room = self._console.width - cells(head) - 2
         if self._fields is not None and self._fields.names:
             values = self._fields.of(message)
             if values is None:
@@ -213,7 +213,7 @@ def _head(message: Message) -> str:
 
 
 def _body(message: Message, room: int, *, whole: bool) -> str:
-    """What a message says: on one line if `room` letters are enough or nothing can be laid out."""
+    """What a message says: on one line if `room` cells are enough or nothing can be laid out."""
     if message.codec == "image":
         return _picture(message)
     try:
@@ -230,7 +230,7 @@ def _body(message: Message, room: int, *, whole: bool) -> str:
     # decoded JSON is written again in a hundredth of the time that looking at each value takes
     is_exact = whole and message.codec == "json" and not _has_nan(message.data)
     line = json_of(payload).decode() if is_exact else presented(payload, whole=whole)
-    if len(line) <= room:
+    if len(line) <= room and cells(line) <= room:
         return line
     laid_out = (
         json_of(payload, indent=True).decode() if is_exact else presented(payload, whole=whole, indent=True)

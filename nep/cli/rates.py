@@ -16,7 +16,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.graphs import Waiting, node_for
 from nep.cli.measure import Frequency, Traffic, Window
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, rate, say, show_json, size, write
+from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
 from nep.errors import WaitTimeoutError
 from nep.message import Message
 from nep.nodes import Node
@@ -99,7 +99,7 @@ class _Report:
         self._subscribers: dict[str, Subscriber] = {}
         self._totals: dict[str, int] = {}
         self._heard_at = time.monotonic()
-        self._width = max(_NARROWEST, *(len(topic) for topic in topics))
+        self._width = max(_NARROWEST, *map(cells, topics))
 
     def run(self, count: int, timeout_s: float | None, master: str | None, *, as_json: bool) -> None:
         """Report until Ctrl+C, or `count` times. Raises `BadTopicError`, `WaitTimeoutError`."""
@@ -147,10 +147,10 @@ class _Report:
         return node.new_sub(topic, msg_type, sink=take)
 
     def _show(self, topic: str) -> None:
-        found, cells = self._figures(self._windows[topic], time.monotonic())
+        found, figures = self._figures(self._windows[topic], time.monotonic())
         lost = self._subscribers[topic].lost
         known = str(found.messages) if found else "0"
-        write(f"{self._line(topic, (*cells, known, UNKNOWN if lost is None else str(lost)))}\n")
+        write(f"{self._line(topic, (*figures, known, UNKNOWN if lost is None else str(lost)))}\n")
 
     def _show_json(self, topic: str) -> None:
         found, _ = self._figures(self._windows[topic], time.monotonic())
@@ -161,8 +161,8 @@ class _Report:
             {"topic": topic, "stamp_ns": time.time_ns(), **figures, "total": window.total, "lost": lost}
         )
 
-    def _line(self, topic: str, cells: Sequence[str]) -> str:
-        return topic.ljust(self._width) + "".join(cell.rjust(12) for cell in cells)
+    def _line(self, topic: str, figures: Sequence[str]) -> str:
+        return padded(topic, self._width) + "".join(figure.rjust(12) for figure in figures)
 
 
 def _frequency_cells(window: Window, now: float) -> tuple[Frequency | None, Sequence[str]]:

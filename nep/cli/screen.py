@@ -105,6 +105,21 @@ def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None
     out.print(table, soft_wrap=False)
 
 
+def cells(text: str) -> int:
+    """How many cells of a terminal a line takes: two for letters of the East and emoji, none for accents."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len  # noqa: PLC0415 - see `console`
+
+    return cell_len(text)
+
+
+def padded(text: str, width: int, justify: Literal["left", "right"] = "left") -> str:
+    """The text with spaces, so that it takes `width` cells."""
+    room = " " * (width - cells(text))
+    return text + room if justify == "left" else room + text
+
+
 def _total(widths: Sequence[int]) -> int:
     """How wide a table of these columns is."""
     return sum(widths) + _GAP * (len(widths) - 1)
@@ -121,7 +136,7 @@ def _blocks(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> Iterato
 
 def _fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
     return all(
-        len(cell) <= width and "\n" not in cell
+        cells(cell) <= width and "\n" not in cell
         for row in rows
         for cell, width in zip(row, widths, strict=True)
     )
@@ -132,11 +147,11 @@ def _laid_out(
 ) -> Iterator[str]:
     """The lines of a long table that needs no folding; rich takes a millisecond for each."""
     gap = " " * _GAP
-    align = [str.rjust if column.justify == "right" else str.ljust for column in columns]
 
-    def line(cells: Iterable[str]) -> str:
+    def line(texts: Iterable[str]) -> str:
         return gap.join(
-            put(cell, width) for put, cell, width in zip(align, cells, widths, strict=True)
+            padded(text, width, column.justify)
+            for column, text, width in zip(columns, texts, widths, strict=True)
         ).rstrip()
 
     yield line(column.head for column in columns)
@@ -147,7 +162,7 @@ def _laid_out(
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], room: int) -> list[int]:
     """How wide each column may be: what it needs, or less where others than whole ones have to give way."""
     widths = [
-        max(len(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))
+        max(cells(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))
         for at, column in enumerate(columns)
     ]
     kept = [column.is_whole or column.justify == "right" for column in columns]

@@ -4,6 +4,7 @@ import io
 import json
 
 import pytest
+from rich.cells import cell_len
 
 from nep.cli.screen import (
     UNKNOWN,
@@ -128,3 +129,26 @@ def test_a_terminal_too_narrow_for_a_table_gets_the_rows_one_below_the_other(mon
     assert screen.getvalue() == (
         "/Pepper/battery\n  type: json\n  publishers: one, two\n/b\n  type: string\n  rate: 1.0 /s\n"
     )
+
+
+WIDE = [("/日本語カメラ", "1"), ("/e\u0301te\u0301", "2"), ("/😀😀", "3"), ("/plain", "4")]
+
+
+@pytest.mark.parametrize("rows", [WIDE, WIDE * 60], ids=["short", "long"])
+def test_columns_stand_below_each_other_whatever_the_script(rows, capsys):
+    show_table([Column("topic"), Column("rate"), Column("lost", "right")], [(*row, "9") for row in rows])
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("/")]
+    assert len(lines) == len(rows), "each takes one line"
+    ends = {cell_len(line.rstrip()) for line in lines}
+    starts = {cell_len(line[: line.index(number)]) for line, (_, number) in zip(lines, rows, strict=True)}
+    assert len(ends) == 1
+    assert len(starts) == 1
+
+
+def test_a_wide_name_is_whole_where_it_has_room(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "30")
+    show_table(
+        [Column("topic", is_whole=True), Column("type")], [("/" + "日本" * 5, "a/type/that/is/folded")]
+    )
+    assert "/" + "日本" * 5 in capsys.readouterr().out

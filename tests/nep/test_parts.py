@@ -219,7 +219,21 @@ def test_addresses(monkeypatch: pytest.MonkeyPatch, given_: str | None, address:
     assert addresses.master_address(None) == "127.0.0.1:5"
 
 
-@pytest.mark.parametrize("address", [":5", "host:port", "host:99999", "no host at all", "a b:5", "ho/st:5"])
+@pytest.mark.parametrize(
+    "address",
+    [
+        ":5",
+        "host:port",
+        "host:99999",
+        "no host at all",
+        "a b:5",
+        "ho/st:5",
+        "1.2.3",
+        "1.2.3.999:5",
+        "http://x:1",
+        "http://[x]:1",
+    ],
+)
 def test_what_is_no_address(address: str) -> None:
     with pytest.raises(nep.NepError, match="is no address of a master"):
         addresses.master_address(address)
