@@ -18,6 +18,7 @@ from app.core.mailbox import Batch
 from app.core.moving import MayNotMoveError, Moving
 from app.core.rize_names import RizeNames
 from app.core.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
+from app.core.run_view import STOPPING_SHOWN_AFTER_S
 from app.core.settings import Settings
 from app.core.stopping import MOST_TOPICS
 from app.core.tries import Tries
@@ -202,6 +203,17 @@ class Fleet:
         if name in self._links:
             self.world(name, change)
 
+    def told_to_stop(self, names: Iterable[str]) -> None:
+        """These robots are being told to stop; `stopped` says what each did."""
+        for link in map(self._links.get, names):
+            if link is not None and link.stop_began_s is None:
+                link.stop_began_s = self._clock()
+
+    @property
+    def stopping(self) -> tuple[str, ...]:
+        """Those that were told to stop and have not answered yet."""
+        return tuple(link.name for link in self._links.values() if link.stop_began_s is not None)
+
     def stopped(self, words: Mapping[str, str], wrong: Mapping[str, str]) -> None:
         """These robots were told to stop; the words say what each did, by its name.
 
@@ -213,6 +225,7 @@ class Fleet:
             if link is None:
                 continue
             link.last_stop, link.not_stopped = said, wrong.get(name, "")
+            link.stop_began_s, link.stopping = None, False
             if not link.not_stopped:
                 link.left_busy = False
                 self._tries.end_all(link, "canceled")
@@ -260,6 +273,8 @@ class Fleet:
                 self._rize.tell(name)
         for link in self._links.values():
             self._read(link, batches)
+            began_s = link.stop_began_s
+            link.stopping = began_s is not None and self._clock() - began_s >= STOPPING_SHOWN_AFTER_S
         self._tries.look(self._links.values())
 
     @property

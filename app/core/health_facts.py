@@ -111,6 +111,8 @@ def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[flo
 def _stop(link: RobotLink) -> HealthFact:
     if link.goes_on:
         return HealthFact("Stop", "error", link.goes_on)
+    if link.stopping:
+        return HealthFact("Stop", "off", "told to stop; its answer is waited for")
     if link.last_stop is not None:
         kinds = {"answered": "ok", "sent": "off"}
         return HealthFact("Stop", kinds.get(link.last_stop.partition(" ")[0], "error"), link.last_stop)

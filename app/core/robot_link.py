@@ -16,6 +16,7 @@ SENDER = "studio"
 """Who the commands of try-outs are from."""
 TRIES_KEPT = 40
 NOT_STOPPED = "not stopped"
+STOPPING = "stopping"
 MAY_MOVE = "may still move"
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 
@@ -73,6 +74,8 @@ class RobotLink:
     anything or was asked, ``answered_s`` when it last answered, ``gone_s`` since when it is away.
     ``not_stopped`` says why the last stop is not proven ("Arm may still move: the brake does not answer"),
     ``goes_on`` what it says itself about actions that it could not end; both are empty when all is well.
+    ``stop_began_s`` is since when the answer to a stop is waited for, ``stopping`` whether that is long
+    enough to be said.
     ``identity`` is the program that it is; ``earlier`` are programs of its name that went away and may still
     move it, ``topics_before`` those of its earlier descriptions. ``was_real`` says that it has not always
     been virtual, ``left_busy`` that it did something for a person when it went away.
@@ -93,6 +96,8 @@ class RobotLink:
     last_stop: str | None = None
     not_stopped: str = ""
     goes_on: str = ""
+    stop_began_s: float | None = None
+    stopping: bool = False
     identity: Identity | None = None
     earlier: tuple[Identity, ...] = ()
     topics_before: tuple[Topics, ...] = ()
@@ -115,14 +120,16 @@ class RobotLink:
 
     @property
     def state(self) -> str:
-        """``away``, ``not stopped``, ``silent``, ``busy`` or ``ready``.
+        """``not stopped``, ``stopping``, ``away``, ``silent``, ``busy`` or ``ready``.
 
-        One that has not stopped may still move when it is away.
+        One that has not stopped, or has not answered yet, may still move when it is away.
         """
-        if not self.connected:
-            return NOT_STOPPED if self.not_stopped else "away"
-        if self.not_stopped or self.goes_on:
+        if self.not_stopped or (self.connected and self.goes_on):
             return NOT_STOPPED
+        if self.stopping:
+            return STOPPING
+        if not self.connected:
+            return "away"
         if self.silent is not None or self.mute:
             return "silent"
         return "busy" if self.running else "ready"

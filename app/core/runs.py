@@ -140,6 +140,7 @@ class Runs:
             self.stop()
             return
         stopper, post = self._network.stopper, self._post_event
+        self._fleet.told_to_stop([name])
 
         def stop_it() -> None:
             post(OneStopped(_asked(stopper, (name,), on_late=lambda late: post(LateAnswer(None, late)))))
@@ -235,6 +236,9 @@ class Runs:
         elif event.number == self._stop_number:
             if isinstance(event, RobotAnswered):
                 run.answered.append(event.robot)
+                if event.robot.wrong or not event.robot.waits:
+                    same = [robot for robot in run.answered if robot.name == event.robot.name]
+                    self._tell_fleet(StopReport(tuple(same), 0.0))
             else:
                 run.dashed = bool(self.stopped_blocks)
                 self._take_report(event.report)
@@ -333,7 +337,11 @@ class Runs:
             for link in self._fleet.links
             if link.connected or link.not_stopped or link.name in self.kept
         )
-        run.asked = names if names is not None else everybody
+        # those that an earlier stop has told and that have not answered: its own report is not waited for
+        run.asked = tuple(
+            dict.fromkeys((*(names if names is not None else everybody), *self._fleet.stopping))
+        )
+        self._fleet.told_to_stop(run.asked)
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(

@@ -168,8 +168,8 @@ class ActionCard(Card):
         self.tries.show_tries(tries)
         self.past.setVisible(bool(self.tries.rows))
 
-    def show_invocation(self, invocation: Invocation | None) -> None:
-        """What became of the newest try."""
+    def show_invocation(self, invocation: Invocation | None, *, may_move: bool = False) -> None:
+        """What became of the newest try; ``may_move``: its robot is not proven to stand still."""
         self._running = invocation is not None and invocation.running
         can_cancel = self._running and (
             self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))
@@ -188,10 +188,12 @@ class ActionCard(Card):
         self.words.setText(words)
         self.left.setText(left)
         self.left.setVisible(bool(left))
-        self._say_end(None if self._running else invocation)
+        self._say_end(None if self._running else invocation, may_move)
 
-    def _say_end(self, invocation: Invocation | None) -> None:
-        said, status, sentence = end_words(invocation) if invocation is not None else ("", "ok", "")
+    def _say_end(self, invocation: Invocation | None, may_move: bool) -> None:
+        said, status, sentence = ("", "ok", "")
+        if invocation is not None:
+            said, status, sentence = end_words(invocation, may_move=may_move)
         self.result.set(said, status)
         if invocation is not None and invocation.state == "succeeded":
             self.words.setText(output_words(self.action, invocation.output))

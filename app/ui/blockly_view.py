@@ -36,6 +36,7 @@ class BlocklyView(BlocklyHost):
         self._tabs = Tabs()
         self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
         self._live: Json = {"values": {}, "old": []}
+        self._alarms: Json = {}
         self._waiting: dict[int, Callable[[Json], None]] = {}
         self._tokens = 0
         self._bridge.edited.connect(self._edited)
@@ -139,6 +140,16 @@ class BlocklyView(BlocklyHost):
             self._live = live
             self._tell("live", self._live)
 
+    def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
+        """Say in the toolbox what is wrong with robots: name -> status of its dot, words.
+
+        All others have the dot of a robot that is connected or not.
+        """
+        told: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
+        if told != self._alarms:
+            self._alarms = told
+            self._tell("alarms", told)
+
     # -- commands ---------------------------------------------------------------------------------
 
     def undo(self) -> None:
@@ -181,6 +192,7 @@ class BlocklyView(BlocklyHost):
 
     def _page_came(self) -> None:
         self._tell("definitions", self._definitions)
+        self._tell("alarms", self._alarms)
         self._tabs.page_gone()
         self._send_tab()
 

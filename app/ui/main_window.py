@@ -10,7 +10,7 @@ from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.faults import survived
-from app.core.robot_link import NOT_STOPPED
+from app.core.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.ui.app_bar import AppBar
 from app.ui.arrangements import Arrangements
@@ -256,7 +256,7 @@ class MainWindow(QMainWindow):
         self.bar.show_robots(words, status)
         if self.showing == START:
             self.bar.stop.show_state(view.stop_word, ring=view.state == "stopping", filled=self._may_move())
-            there = any(link.state in {"ready", "busy"} for link in self.session.fleet.links)
+            there = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
             self.start.show_robot(words if there else "", status)
         elif self.showing == "behaviour":
             self.run_bar.show_view(view)
@@ -283,7 +283,8 @@ class MainWindow(QMainWindow):
             self.setWindowTitle(title)
 
     def _moves(self) -> bool:
-        return self.session.runs.active or any(link.state == "busy" for link in self.session.fleet.links)
+        moves = {"busy", STOPPING}
+        return self.session.runs.active or any(link.state in moves for link in self.session.fleet.links)
 
     def _may_move(self) -> bool:
         """Whether a program, or a robot that did not stop, may move something now."""

@@ -15,7 +15,10 @@ from app.ui.widgets import Chip, paint
 if TYPE_CHECKING:
     from app.core.robot_link import RobotLink
 
-STATUS = {"ready": "ok", "busy": "running", "silent": "warn", "not stopped": "error", "away": "off"}
+STATUS = {
+    "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
+    "away": "off",
+}  # fmt: skip
 LIST_WIDTH = 300
 
 

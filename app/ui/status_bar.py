@@ -10,6 +10,7 @@ from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.health_facts import facts_of, has_told
+from app.core.robot_link import STOPPING
 from app.core.session import Session
 from app.ui.others_sheet import words_of
 from app.ui.theme import Theme
@@ -61,6 +62,8 @@ class Facts:
             icon, status = _worst(wrong)
             whose = links[0].name if len(links) == 1 else f"{len(links)} robots"
             return icon, f"{whose}: {len(wrong)} to look at", status
+        if any(link.state == STOPPING for link in links):
+            return "circle-dashed", "Waiting for the answer to Stop", "off"
         who = f"{links[0].name} is" if len(links) == 1 else f"{len(links)} robots are"
         if all(has_told(link, facts) for link, facts in found):
             return "circle-check", f"{who} well", "ok"

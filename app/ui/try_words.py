@@ -95,14 +95,17 @@ def left_words(made: Invocation) -> str:
     return f"{max(0, int(left_s + 0.999))} s left"
 
 
-def end_words(made: Invocation) -> tuple[str, str, str]:
-    """How a try ended: the words of its chip, the chip's status, and a sentence when there is one to say."""
+def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
+    """How a try ended: the words of its chip, the chip's status, and a sentence when there is one to say.
+
+    ``may_move``: the robot is not proven to stand still, so nothing is called stopped.
+    """
     took = seconds_words(made.elapsed_s)
     if made.state == "succeeded":
         return f"done in {took}", "ok", ""
     if made.state == "canceled":
         reason = made.error if made.error and made.error != "stopped" else ""
-        return f"stopped after {took}", "off", _sentence(reason)
+        return f"{'ended' if may_move else 'stopped'} after {took}", "off", _sentence(reason)
     return "not done", "error", _sentence(made.error or "The robot did not say why")
 
 

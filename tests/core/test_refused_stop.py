@@ -23,6 +23,7 @@ from tests.blocks.samples import block, number, started, workspace
 from tests.blocks.wire_robot import WireRobot
 from tests.core.waiting import tick_until
 
+LONG_S = 60.0
 SAID = "Arm may still move: the brake does not answer"
 
 
@@ -153,6 +154,71 @@ def test_run_prints_what_the_robot_said(master: Master, arm: Driver, tmp_path: P
     assert "Arm may still move" in out.getvalue()
     assert "the brake does not answer. Switch it off by hand." in out.getvalue()
     assert "did not answer." not in out.getvalue()
+
+
+@pytest.fixture
+def patient(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
+    """Waits for the answers to a stop as long as a test needs."""
+    monkeypatch.setattr("app.core.stopping.STOP_TIMEOUT_S", 120.0)
+    monkeypatch.setattr("app.core.stopping.LONGEST_STOP_S", 120.0)
+    return session
+
+
+def answers(session: Session, robot: WireRobot, count: int = 1) -> None:
+    """It answers so many stops that it heard and kept silent about."""
+    tick_until(session, lambda: len(robot.heard("stop")) >= count, LONG_S)
+    for command in robot.heard("stop"):
+        robot._say(command, "succeeded")
+
+
+def test_while_a_stop_is_not_answered_nothing_looks_well(patient: Session, pepper: WireRobot) -> None:
+    link = the_link(patient, "Pepper")
+    pepper.silent = {"stop"}
+    patient.runs.stop()
+    tick_until(patient, lambda: link.state == "stopping", LONG_S)
+    assert link.chip.removeprefix("virtual, ") == "stopping"
+    assert robots_chip(patient) == ("Pepper stopping", "running")
+    (fact,) = (each for each in facts_of(link, patient.topics, 0.0, str) if each.title == "Stop")
+    assert (fact.status, fact.words) == ("off", "told to stop; its answer is waited for")
+    answers(patient, pepper)
+    tick_until(patient, lambda: patient.runs.view().state == "proven", LONG_S)
+    assert link.state == "ready"
+
+
+def test_who_answers_first_is_shown_while_others_are_waited_for(patient: Session, master: Master) -> None:
+    """One is proven, one refuses, one is silent: the first two are known before the third."""
+    robots = {name: WireRobot(master.address, name) for name in ("Good", "Bad", "Deaf")}
+    try:
+        links = {name: the_link(patient, name) for name in robots}
+        bad = robots["Bad"]
+        refuse = bad._say
+        bad._say = lambda command, state, error="": refuse(command, "failed", "no")  # type: ignore[method-assign]
+        robots["Deaf"].silent = {"stop"}
+        patient.runs.stop()
+        tick_until(patient, lambda: links["Bad"].state == "not stopped", LONG_S)
+        tick_until(patient, lambda: links["Good"].last_stop is not None, LONG_S)
+        tick_until(patient, lambda: links["Deaf"].state == "stopping", LONG_S)
+        assert (links["Good"].state, patient.runs.view().state) == ("ready", "stopping")
+        assert robots_chip(patient) == ("Bad: may still move", "error")
+        answers(patient, robots["Deaf"])
+        tick_until(patient, lambda: patient.runs.view().state == "unanswered", LONG_S)
+        assert links["Deaf"].state == "ready"
+    finally:
+        for robot in robots.values():
+            robot.close()
+
+
+def test_a_later_stop_asks_those_that_have_not_answered_an_earlier_one(
+    patient: Session, pepper: WireRobot
+) -> None:
+    link = the_link(patient, "Pepper")
+    pepper.silent = {"stop"}
+    patient.runs.stop_robot("Pepper")
+    patient.runs._stop(())
+    assert patient.runs._run.asked == ("Pepper",)
+    answers(patient, pepper, 2)
+    tick_until(patient, lambda: patient.runs.view().state == "proven", LONG_S)
+    tick_until(patient, lambda: link.state == "ready", LONG_S)
 
 
 # ---- what a robot says later, and of itself ------------------------------------------------------------

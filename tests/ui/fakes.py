@@ -223,6 +223,7 @@ class RobotLink:
     gone_s: float | None = None
     not_stopped: str = ""
     goes_on: str = ""
+    stopping: bool = False
 
 
 class Kept(dict[str, object]):

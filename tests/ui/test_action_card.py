@@ -74,6 +74,8 @@ def test_what_was_replaced_says_by_what_and_a_plain_stop_says_no_more(card) -> N
     card.show_invocation(tried("canceled", error="turn took its place", elapsed_s=1.0))
     assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "Turn took its place.")
     assert card.error.property("role") == "textSecondary"  # that is no error
+    card.show_invocation(tried("canceled", elapsed_s=1.0), may_move=True)
+    assert card.result.text == "ended after 1.0 s"  # its robot is not proven to stand still
     card.show_invocation(tried("canceled", error="stopped", elapsed_s=1.0))
     assert not card.error.isVisible()
 

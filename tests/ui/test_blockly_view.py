@@ -82,6 +82,41 @@ def test_equal_definitions_touch_nothing(qtbot, view, person):
     assert them.ask("!!document.querySelector('.nepHeading[data-same=yes]')")
 
 
+DOTS = """Object.fromEntries([...document.querySelectorAll('.nepHeading.robot')].map(
+    each => [each.textContent, each.querySelector('i').className])
+    .filter(([name]) => name.startsWith('Rover')))"""
+
+
+def test_a_robot_that_may_still_move_has_no_green_dot_also_while_a_block_is_in_the_hand(view, person):
+    them = person(START)
+    view.set_definitions(with_rover())
+    them.wait_for(DOTS, {"Rover": "on"})
+    them.open_category("Control")
+    start = them.hold(".blocklyFlyout .control_wait")
+    them.move(start, QPoint(700, 300))
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    view.set_alarms({"Rover": ("running", "stopping")})
+    them.wait_for(DOTS, {"Roverstopping": "running"})
+    view.set_alarms({"Rover": ("error", "may still move"), "__proto__": ("error", "not stopped")})
+    them.wait_for(DOTS, {"Rovermay still move": "error"})
+    them.drop(QPoint(700, 300))
+    more = with_rover()
+    more["toolbox"]["contents"][-2]["connected"] = False  # it goes away, and may move all the same
+    view.set_definitions(more)
+    them.wait_for(DOTS, {"Rovermay still move": "error"})
+    view.set_alarms({})
+    them.wait_for(DOTS, {"Rovernot connected": "off"})
+
+
+def test_a_page_that_comes_back_knows_which_robots_may_still_move(qtbot, view, person):
+    them = person(START)
+    view.set_definitions(with_rover())
+    view.set_alarms({"Rover": ("error", "may still move")})
+    with qtbot.waitSignal(view.ready, timeout=60_000):
+        os.kill(view.web.page.renderProcessPid(), signal.SIGKILL)
+    them.wait_for(DOTS, {"Rovermay still move": "error"})
+
+
 def test_a_block_whose_definition_changes_keeps_its_place_and_undo(qtbot, view, person):
     wait = {"type": "control_wait", "id": "w", "x": 140, "y": 140}
     them = person(wait, START)

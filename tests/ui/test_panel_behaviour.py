@@ -111,6 +111,22 @@ def test_blocks_of_absent_robots_are_grey(panel, window) -> None:
     assert editor(panel).last("set_absent") == ()
 
 
+def test_the_toolbox_says_which_robots_may_move_or_do_not_answer(panel, window) -> None:
+    link = window.session.fleet.links[0]
+    assert editor(panel).last("set_alarms") == {}
+    for state, chip, status in (
+        ("stopping", "virtual, stopping", "running"),
+        ("not stopped", "virtual, may still move", "error"),
+        ("silent", "virtual, does not answer", "warn"),
+    ):
+        link.state, link.chip = state, chip
+        panel.refresh()
+        assert editor(panel).last("set_alarms") == {link.name: (status, chip.removeprefix("virtual, "))}
+    link.state, link.chip = "busy", "virtual, busy"
+    panel.refresh()
+    assert editor(panel).last("set_alarms") == {}
+
+
 def test_sensor_blocks_say_their_newest_value(panel, window) -> None:
     document = window.session.document
     document.sensors, document.edits = (("Pepper", "battery"), ("NAO", "battery")), 5

@@ -9,6 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
+from app.core.robot_link import NOT_STOPPED, STOPPING
 from app.ui.behaviour_tab import TabFacts
 from app.ui.behaviour_title import BehaviourTitle
 from app.ui.blocks_wait import BlocksWait
@@ -16,17 +17,20 @@ from app.ui.editor import Editor, blockly
 from app.ui.live_words import live_words
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.program_view import ProgramView
+from app.ui.robot_item import STATUS
 from app.ui.widgets import EmptyAction, EmptyState
 
 if TYPE_CHECKING:
     from app.blocks import Program
     from app.core.document import Document
+    from app.core.robot_link import RobotLink
     from app.core.runs import Runs
     from app.core.watches import Look, Watch
 
 LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
 TOOLBOX_WIDTH = 196
 EMPTY_SIZE = (460, 250)
+ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
 
 
 class BehaviourPanel(PanelWidget):
@@ -103,6 +107,9 @@ class BehaviourPanel(PanelWidget):
             self.editor.highlight(runs.running_blocks if mine else ())
             self.editor.mark_stopped(runs.stopped_blocks if mine else ())
             self.editor.set_errors(runs.block_errors if mine else {})
+        alarms = alarms_of(self.session.fleet.links)
+        if self._new("alarms", alarms):
+            self.editor.set_alarms(alarms)
         if self._ticks % LIVE_EVERY == 0:
             self._show_live()
         self.waiting.tell(ready=self.editor.is_ready)
@@ -279,6 +286,15 @@ class BehaviourPanel(PanelWidget):
     def shut(self) -> None:
         self._sensors = self._offered = ()
         self._look_at(set())
+
+
+def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
+    """What the toolbox says of robots that may move or do not answer, instead of a green dot."""
+    return {
+        link.name: (STATUS[link.state], link.chip.removeprefix("virtual, "))
+        for link in links
+        if link.state in ALARMS
+    }
 
 
 def tab_facts(document: Document, runs: Runs) -> TabFacts:

@@ -28,7 +28,10 @@ TOUCHABLE = ("head", "left_hand", "right_hand")
 STALE = QColor(90, 90, 90, 150)
 STALE_AFTER_S = 2.0
 """A virtual robot tells how it is many times a second, also when it does nothing."""
-STATUS = {"ready": "ok", "busy": "running", "silent": "warn", "not stopped": "error", "away": "off"}
+STATUS = {
+    "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
+    "away": "off",
+}  # fmt: skip
 KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
 
 

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.moving import MayNotMoveError
+from app.core.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, RobotInputError
 from app.ui.action_card import ActionCard
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -218,11 +219,12 @@ class RobotsPanel(PanelWidget):
         self._make_forms()
         if self._new("head", link.state, link.chip):
             self.chip.set(link.chip.removeprefix("virtual, "), STATUS.get(link.state, "ok"))
+        may_move = link.state in {NOT_STOPPED, STOPPING}
         for name, card in self.cards.items():
             made = link.invocations.get(name)
             now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()
-            if self._new(f"card {name}", *now):
-                card.show_invocation(made)
+            if self._new(f"card {name}", may_move, *now):
+                card.show_invocation(made, may_move=may_move)
                 card.show_tries(tuple(link.tried))
 
     def _options(self, name: str) -> Sequence[str]:

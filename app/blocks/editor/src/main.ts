@@ -11,6 +11,7 @@ import {type Tab} from './tab';
 import {type Definitions, type Shown, Tabs} from './tabs';
 import {putVariables} from './theme';
 import {type Tokens, useTokens} from './tokens';
+import {type Alarm, showAlarms} from './toolbox';
 
 interface Bridge {
   told: {connect(slot: (name: string, payload: string) => void): void};
@@ -87,6 +88,7 @@ class Editor {
     stopped: (ids: string[]) => this.shown.states.markStopped(ids),
     errors: (errors: Record<string, string>) => this.shown.states.setErrors(errors),
     absent: (ids: string[]) => this.shown.states.setAbsent(ids),
+    alarms: (alarms: Record<string, Alarm>) => showAlarms(alarms),
     live: (it: {values: Record<string, string>; old: string[]}) => this.shown.states.setLive(it.values, it.old),
     flush: (token: number) => this.bridge.flushed(token, this.shown.program.flush()),
     change: (state: Record<string, unknown>) => this.shown.change(state),

@@ -35,9 +35,26 @@ function noteOf(def: Def): string {
   return def['virtual'] === true ? 'virtual' : '';
 }
 
+/** What is wrong with a robot now: a status of the design (its dot has that colour), and the words for it. */
+export interface Alarm {
+  status: string;
+  words: string;
+}
+
+let alarms = new Map<string, Alarm>();
+const headings = new Set<Heading>();
+
+/** The headings of these robots say so, at once and whatever is in the hand: a dot must not stay green. */
+export function showAlarms(now: Record<string, Alarm>): void {
+  alarms = new Map(Object.entries(now));
+  for (const heading of headings) heading.dress();
+}
+
 /** "Blocks", or a robot's name with a filled dot (connected) or an empty ring (not). */
 class Heading extends Blockly.ToolboxItem {
   private div: HTMLDivElement | null = null;
+  private readonly dot = document.createElement('i');
+  private readonly note = document.createElement('span');
 
   override init(): void {
     const def = (this.toolboxItemDef_ ?? {}) as unknown as Def;
@@ -48,15 +65,22 @@ class Heading extends Blockly.ToolboxItem {
     const name = document.createElement('b');
     name.textContent = text(def['name']) || text(def['text']);
     if (typeof def['connected'] === 'boolean') {
-      const dot = document.createElement('i');
-      dot.className = def['connected'] ? 'on' : 'off';
-      div.append(dot);
+      div.append(this.dot);
       div.classList.add('robot');
     }
-    const note = document.createElement('span');
-    note.textContent = text(def['note']) || noteOf(def);
-    div.append(name, note);
+    div.append(name, this.note);
     this.div = div;
+    headings.add(this);
+    this.dress();
+  }
+
+  /** Dot and note: what is wrong now, else whether the robot is connected. */
+  dress(): void {
+    const def = (this.toolboxItemDef_ ?? {}) as unknown as Def;
+    const alarm = typeof def['connected'] === 'boolean' ? alarms.get(text(def['name'])) : undefined;
+    this.dot.className = alarm?.status ?? (def['connected'] ? 'on' : 'off');
+    this.note.className = alarm?.status ?? '';
+    this.note.textContent = alarm?.words ?? (text(def['note']) || noteOf(def));
   }
 
   override getDiv(): Element | null {
@@ -68,6 +92,7 @@ class Heading extends Blockly.ToolboxItem {
   }
 
   override dispose(): void {
+    headings.delete(this);
     this.div?.remove();
   }
 }
