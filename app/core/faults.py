@@ -54,7 +54,11 @@ class SaidOnce:
         self._counts: dict[tuple[object, ...], int] = {}
 
     def told(self, record: logging.LogRecord) -> logging.LogRecord | None:
-        """The record as it is to be written, or None; one that was written before says how often it came."""
+        """The record as it is to be written, or None; one that was written before says how often it came.
+
+        It never raises: whoever logs must not end because of the words.
+        """
+        record = _sayable(record)
         key = (record.name, record.levelno, _place(record) or record.getMessage())
         count = self._counts.pop(key, 0) + 1
         while len(self._counts) >= FAULTS_KEPT:
@@ -68,6 +72,19 @@ class SaidOnce:
         again.msg, again.args = f"{record.getMessage()} ({count} times)", ()
         again.exc_info, again.exc_text = None, None  # the first one told where
         return again
+
+
+def _sayable(record: logging.LogRecord) -> logging.LogRecord:
+    """The record; where its values do not fit its text, or can't be said, one with the text only."""
+    try:
+        record.getMessage()
+    except Exception as error:  # noqa: BLE001  values are of any class
+        text = record.msg if isinstance(record.msg, str) else type(record.msg).__name__
+        made = logging.makeLogRecord(record.__dict__)
+        made.msg, made.args = f"{text} (its values can't be said: {type(error).__name__})", ()
+        return made
+    else:
+        return record
 
 
 def _place(record: logging.LogRecord) -> tuple[object, ...] | None:

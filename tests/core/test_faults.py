@@ -325,3 +325,31 @@ def test_the_source_outlives_a_graph_that_nobody_can_take(
     finally:
         source.close()
     assert "can't follow the network" in caplog.text
+
+
+class Unsayable:
+    def __str__(self) -> str:
+        raise ValueError("no words")
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "said"),
+    [
+        ("%d items", "many", "%d items (its values can't be said: TypeError)"),
+        ("it is %s", Unsayable(), "it is %s (its values can't be said: ValueError)"),
+        (Unsayable(), None, "Unsayable (its values can't be said: ValueError)"),
+    ],
+)
+def test_who_logs_what_can_not_be_said_goes_on_and_the_text_is_kept(
+    tmp_path: Path, text: object, value: object, said: str
+) -> None:
+    """Any library may do so; Python's own handlers survive it, too."""
+    logger = logging.Logger("a library")  # noqa: LOG001 - without the handlers of pytest, which raise
+    handler = LogFile(tmp_path)
+    logger.addHandler(handler)
+    for _ in range(10):
+        logger.warning(text, *([] if value is None else [value]))
+    handler.close()
+    written = (tmp_path / "studio.log").read_text()
+    assert written.count(said) == 2
+    assert "(10 times)" in written
