@@ -14,6 +14,7 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, TextIO
 
+from nep.forks import watch
 from nep.text import escaped
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class Terminal(io.TextIOBase):
         self._is_writing = False
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
+        watch(self)
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
@@ -70,8 +72,7 @@ class Terminal(io.TextIOBase):
             self._waiting.append(text)
             self._size += len(text)
             if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name="nep-terminal", daemon=True)
-                self._thread.start()
+                self._begin()
             self._changed.notify_all()
         return len(text)
 
@@ -97,6 +98,22 @@ class Terminal(io.TextIOBase):
 
     def __exit__(self, *_exc: object) -> None:
         self.close()
+
+    def forked(self) -> None:
+        """In a child: the thread is not there; what waits is its parent's to write. See `nep.forks`."""
+        self._changed = threading.Condition()
+        self._thread = None
+        self._waiting.clear()
+        self._size = self._lines_dropped = 0
+        self._is_writing = False
+
+    def _begin(self) -> None:
+        thread = threading.Thread(target=self._run, name="nep-terminal", daemon=True)
+        try:
+            thread.start()
+        except RuntimeError:  # the interpreter is ending (from 3.12 on), or no thread can be had now
+            return
+        self._thread = thread
 
     # ---- in the thread
 

@@ -17,7 +17,7 @@ import pytest
 import nep
 from nep.masters import is_running
 from nep.terminal import LineFormatter, Terminal
-from tests.nep.programs import eventually
+from tests.nep.programs import eventually, running
 
 if sys.platform == "linux":
     import fcntl
@@ -157,3 +157,45 @@ def test_a_master_whose_terminal_is_blocked_serves_on_and_ends(tmp_path: Path) -
         process.kill()
         process.wait(5.0)
         os.close(reading)
+
+
+@pytest.mark.parametrize("ends", [False, True])
+def test_a_terminal_that_gets_no_thread_keeps_what_it_is_given(
+    monkeypatch: pytest.MonkeyPatch, ends: bool
+) -> None:
+    """As at the interpreter's end from 3.12 on; whoever writes, or ends it, must not be hit."""
+    given = io.StringIO()
+    terminal = Terminal(given)
+
+    def no_thread(_thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(threading.Thread, "start", no_thread)
+        assert terminal.write("first\n") == 6
+        terminal.close(30.0) if ends else terminal.write("second\n")
+    terminal.write("there\n")
+    terminal.close(30.0)
+    assert given.getvalue().splitlines() == ([] if ends else ["first", "second", "there"])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has no fork")
+def test_a_forked_child_writes_to_the_terminal_too() -> None:
+    """Its parent's thread is not there: what it says would wait for ever."""
+    code = """
+    import os, sys
+    from nep.terminal import Terminal
+    terminal = Terminal(sys.stdout)
+    terminal.write("parent\\n")
+    assert terminal.drain(30.0)
+    terminal._changed.acquire()  # another thread writes just now
+    child = os.fork()
+    if child == 0:
+        terminal.write("child\\n")
+        terminal.close(30.0)
+        os._exit(0)
+    terminal._changed.release()
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    """
+    with running(code) as program:
+        assert [program.line() for _ in range(3)] == ["parent", "child", "0"]
