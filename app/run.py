@@ -69,10 +69,7 @@ def run_file(
         known = _known(descriptions)
         wanted = robots_named(workspace)
         with nep.node("behaviour runner", master=master) as node:
-            found = find_robots(node, robot_wait_s, wanted=wanted, known=known) if wanted else Found()
-            if compile_behaviour(workspace, found.robots, absent=known).publishes:
-                found = find_robots(node, EVERYBODY_S, wanted=(), known=known)  # it may move any of them
-            found = _judged(found)
+            found = _judged(_robots_for(workspace, node, robot_wait_s, known))
             for claim in found.claims:
                 say(f"warning: {claim}")
             program = compile_behaviour(workspace, found.robots, absent=known, name=name)
@@ -95,6 +92,17 @@ def run_file(
         return UNUSABLE
     finally:
         say.tell_problem()
+
+
+def _robots_for(
+    workspace: Mapping[str, object], node: nep.Node, wait_s: float, known: Sequence[Robot]
+) -> Found:
+    """The robots that a behaviour names, once they are there; all that are there when it publishes."""
+    wanted = robots_named(workspace)
+    found = find_robots(node, wait_s, wanted=wanted, known=known) if wanted else Found()
+    if compile_behaviour(workspace, found.robots, absent=known).publishes:
+        found = find_robots(node, EVERYBODY_S, wanted=(), known=known)  # it may move any of them
+    return found
 
 
 def _judged(found: Found) -> Found:

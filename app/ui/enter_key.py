@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QWindow
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QAbstractButton, QApplication, QPushButton, QWidget
+
+from app.ui.every_window import EveryWindow
 
 _ENTER = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter})
 _PLAIN = frozenset({Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier})
 
 
-class EnterKey(QObject):
+class EnterKey(EveryWindow):
     """Listens to the keys of every window of ours that a person uses; the system's own buttons know Enter."""
-
-    def __init__(self, window: QWidget) -> None:
-        """``window`` lives as long as this."""
-        super().__init__(window)
-        self._home = window
-        application = QApplication.instance()
-        if isinstance(application, QGuiApplication):
-            application.focusWindowChanged.connect(self._listen_to)
-        self._listen_to(QGuiApplication.focusWindow())
-
-    def _listen_to(self, window: QWindow | None) -> None:
-        if window is not None:
-            window.removeEventFilter(self)
-            window.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Give the button under the keyboard a Space instead; holding Enter down does not repeat it."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QWindow
+from PySide6.QtGui import QKeyEvent, QKeySequence, QMouseEvent
 from PySide6.QtWidgets import QAbstractButton, QApplication
 
+from app.ui.every_window import EveryWindow
 from app.ui.widgets import Button, StopButton
 
 _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
@@ -32,7 +33,7 @@ def shut_popups() -> None:
         continue
 
 
-class StopKeys(QObject):
+class StopKeys(EveryWindow):
     """Hears the keys of every window of ours before anything in it does.
 
     A shortcut is not enough: an open menu or list, a page or a field that claims the key would have it.
@@ -43,17 +44,8 @@ class StopKeys(QObject):
         self, parent: QObject, keys: Callable[[], Collection[str]], stop: Callable[[], object]
     ) -> None:
         """``keys`` are Stop's keys of the moment, as `QKeySequence` spells them; ``stop`` is done at once."""
-        super().__init__(parent)
         self._keys, self._stop = keys, stop
-        application = QApplication.instance()
-        if isinstance(application, QGuiApplication):
-            application.focusWindowChanged.connect(self._listen_to)
-        self._listen_to(QGuiApplication.focusWindow())
-
-    def _listen_to(self, window: QWindow | None) -> None:
-        if window is not None:
-            window.removeEventFilter(self)
-            window.installEventFilter(self)
+        super().__init__(parent)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in _KINDS and isinstance(event, QKeyEvent):
