@@ -209,9 +209,10 @@ class RobotStopper:
             self._view = view
             targets = [line.target for line in self._lines.values()]
             self._senders.learn(view, {way.answer for target in targets for way in target.ways})
-            for asked in self._asked.values():
-                self._judge_again(asked)
+            late = [said for asked in self._asked.values() for said in self._judge_again(asked)]
             self._changed.notify_all()
+        for tell, said in late:
+            tell(said)
 
     def expect(self, targets: Iterable[StopTarget]) -> None:
         """These are the programs of the robots now; it takes no time, `set_robots` does the rest."""
@@ -281,8 +282,8 @@ class RobotStopper:
         By default it waits as long as their descriptions say that they need, and a second at least. The
         report has a line for each of `names`, also for one that could not be told. `on_answer` is called in
         this thread for each robot as it answers, and at the end for each that did not. `on_late` is called in
-        the node's thread when one answers later than that, or says at last that it stands still. `ends` as in
-        `send_stop`.
+        the node's thread, or in that of `see`, when one answers later than that, or says at last that it
+        stands still. `ends` as in `send_stop`.
         """
         names = None if names is None else tuple(names)
         began = self._clock()
@@ -432,7 +433,7 @@ class RobotStopper:
             for each in asked:
                 if not each.serving:
                     each.serving |= self._serving(each)
-                    self._judge_again(each)
+                    self._judge_again(each)  # none of it is late: they are asked just now
 
     def _serving(self, asked: _Asked) -> dict[str, RobotStop | None]:
         """Who must answer: the robot's own program first, then whoever else serves its commands, by node.
@@ -478,13 +479,14 @@ class RobotStopper:
             if asked is not None and late is not None and asked.late is not None:
                 asked.late(late)
 
-    def _judge_again(self, asked: _Asked) -> None:
-        """Look at the answers again whose publishers were not known."""
+    def _judge_again(self, asked: _Asked) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
+        """Look again at answers whose publishers were not known; what comes too late, and whom to tell.
+
+        The lock is held here: whoever is told may need it.
+        """
         waiting, asked.unknown = list(asked.unknown), deque(maxlen=UNKNOWN_KEPT)
-        for message in waiting:
-            late = self._judge(asked, message)
-            if late is not None and asked.late is not None:
-                asked.late(late)
+        late = [self._judge(asked, message) for message in waiting]
+        return [(asked.late, said) for said in late if said is not None and asked.late is not None]
 
     def _judge(self, asked: _Asked, message: Message) -> RobotStop | None:
         """Take an answer if it is of a program that must give one; what it says when it comes too late.

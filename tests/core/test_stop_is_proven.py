@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -236,6 +237,29 @@ def test_a_late_answer_is_still_taken(stopper, pepper) -> None:
     assert stopper.stop_all(timeout_s=0.1, on_late=late.append).silent == ("Pepper",)
     assert len(late) == 2
     assert report.with_late(RobotStop("Other", True, 1.0)) is report
+
+
+def test_who_is_told_of_a_late_answer_may_ask_the_stopper(stopper, pepper) -> None:
+    """The answer waited until the master told whose it is: whoever hears that is told with no lock held."""
+    pepper.silent = {"stop"}
+    free: list[bool] = []
+
+    def late(_robot: RobotStop) -> None:
+        asking = threading.Thread(target=lambda: stopper.robots)
+        asking.start()
+        asking.join(2.0)
+        free.append(not asking.is_alive())
+
+    stopper.stop_all(timeout_s=0.1, on_late=late)
+    (command,) = pepper.heard("stop")
+    (asked,) = stopper._asked.values()
+    answer = {"id": command["id"], "op": "stop", "action": "stop", "state": "failed", "error": "stuck"}
+    publisher = pepper._answer._spec.id
+    topic, payload = pepper.described.topics.answer, json.dumps(answer).encode()
+    with stopper._changed:
+        asked.unknown.append(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
+    stopper.see(stopper._node.graph())
+    until(lambda: free == [True])
 
 
 def test_the_words_of_a_refusal_are_the_robots_own_and_harmless(stopper, pepper) -> None:
