@@ -6,25 +6,29 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-__all__ = ["at_least", "flag", "function", "one_of", "seconds", "text"]
+__all__ = ["WrongTypeError", "at_least", "flag", "function", "one_of", "seconds", "text"]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
 
 
+class WrongTypeError(TypeError, ValueError):
+    """An argument of a wrong type: a `ValueError` as every wrong argument, and what Python calls it."""
+
+
 def text(name: str, value: object) -> str:
-    """`value` itself when it is a text with something in it. Raises `TypeError`, `ValueError`."""
+    """`value` itself when it is a text with something in it. Raises `ValueError`."""
     if not isinstance(value, str):
-        raise TypeError(f"{name} is a '{_kind(value)}'; give a 'str'")
+        raise WrongTypeError(f"{name} is a '{_kind(value)}'; give a 'str'")
     if not value:
         raise ValueError(f"{name} is empty; give a name such as 'json'")
     return value
 
 
 def flag(name: str, value: object) -> bool:
-    """`value` itself when it is True or False. Raises `TypeError`."""
+    """`value` itself when it is True or False. Raises `ValueError`."""
     if not isinstance(value, bool):
-        raise TypeError(f"{name} is {value!r}; give True or False")
+        raise WrongTypeError(f"{name} is {value!r}; give True or False")
     return value
 
 
@@ -36,29 +40,29 @@ def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
 
 
 def at_least(name: str, value: object, least: int) -> int:
-    """`value` itself when it is a whole number and not below `least`. Raises `TypeError`, `ValueError`."""
+    """`value` itself when it is a whole number and not below `least`. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
-        raise TypeError(f"{name} is {value!r}; give a whole number from {least} on")
+        raise WrongTypeError(f"{name} is {value!r}; give a whole number from {least} on")
     if value < least:
         raise ValueError(f"{name} is {value}; give a whole number from {least} on")
     return value
 
 
 def seconds(name: str, value: object) -> float | None:
-    """`value` itself when it is a time: 0 or more seconds, or None. Raises `TypeError`, `ValueError`."""
+    """`value` itself when it is a time: 0 or more seconds, or None. Raises `ValueError`."""
     if value is None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise TypeError(f"{name} is {value!r}; give seconds, 0 or more, or None")
+        raise WrongTypeError(f"{name} is {value!r}; give seconds, 0 or more, or None")
     if not value >= 0.0:  # also what is not a number
         raise ValueError(f"{name} is {value}; give seconds, 0 or more, or None")
     return None if math.isinf(value) else value
 
 
 def function(name: str, value: F) -> F:
-    """`value` itself when it can be called. Raises `TypeError`."""
+    """`value` itself when it can be called. Raises `ValueError`."""
     if not callable(value):
-        raise TypeError(f"{name} is a '{_kind(value)}'; give a function")
+        raise WrongTypeError(f"{name} is a '{_kind(value)}'; give a function")
     return value
 
 

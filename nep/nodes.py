@@ -18,7 +18,7 @@ import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: 
 
 from nep import forks
 from nep.addresses import checked_host, master_address
-from nep.arguments import at_least, flag, function, one_of, seconds, text
+from nep.arguments import WrongTypeError, at_least, flag, function, one_of, seconds, text
 from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
 from nep.backends.choosing import backend_named
 from nep.codecs import codec_for
@@ -154,8 +154,8 @@ class Node:
         """A publisher. The first message reaches every subscriber that was there before this returned.
 
         `latched`: whoever subscribes later gets the last message at once. Raises `MasterUnreachable`,
-        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` or
-        `TypeError` for what is none of the allowed arguments.
+        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` for
+        what is none of the allowed arguments.
         """
         number = next(self._numbers)
         spec = PublisherSpec(
@@ -236,7 +236,7 @@ class Node:
             return self.hybrid()
         if not isinstance(configuration, Hybrid | Direct):
             kind = type(configuration).__name__
-            raise TypeError(f"configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'")
+            raise WrongTypeError(f"configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'")
         return configuration
 
     def _subscribed(self, inlet: Inlet, spec: SubscriberSpec) -> Subscriber:
