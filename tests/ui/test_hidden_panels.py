@@ -68,9 +68,9 @@ def graph() -> GraphView:
 
 
 class Case:
-    """A window with the real panels on a session that talks to nobody, and its clock."""
+    """A window with the real panels on a session that talks to nobody, and its clock, or the computer's."""
 
-    def __init__(self, home: Path, theme: Theme) -> None:
+    def __init__(self, home: Path, theme: Theme, *, own_clock: bool = True) -> None:
         self.now = 100.0
         self.source = Wishes()
         self.session = Session(
@@ -83,7 +83,8 @@ class Case:
         self.session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
         self.session._mailbox.post_event(GraphSeen(graph(), 0.0))
         panels = {**PanelShelf(), "behaviour": PANELS["behaviour"]}
-        self.window = MainWindow(self.session, theme, panels, clock=lambda: self.now)
+        clock = {"clock": lambda: self.now} if own_clock else {}
+        self.window = MainWindow(self.session, theme, panels, **clock)
 
     def tick(self, seconds: float = 0.0) -> None:
         self.now += seconds
@@ -140,6 +141,32 @@ def test_a_closed_panel_looks_at_nothing_and_does_again_when_it_is_opened(qtbot,
     settle(qtbot, case, case.dock("camera"))
     assert CAMERA in case.source.wanted
     assert case.source.asked.count(CAMERA) == before + 1
+
+
+@pytest.mark.parametrize("how", ["closed", "behind a tab", "in the other layout", "minimised"])
+def test_by_the_computers_clock_too(qtbot, theme: Theme, home: Path, how: str) -> None:
+    case = Case(home, theme, own_clock=False)
+    qtbot.addWidget(case.window)
+    case.window.show()
+    case.window.show_layout("developer")
+    image = case.dock("image")
+    image.panel.show_topic(OTHER)
+    qtbot.waitUntil(lambda: image.panel.isVisible() and OTHER in case.source.wanted)
+    if how == "closed":
+        image.close()
+    elif how == "behind a tab":
+        case.dock("camera")
+    elif how == "in the other layout":
+        case.window.show_layout("behaviour")
+    else:
+        case.window.showMinimized()
+
+    def is_let_go() -> bool:
+        case.window.tick()
+        return OTHER not in case.source.wanted
+
+    qtbot.waitUntil(is_let_go, timeout=30_000)
+    case.window.close()
 
 
 def test_a_panel_behind_another_tab_looks_at_nothing(qtbot, case: Case) -> None:

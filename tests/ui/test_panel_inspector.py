@@ -82,6 +82,18 @@ def test_a_latched_message_from_before_says_when_it_was_sent(panel, window) -> N
     assert "latency" in message_facts(half_an_hour_ago, now - 10**9), "it came while somebody looked"
 
 
+def test_a_latched_message_from_before_shows_no_latency(panel, window) -> None:
+    latched = Message("/blackboard", b"1", "json", "json", stamp_ns=time.time_ns() - 1800 * 10**9, seq=1)
+    latched.kind = kind_of("/blackboard", "json", "json", is_latched=True)
+    topic = window.session.topics["/blackboard"]
+    topic.newest, topic.received = latched, topic.received + 1
+    window.session.topics.values_revision += 1
+    panel.show_topic("/blackboard")
+    panel.refresh()
+    assert "seq 1" in panel.foot.facts.text()
+    assert "latency" not in panel.foot.facts.text()
+
+
 def test_how_long_a_message_took_does_not_grow_while_it_is_looked_at(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard())
