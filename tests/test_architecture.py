@@ -224,6 +224,26 @@ def test_no_process_opens_a_console_window_on_windows() -> None:
     ] == []
 
 
+def places_that_replace_files(tree: ast.AST) -> list[int]:
+    """Lines that put a file in the place of another by themselves: text is replaced with two arguments."""
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and (
+            ast.unparse(node.func) in {"os.replace", "os.rename", "os.renames"}
+            or (node.func.attr in {"replace", "rename"} and len(node.args) == 1 and not node.keywords)
+        )
+    ]
+
+
+def test_files_are_replaced_in_one_place_which_tries_again_on_windows() -> None:
+    assert places_that_replace_files(ast.parse("path.replace(other)\n'a'.replace('a', 'b')\n")) == [1]
+    found = {module.name for module in modules() if places_that_replace_files(module.tree)}
+    assert found - {"nep.replacing", "app.ui.blockly_view"} == set(), "the latter replaces a tab"
+
+
 def test_qt_does_not_lose_references_of_none() -> None:
     """PySide6 6.12.0 for Linux loses one at every void call; Python 3.10 and 3.11 then abort."""
     program = (

@@ -23,6 +23,7 @@ from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
 from nep.later import later
+from nep.network import unknown_host
 from nep.nodes import Node
 from nep.version import __version__
 from nep.views import GraphView
@@ -87,6 +88,7 @@ def gather(
         loopback_problem(),
         installs.install_of(master_pid) if master_pid is not None else None,
         tuple(_programs(view)),
+        unknown_host(chosen) or "" if view is None and master_port is None else "",
     )
 
 

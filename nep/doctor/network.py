@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nep.addresses import is_loopback
+from nep.addresses import host_of, is_loopback
 from nep.doctor.facts import Facts, PortFact, ProcessFact
 from nep.doctor.verdict import Finding, ago, counted
 
@@ -38,6 +38,13 @@ def masters(facts: Facts) -> Iterator[Finding]:
     if facts.view is not None:
         yield _running(facts, holder)
         yield from _of_another_version(facts, holder)
+    elif facts.unknown_host:
+        yield Finding(
+            "master:unknown",
+            "error",
+            f"No computer is called “{host_of(facts.address)}” here, so no master is found.",
+            "Look for a typing error, or write its address in numbers.",
+        )
     elif holder is not None and holder.is_master:
         yield Finding(
             "master:hung",

@@ -142,6 +142,16 @@ def test_what_cannot_be_sent_is_the_same_with_and_without_a_listener(
     eventually(lambda: not node.graph().alerts)
 
 
+def test_whoever_begins_to_listen_ends_no_publisher(make: Make) -> None:
+    pub = make("a").new_pub("topic")
+    bad = {"joints": {1, 2}}
+    pub.publish(bad)
+    sub = make("b").new_sub("topic")
+    pub.publish(bad)
+    pub.publish(1)
+    assert sub.listen(timeout_s=2.0) == (True, 1)
+
+
 def test_what_is_latched_and_cannot_be_sent_leaves_what_was_latched_before(make: Make) -> None:
     pub = make("a").new_pub("topic", latched=True)
     pub.publish("good")

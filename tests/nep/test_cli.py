@@ -129,6 +129,9 @@ def test_a_name_that_no_computer_has_is_the_right_sentence():
     done = run("--master", "nosuchhost.invalid:7781", "topic", "list")
     assert done.returncode == 1
     assert done.stderr.startswith("nep: no computer is called 'nosuchhost.invalid' here; ")
+    doctor = run("doctor", "--master", "nosuchhost.invalid:7781")
+    assert "No computer is called" in doctor.stdout
+    assert "Start one" not in doctor.stdout
     assert run("--master", "not an address", "topic", "list").stderr.startswith(
         "nep: 'not an address:7780' is no"
     )

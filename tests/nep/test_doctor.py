@@ -98,6 +98,13 @@ def test_no_master_says_how_to_start_one():
     assert "on that computer" in far.mend
 
 
+def test_a_master_whose_name_nobody_knows_is_not_told_to_be_started():
+    made = found(view=None, address="lap.top:7780", master_port=None, unknown_host="no computer is called")
+    assert made["master:unknown"].sentence == "No computer is called “lap.top” here, so no master is found."
+    assert "typing error" in made["master:unknown"].mend
+    assert "master:none" not in made
+
+
 def test_a_foreign_program_on_the_masters_port_is_named_with_the_way_out():
     one = found(view=None, master_port=PortFact(7780, "", True, OTHER))["master:foreign"]
     assert one.sentence == "Port 7780 is held by “python3 server.py” (process 77), which is no master."

@@ -80,6 +80,13 @@ def test_none_is_missed_and_none_is_made_up(payload):
     assert (teller.count == 1) == (nan_in(payload) is not None)
 
 
+def test_who_publishes_nan_is_told_so(master, caplog):
+    with nep.node("robot") as node, node.new_sub("/odom") as sub:
+        node.new_pub("/odom").publish({"x": math.nan})
+        assert sub.listen(timeout_s=5) == (True, {"x": None})
+        assert "'/odom' sends NaN or infinity as null" in caplog.text
+
+
 def test_a_publisher_counts_them_and_its_readers_get_null(master, caplog):
     with nep.node("robot") as node, node.new_sub("/odom") as sub:
         pub = node.new_pub("/odom")

@@ -56,6 +56,12 @@ def test_a_name_has_one_to_two_hundred_bytes() -> None:
         assert len(str(raised.value)) < 400
 
 
+@pytest.mark.parametrize("name", ["a\x1b[2J", "a\nb", "a\u202eb", "\x9b2J", "x" * 201], ids=repr)
+def test_no_node_is_made_with_such_a_name(name: str) -> None:
+    with pytest.raises(ValueError, match="node"):
+        nep.node(name, "memory")
+
+
 @given(st.text(st.characters(categories=["L", "N", "P", "S", "Zs", "Cc", "Cf", "Cs", "Zl", "Zp"])))
 def test_what_is_escaped_moves_no_cursor_and_has_one_line(text: str) -> None:
     shown = escaped(text)
