@@ -30,8 +30,9 @@ _ENDPOINT = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re
 def master_address(address: str | None = None) -> str:
     """`address`, else $NEP_MASTER, else "127.0.0.1:7780"; the port 7780 is added when there is none."""
     if address is not None and not isinstance(address, str):
-        kind = type(address).__name__
-        raise WrongTypeError(f"an address is a 'str' such as '{DEFAULT_MASTER}', not a '{kind}'")
+        raise WrongTypeError(
+            f"an address is a 'str' such as '{DEFAULT_MASTER}', not a '{type(address).__name__}'"
+        )
     chosen = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
     if "://" not in chosen and ("[" in chosen or chosen.count(":") > 1):
         checked_host(chosen)
