@@ -23,7 +23,6 @@ from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
 from nep.later import later
-from nep.network import unknown_host
 from nep.nodes import Node
 from nep.version import __version__
 from nep.views import GraphView
@@ -60,7 +59,7 @@ def gather(
     """
     chosen = master_address(address)
     number = int(chosen.rpartition(":")[2])
-    view, answered_s = _ask(chosen)
+    view, answered_s, is_known = _ask(chosen)
     listening = processes.listening()
     master_port = _port(number, "the master's", listening) if _is_here(chosen) else None
     holder = master_port.holder if master_port is not None else None
@@ -88,7 +87,7 @@ def gather(
         loopback_problem(),
         installs.install_of(master_pid) if master_pid is not None else None,
         tuple(_programs(view)),
-        unknown_host(chosen) or "" if view is None and master_port is None else "",
+        is_known,
     )
 
 
@@ -104,13 +103,16 @@ def hindrance(address: str | None = None) -> Finding | None:
     return None
 
 
-def _ask(address: str) -> tuple[GraphView | None, float | None]:
+def _ask(address: str) -> tuple[GraphView | None, float | None, bool]:
+    """The graph, how long it took, and whether the name of the master's computer is known."""
     began = time.monotonic()
     try:
         with Node(f"nep-doctor-{os.getpid()}", master=address) as node:
-            return node.graph(_ASK_S), time.monotonic() - began
+            return node.graph(_ASK_S), time.monotonic() - began, True
+    except nep.errors.MasterUnreachable as error:
+        return None, None, error.is_known
     except (nep.errors.NepError, zmq.ZMQError, OSError):
-        return None, None
+        return None, None, True
 
 
 def _is_here(address: str) -> bool:

@@ -99,8 +99,7 @@ class Facts:
     hides it from programs that are started here. `loopback` says why programs of this computer cannot reach
     each other, "" when they can. `master_install` is where the master that answers was started from, None
     when that is not known. `programs` are those of this computer that have nodes, as far as the system tells
-    of their files. `unknown_host` says that the master's name means no computer, "" when it does or when
-    nobody asked.
+    of their files. Not `is_known`: no computer has the name that the master's address begins with.
     """
 
     now_s: float
@@ -123,4 +122,4 @@ class Facts:
     loopback: str = ""
     master_install: Install | None = None
     programs: tuple[ProgramFact, ...] = ()
-    unknown_host: str = ""
+    is_known: bool = True

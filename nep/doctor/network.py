@@ -38,7 +38,7 @@ def masters(facts: Facts) -> Iterator[Finding]:
     if facts.view is not None:
         yield _running(facts, holder)
         yield from _of_another_version(facts, holder)
-    elif facts.unknown_host:
+    elif not facts.is_known:
         yield Finding(
             "master:unknown",
             "error",

@@ -311,12 +311,15 @@ def test_all_forms_of_hosts_are_endpoints(endpoint: str) -> None:
 
 @pytest.mark.parametrize("endpoint", ["ipc:///tmp/x", "inproc://x", "udp://127.0.0.1:9", "tcp://a b:9", "x"])
 def test_no_program_without_a_key_registers_such_an_endpoint_either(master: Master, endpoint: str) -> None:
-    own = "5" * 16
-    with attacker_at(master, own.encode()) as attacker:
-        assert not isinstance(attacker.ask(Join(NodeRecord(own, "Mallory", "host", 1))), Refused)
-        record = PublisherRecord(77, "/arm/state", "json", "json", (endpoint,))
-        assert isinstance(attacker.ask(AddPublisher(own, record)), Refused)
-    assert "/arm/state" not in master.view().topics
+    own = NodeRecord("5" * 16, "Mallory", "host", 1)
+
+    def record(where: str) -> PublisherRecord:
+        return PublisherRecord(77, "/arm/state", "json", "json", (where,))
+
+    with attacker_at(master, own.id.encode()) as attacker:
+        assert isinstance(attacker.ask(AddPublisher(own, record(endpoint))), Refused)
+        assert "/arm/state" not in master.view().topics
+        assert isinstance(attacker.ask(AddPublisher(own, record("tcp://127.0.0.1:9"))), Added)
 
 
 def test_what_no_program_may_register_is_refused_counted_and_named(master: Master, victims: Victims) -> None:

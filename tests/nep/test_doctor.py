@@ -99,7 +99,7 @@ def test_no_master_says_how_to_start_one():
 
 
 def test_a_master_whose_name_nobody_knows_is_not_told_to_be_started():
-    made = found(view=None, address="lap.top:7780", master_port=None, unknown_host="no computer is called")
+    made = found(view=None, address="lap.top:7780", master_port=None, is_known=False)
     assert made["master:unknown"].sentence == "No computer is called “lap.top” here, so no master is found."
     assert "typing error" in made["master:unknown"].mend
     assert "master:none" not in made
