@@ -24,7 +24,7 @@ from app.core.settings import home
 from app.ui import fonts, messages, single_window, turns
 from app.ui.commands import Commands
 from app.ui.first_paint import AfterFirstPaint
-from app.ui.incoming_files import IncomingFiles
+from app.ui.incoming_files import Application, IncomingFiles
 from app.ui.logo import LogoEngine
 from app.ui.main_window import MainWindow
 from app.ui.panel_shelf import PanelShelf
@@ -65,7 +65,7 @@ def make_application() -> QApplication:
     turns.shorten()
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontShowIconsInMenus)
-    application = QApplication(sys.argv[:1])
+    application = Application(sys.argv[:1])
     application.setApplicationName("nep-studio")
     application.setApplicationDisplayName("NEP Studio")
     application.setDesktopFileName("nep-studio")
@@ -171,9 +171,9 @@ def run(options: Options) -> int:
     if not options.alone:
         first.append(lambda: single_window.Meeting(meeting_place, commands.do_asked, window))
     soon.put_first(first)
-    incoming = IncomingFiles(window, commands.files.open_all)
-    if sys.platform == "darwin":
-        application.installEventFilter(incoming)  # the Finder tells the application, not its window
+    IncomingFiles(window, commands.files.open_all)
+    if isinstance(application, Application):
+        application.open_files_with(commands.files.open_all)
     driver = SelfDrive(window, commands, options.self_drive) if options.self_drive is not None else None
     code = application.exec()
     if driver is not None and not driver.well:

@@ -8,7 +8,7 @@ from typing import cast
 
 from PySide6.QtCore import QEvent, QMimeData, QObject
 from PySide6.QtGui import QDragMoveEvent, QDropEvent, QFileOpenEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 DROPS = frozenset({QEvent.Type.DragEnter, QEvent.Type.DragMove, QEvent.Type.Drop})
 
@@ -33,12 +33,44 @@ class IncomingFiles(QObject):
             if kind == QEvent.Type.Drop:
                 self._take(paths)
             return True
-        if kind == QEvent.Type.FileOpen:
-            file = cast("QFileOpenEvent", event).file()
-            if file:
-                self._take([Path(file)])
-                return True
         return super().eventFilter(watched, event)
+
+
+class Application(QApplication):
+    """The application; macOS tells it, and no window, which files the Finder wants to be opened.
+
+    A Python event filter of the whole application would hear of them, too, and end the process with the first
+    event of the block editor's browser: PySide asks each receiver for its C++ type, and Chromium's have none
+    (ADR 0018). So there can be no such filter, neither of ours nor of a plug-in.
+    """
+
+    def __init__(self, arguments: Sequence[str]) -> None:
+        super().__init__(list(arguments))
+        self._take: Callable[[Sequence[Path]], object] | None = None
+        self._waiting: list[Path] = []
+
+    def open_files_with(self, take: Callable[[Sequence[Path]], object]) -> None:
+        """From now on ``take`` gets what is to be opened, and at once what came before there was a window."""
+        self._take = take
+        waiting, self._waiting = self._waiting, []
+        if waiting:
+            take(waiting)
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.FileOpen and (name := cast("QFileOpenEvent", event).file()):
+            if self._take is None:
+                self._waiting.append(Path(name))
+            else:
+                self._take([Path(name)])
+            return True
+        return super().event(event)
+
+    def installEventFilter(self, filter_object: QObject) -> None:
+        """Raises TypeError, as the class says; filter a window or a widget."""
+        raise TypeError(
+            f"{type(filter_object).__name__} can't filter the events of the whole application: the first one "
+            "of the block editor's browser would end Studio; filter those of a window or a widget"
+        )
 
 
 def paths_of(dropped: QMimeData) -> list[Path]:

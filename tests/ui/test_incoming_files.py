@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QFileOpenEvent
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.ui.incoming_files import IncomingFiles
@@ -56,6 +59,42 @@ def test_what_is_no_file_of_this_computer_is_left_alone(window, taken) -> None:
     assert taken == []
 
 
-def test_the_system_opens_a_file(window, taken) -> None:
-    QApplication.sendEvent(window, QFileOpenEvent("/a/One.nepb"))
-    assert taken == [[Path("/a/One.nepb")]]
+MAC = """
+import sys
+from PySide6.QtCore import QObject, QTimer
+from PySide6.QtGui import QFileOpenEvent
+from app.ui.application import make_application
+
+application = make_application()
+from PySide6.QtWebEngineWidgets import QWebEngineView
+
+application.sendEvent(application, QFileOpenEvent("/a/Early.nepb"))
+taken = []
+application.open_files_with(taken.extend)
+application.sendEvent(application, QFileOpenEvent("/a/Late.nepb"))
+try:
+    application.installEventFilter(QObject(application))
+except TypeError as error:
+    print("refused:", error)
+view = QWebEngineView()
+view.loadFinished.connect(lambda well: QTimer.singleShot(0, application.quit))
+view.setHtml("<p>blocks</p>")
+view.show()
+application.exec()
+print([path.name for path in taken])
+sys.exit(0)
+"""
+
+
+def test_the_system_opens_files_beside_the_browser_of_the_editor() -> None:
+    """What macOS does, which tells the application; a filter of all events ended Studio (SIGSEGV) there."""
+    environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"
+    done = subprocess.run(
+        [sys.executable, "-c", MAC], env=environ, check=False, capture_output=True, text=True, timeout=100
+    )
+    assert done.returncode == 0, done.stderr
+    refused, took = done.stdout.splitlines()
+    assert refused.startswith("refused: QObject can't filter the events of the whole application")
+    assert took == "['Early.nepb', 'Late.nepb']"
