@@ -5,14 +5,19 @@ An interrupt in the middle of an import, or of the end of the interpreter, would
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
+import threading
 from contextlib import suppress
 from types import FrameType
 
 from nep.cli import INTERRUPTED
 
 __all__ = ["ask_first", "end_at_once"]
+
+GRACE_S = 3.0
+"""So long may a command take to end that was asked to: nodes say goodbye within 2 s."""
 
 
 def end_at_once() -> None:
@@ -21,7 +26,10 @@ def end_at_once() -> None:
 
 
 def ask_first() -> None:
-    """From now on Ctrl+C raises `KeyboardInterrupt`, so that nodes say goodbye; once more ends it at once."""
+    """From now on Ctrl+C raises `KeyboardInterrupt`, so that nodes say goodbye.
+
+    Once more, or when that takes too long, ends it at once: a terminal may take nothing any more.
+    """
     _handle_with(_ask)
 
 
@@ -31,7 +39,16 @@ def _end(_signal: int, _frame: FrameType | None) -> None:
 
 def _ask(_signal: int, _frame: FrameType | None) -> None:
     end_at_once()
+    with suppress(
+        RuntimeError
+    ):  # no thread can be had; `Thread` has locks that whoever was interrupted may hold
+        _thread.start_new_thread(_end_later, ())
     raise KeyboardInterrupt
+
+
+def _end_later() -> None:
+    threading.Event().wait(GRACE_S)
+    os._exit(INTERRUPTED)
 
 
 def _handle_with(handler: signal._HANDLER) -> None:
