@@ -11,13 +11,14 @@ from shiboken6 import isValid
 
 from app.core.moving import Moving
 from app.errors import SettingsError
+from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Switch, label, paint
 
 WIDE = 480
 TOP_SHARE = 0.42  # below every Stop: the run bar's and the robots' own
-TILE = 40
+TILE, EDGE, BETWEEN = 40, 20, 10
 
 
 class _Tile(QWidget):
@@ -52,6 +53,7 @@ class MoveQuestion(QWidget):
         self._seen = moving.revision
         self._before: QWidget | None = None
         self._complain = complain
+        self._always_for = ""
         self.title = label("", "heading", wrap=True)
         self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.always = Switch(theme, "")
@@ -79,13 +81,13 @@ class MoveQuestion(QWidget):
         top.addWidget(_Tile(theme), 0, Qt.AlignmentFlag.AlignTop)
         top.addLayout(words, 1)
         foot = QHBoxLayout()
-        foot.setSpacing(10)
+        foot.setSpacing(BETWEEN)
         foot.addWidget(self.always)
         foot.addStretch(1)
         foot.addWidget(self.not_now)
         foot.addWidget(self.let)
         column = QVBoxLayout(self)
-        column.setContentsMargins(20, 18, 20, 16)
+        column.setContentsMargins(EDGE, 18, EDGE, 16)
         column.setSpacing(16)
         column.addLayout(top)
         column.addLayout(foot)
@@ -100,11 +102,11 @@ class MoveQuestion(QWidget):
             self._put_away()
             return
         names = list(question.moves)
-        self.title.setText(question.title)
-        self.sentence.setText(question.sentence)
-        self.always.setText(f"Always for {names[0]}" if len(names) == 1 else "Always for these")
+        self.title.setText(plain.breakable(question.title))
+        self.sentence.setText(plain.breakable(question.sentence))
+        self._always_for = f"Always for {names[0]}" if len(names) == 1 else "Always for these"
+        self.always.setAccessibleName(self._always_for)
         self.always.setChecked(False)
-        self.always.updateGeometry()
         self.let.set_word("Let it move" if len(names) == 1 else "Let them move")
         self.setAccessibleName(question.title)
         self.setAccessibleDescription(question.sentence)
@@ -136,6 +138,7 @@ class MoveQuestion(QWidget):
             return
         wide = min(round(self._theme.scaled(WIDE)), window.width() - 32)
         self.setFixedWidth(wide)
+        self._name_always(wide)
         layout = self.layout()
         if layout is not None:
             layout.invalidate()
@@ -144,6 +147,14 @@ class MoveQuestion(QWidget):
         self.resize(wide, max(high, self.minimumSizeHint().height()))
         top = round(window.height() * TOP_SHARE)
         self.move((window.width() - wide) // 2, min(top, max(8, window.height() - self.height() - 8)))
+
+    def _name_always(self, wide: int) -> None:
+        """The robot's name on the switch where there is room for all of it; the title has it anyway."""
+        self.always.setText(self._always_for)
+        buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()
+        if self.always.sizeHint().width() > wide - 2 * EDGE - 2 * BETWEEN - buttons:
+            self.always.setText("Always")
+        self.always.updateGeometry()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and self.isVisible():

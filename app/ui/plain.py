@@ -7,8 +7,27 @@ and pointing at its name would show a file of this computer, or tell a server wh
 from __future__ import annotations
 
 import html
+import unicodedata
 
 from PySide6.QtGui import Qt
+
+LONG_WORD, PIECE = 20, 4
+MAY_BREAK = "\u200b"  # shows nothing; a line may end there
+
+
+def breakable(words: str) -> str:
+    """The same, with places in very long words where a line may end: a label cuts off what it can't break."""
+    return " ".join(_pieces(word) if len(word) > LONG_WORD else word for word in words.split(" "))
+
+
+def _pieces(word: str) -> str:
+    """A letter and what belongs to it (accents, joined signs) stay together."""
+    made, since = "", 0
+    for letter in word:
+        if since >= PIECE and not unicodedata.combining(letter) and unicodedata.category(letter)[0] in "LN":
+            made, since = made + MAY_BREAK, 0
+        made, since = made + letter, since + 1
+    return made
 
 
 def tip(words: str) -> str:

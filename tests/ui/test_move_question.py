@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -15,6 +16,7 @@ from app.robots.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
 from app.ui.move_question import MoveQuestion
 from app.ui.theme import Theme
+from tests.ui.clipping import clipped
 
 ROVER: Robot = replace(parse(td_for(ROBOT.thing_model, "Rover")), virtual=False)
 
@@ -130,6 +132,38 @@ def test_what_had_the_keyboard_may_be_gone_by_then(window) -> None:
     QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
     assert window.done == ["moved"]
     assert not window.question.isVisible()
+
+
+LONG = [
+    "Roboterarm im Labor für Mechatronik und Regelungstechnik",
+    "Donaudampfschifffahrtsgesellschaftskapitänsroboter",
+    "R" * 100,
+]
+
+
+@pytest.mark.parametrize("name", LONG, ids=lambda each: each[:10])
+@pytest.mark.parametrize("size", [(1440, 900), (640, 480)])
+@pytest.mark.parametrize("percent", [100, 150])
+def test_the_whole_name_is_to_be_read_however_long(qtbot, tmp_path, name, size, percent) -> None:
+    """Two robots may differ in their last letter only."""
+    window = Window(tmp_path)
+    qtbot.addWidget(window)
+    window.question._theme.set_text_percent(percent)
+    window.question._theme.apply()
+    window.resize(*size)
+    window.show()
+    rover = replace(ROVER, name=name)
+    window.moving.permits([(rover, ("move",))], lambda: None)
+    window.question.refresh()
+    assert clipped(window.question) == []
+    for words in (window.question.title, window.question.sentence):
+        widest = max(
+            words.fontMetrics().horizontalAdvance(each) for each in re.split("[ \u200b]", words.text())
+        )
+        assert widest <= words.width()
+        assert name in words.text().replace("\u200b", "")
+    assert window.question.always.accessibleName() == f"Always for {name}"
+    assert name in window.question.accessibleName()
 
 
 def test_its_words_have_their_room_at_the_first_show(qtbot, tmp_path) -> None:
