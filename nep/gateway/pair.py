@@ -19,6 +19,8 @@ _OPENED = zmq.EVENT_ACCEPTED | zmq.EVENT_CONNECTED
 _CLOSED = zmq.EVENT_DISCONNECTED
 _QUEUE = 1000
 _QUEUE_OF_PICTURES = 20
+MOST_KEPT_BYTES = 128 * 2**20
+"""About so much is kept for a subscriber that does not read: libzmq counts messages, however large."""
 _LINGER_MS = 200
 _LARGEST_BYTES = 2**28
 _LARGEST_FILTER_BYTES = 2**16
@@ -80,6 +82,7 @@ class Pair:
         self._open_handles: dict[Role, set[int]] = {"publisher": set(), "subscriber": set()}
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
         self.languages: frozenset[str] = frozenset()
+        self._mark = self._queue = _QUEUE_OF_PICTURES if line.codec == "image" else _QUEUE
         with contextlib.ExitStack() as undo:
             self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo, _LARGEST_BYTES)
             self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo, _LARGEST_FILTER_BYTES)
@@ -96,9 +99,8 @@ class Pair:
     ) -> zmq.Socket[bytes]:
         opened = context.socket(kind)
         undo.callback(opened.close, _LINGER_MS)
-        queue = _QUEUE_OF_PICTURES if self.line.codec == "image" else _QUEUE
-        opened.setsockopt(zmq.SNDHWM, queue)
-        opened.setsockopt(zmq.RCVHWM, queue)
+        opened.setsockopt(zmq.SNDHWM, self._queue)
+        opened.setsockopt(zmq.RCVHWM, self._queue)
         opened.setsockopt(zmq.MAXMSGSIZE, largest_bytes)  # who sends more at once is disconnected
         if end.bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
@@ -192,5 +194,9 @@ class Pair:
         return data
 
     def _send(self, frame: bytes) -> None:
+        mark = min(self._queue, max(1, MOST_KEPT_BYTES // max(1, len(frame))))
+        if mark != self._mark:  # libzmq takes it over for subscribers that are connected, too
+            self.outgoing.setsockopt(zmq.SNDHWM, mark)
+            self._mark = mark
         with contextlib.suppress(zmq.Again):
             self.outgoing.send(frame, zmq.NOBLOCK)
