@@ -117,6 +117,7 @@ class Document:
         self.saved_at = self._clock()
         self._stamp = stamp_of(target)
         self._journal.discard()
+        self.journal_error = None
 
     def mend(self, action: str) -> bool:
         """Do what a problem's button says to the blocks; False when the action is no matter of blocks."""
@@ -162,6 +163,12 @@ class Document:
     def journal(self) -> str:
         """The name of the file that keeps its unsaved work."""
         return self._journal.name
+
+    def keep_again(self) -> bool:
+        """Try once more to journal unsaved work that the disk did not take; whether all of it is kept."""
+        if self.dirty and self.journal_error is not None:
+            self._write_journal()
+        return not self.dirty or self.journal_error is None
 
     def close(self) -> None:
         """The window closes: unsaved work stays in the journal and is offered at the next start."""
@@ -247,6 +254,7 @@ class Document:
     def _replace(self, found: BehaviourFile, path: Path | None) -> None:
         self._journal.discard()
         self._journal = self._make_journal()
+        self.journal_error = None
         self.name, self.path, self.workspace = found.name, path, found.workspace
         self.robots, self.others = dict(found.robots), found.others
         self._compile_s = self._asked = None

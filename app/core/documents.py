@@ -174,6 +174,10 @@ class Documents:
         """Why unsaved work of one of them can't be kept; None when all of it is."""
         return next((each.journal_error for each in self._open if each.journal_error), None)
 
+    def unkept(self) -> list[Document]:
+        """Those whose unsaved work can't be kept, also when it is tried once more: the window ends it."""
+        return [each for each in self._open if not each.keep_again()]
+
     def end(self) -> None:
         """The window closes; unsaved work stays in the journals."""
         for document in self._open:

@@ -17,6 +17,7 @@ CURE_S = 1.0
 AWAY_S = 5.0
 """A driver that is started again is back by then."""
 ASK_DOCTOR = "Open the connection doctor"
+GIVES_UP = "leaving"
 
 REAL = "Check that it is on and in the same Wi-Fi."
 VIRTUAL = "Start the virtual robot again."
@@ -100,6 +101,7 @@ class Health:
         """Whether unsaved work is kept: the sentence that says why not, or None."""
         if sentence is None:
             self._alerts.cure("journal")
+            self._alerts.cure(GIVES_UP)
             return
         self._alerts.put(
             "journal",
@@ -110,6 +112,25 @@ class Health:
             action="file.save",
             count=0,
         )
+
+    def gives_up(self, name: str, sentence: str) -> bool:
+        """Whether a person closes the window though the work of ``name`` can't be kept, and has been told so.
+
+        ``sentence`` says why it can't be kept. The first time an alert tells it, and what to do.
+        """
+        if self._alerts.has(GIVES_UP):
+            return True
+        self._alerts.cure("journal")  # it comes again, behind this one
+        self._alerts.put(
+            GIVES_UP,
+            "error",
+            f"Studio stays open: the unsaved work in {name} would be lost.",
+            f"{sentence[0].upper()}{sentence[1:]}. Closing once more gives it up.",
+            button="Save somewhere else",
+            action="file.save_as",
+            count=0,
+        )
+        return False
 
     def settings(self, sentence: str | None) -> None:
         """Whether what a person chooses is kept: the sentence that says why not, or None."""

@@ -144,6 +144,10 @@ class Session:
         """Look at a topic until the watch is closed: its messages arrive in `Topics`."""
         return self._watches.open([topic])
 
+    def gives_up(self, document: Document) -> bool:
+        """Whether a person gives up unsaved work that can't be kept; the first time an alert asks them."""
+        return self._health.gives_up(document.name, document.journal_error or "")
+
     def tick(self) -> None:
         """Take over everything that the threads posted since the last tick."""
         began = self._clock()
@@ -193,6 +197,7 @@ class Session:
                 self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
         with self.surviving("check what is wrong"):
             self._health.check(self.runs.kept if self.runs.active else (), self.companions.virtual_robots)
+            self.documents.unkept()
             self._health.journal(self.documents.journal_error)
             self._health.settings(self.settings.not_kept)
 

@@ -23,7 +23,7 @@ class Leaving(QObject):
     def ready(self) -> bool:
         """Whether the window may close now; if not, it is closed as soon as it may."""
         if not self._asked:
-            self._asked = True
+            self._asked, self._ready = True, False
             editor = self._editor()
             if isinstance(editor, Flushes):
                 editor.flush(self._go_on)
@@ -33,6 +33,10 @@ class Leaving(QObject):
             if self._waits:
                 QTimer.singleShot(LONGEST_MS, self, self._go_on)
         return self._ready
+
+    def stay(self) -> None:
+        """The window stays open after all: the next time the editor is asked anew."""
+        self._asked = self._ready = self._waits = False
 
     def _go_on(self) -> None:
         self._ready = True

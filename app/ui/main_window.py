@@ -318,6 +318,10 @@ class MainWindow(QMainWindow):
             if not self._leaving.ready():
                 event.ignore()
                 return
+            if not self._may_lose_work():
+                self._leaving.stay()
+                event.ignore()
+                return
             self._shut = True
             self.timer.stop()
             with survived("keep how the window looks"):
@@ -328,6 +332,16 @@ class MainWindow(QMainWindow):
             self.session.close()
             self.on_shut()
         super().closeEvent(event)
+
+    def _may_lose_work(self) -> bool:
+        """Whether no unsaved work is lost with the window, or a person was told and closes it all the same."""
+        unkept = self.session.documents.unkept()
+        if not unkept or self.session.gives_up(unkept[0]):
+            return True
+        self.show_layout("behaviour")
+        self.session.documents.show(unkept[0])
+        self.toast.say("Studio stays open: unsaved work would be lost")
+        return False
 
     def _keep(self) -> None:
         self.state.keep_place(self)

@@ -190,6 +190,33 @@ def test_a_journal_that_cant_be_written_is_told(tmp_path: Path) -> None:
     assert "save the file now" in document.journal_error
 
 
+def test_work_that_could_not_be_kept_is_kept_as_soon_as_it_can_be(tmp_path: Path) -> None:
+    folder = tmp_path / "full"
+    folder.write_text("no folder")
+    document = Document(lambda: Journal(folder))
+    document.edited(STARTED)
+    assert not document.keep_again()
+    folder.unlink()
+    assert document.keep_again()
+    assert document.journal_error is None
+    (file,) = folder.glob("*.json")
+    assert json.loads(file.read_bytes())["workspace"] == STARTED
+
+
+def test_work_that_was_saved_is_no_longer_told_as_lost(tmp_path: Path) -> None:
+    (tmp_path / "full").write_text("no folder")
+    document = Document(lambda: Journal(tmp_path / "full"))
+    document.edited(STARTED)
+    assert document.journal_error is not None
+    document.save(tmp_path / "Mine.nepb")
+    assert document.journal_error is None
+    assert document.keep_again()
+    document.edited(EMPTY)
+    assert document.journal_error is not None
+    document.new()
+    assert document.journal_error is None
+
+
 def test_the_file_carries_the_robots_that_its_blocks_name(document: Document, tmp_path: Path) -> None:
     pepper, other = rize.robot("Pepper"), rize.robot("Other")
     block = {"type": "robot_rize_do_say", "id": "b", "fields": {"ROBOT": "Pepper"}}

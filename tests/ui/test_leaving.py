@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 from PySide6.QtCore import QObject
 
@@ -62,3 +64,43 @@ def test_the_window_takes_the_newest_edit_with_it(qtbot, window: MainWindow, com
     editor.done[0]()
     qtbot.waitUntil(lambda: shut == [True])
     assert not window.isVisible()
+
+
+def test_work_that_cant_be_kept_is_not_lost_without_a_word(
+    qtbot, window: MainWindow, commands, home: Path
+) -> None:
+    """As on a full disk: the window stays open once, and says why."""
+    (home / "journal").parent.mkdir(parents=True, exist_ok=True)
+    (home / "journal").write_text("no folder")
+    shut: list[bool] = []
+    window.on_shut = lambda: shut.append(True)
+    window.show()
+    session = window.session
+    session.document.edited(BLOCKS)
+    assert not window.close()
+    window.tick()
+    assert (shut, window.isVisible(), window.showing) == ([], True, "behaviour")
+    assert "Studio stays open" in window.banner.banner.words.text()
+    assert window.toast.isVisible()
+    (home / "journal").unlink()
+    session._next_check = 0.0
+    window.tick()
+    assert not session.alerts.has("leaving"), "there is room again"
+    assert window.close()
+    assert shut == [True]
+    (left,) = left_behind_of(home)
+    assert left["workspace"] == BLOCKS
+
+
+def test_who_was_told_and_closes_again_gives_the_work_up(window: MainWindow, commands, home: Path) -> None:
+    (home / "journal").parent.mkdir(parents=True, exist_ok=True)
+    (home / "journal").write_text("no folder")
+    window.show()
+    window.session.document.edited(BLOCKS)
+    assert not window.close()
+    assert window.close()
+    assert not window.isVisible()
+
+
+def left_behind_of(home: Path) -> list[dict[str, object]]:
+    return [json.loads(file.read_bytes()) for file in (home / "journal").glob("*.json")]
