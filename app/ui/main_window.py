@@ -334,7 +334,7 @@ class MainWindow(QMainWindow):
         super().closeEvent(event)
 
     def _may_lose_work(self) -> bool:
-        """Whether no unsaved work is lost with the window, or a person was told and closes it all the same."""
+        """Whether no unsaved work is lost with the window, or a person who was told closes it anyway."""
         unkept = self.session.documents.unkept()
         if not unkept or self.session.gives_up(unkept[0]):
             return True
