@@ -97,6 +97,47 @@ def test_a_description_on_another_topic_does_not_replace_the_robot(
     assert len(pepper.heard("stop")) == 1
 
 
+def test_a_stop_reaches_the_robot_whoever_describes_it_as_well(
+    session: Session, pepper: WireRobot, evil: nep.Node
+) -> None:
+    the_link(session)
+    diverted: list[object] = []
+    evil.new_sub("/Evil/command", "robot/command", sink=diverted.extend)
+    topics = {"command": "/Evil/command", "answer": "/Evil/answer"}
+    announce(evil, "/Evil/description", description("Pepper", **topics))
+
+    def is_seen() -> bool:
+        link = session.fleet.link("Pepper")
+        claimed = session.alerts.has("claim:/Evil/description")
+        return claimed or (link is not None and link.robot.topics.command == "/Evil/command")
+
+    tick_until(session, is_seen)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state in {"proven", "unanswered"})
+    assert (len(pepper.heard("stop")), diverted) == (1, [])
+
+
+def test_a_twin_that_does_not_answer_leaves_a_stop_without_proof(
+    session: Session, pepper: WireRobot, evil: nep.Node
+) -> None:
+    the_link(session)
+    announce(evil, "/Pepper/description", description())
+    evil.new_pub("/Pepper/answer", "robot/answer")
+    evil.new_sub("/Pepper/command", "robot/command")  # hears, and says nothing
+    tick_until(session, lambda: _subscribers(session, "/Pepper/command") == 2)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state in {"proven", "unanswered"})
+    assert session.runs.view().state == "unanswered"
+    assert len(pepper.heard("stop")) == 1
+
+
+def test_a_robot_whose_description_is_huge_is_refused_with_an_alert(session: Session, evil: nep.Node) -> None:
+    announce(evil, "/Big/description", {**description("Big"), "note": "x" * 1_100_000})
+    tick_until(session, lambda: session.fleet.link("Big") is not None or bool(session.alerts.active))
+    assert session.fleet.link("Big") is None
+    assert any("Big" in f"{alert.title} {alert.detail}" for alert in session.alerts.active)
+
+
 def test_a_second_program_of_the_name_changes_nothing_and_both_are_named(
     session: Session, pepper: WireRobot, evil: nep.Node
 ) -> None:

@@ -177,6 +177,20 @@ def test_versions_that_can_not_be_moved_stay(tmp_path: Path) -> None:
     assert len(versions_of(document, old)) == 1
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="these variables are those of Linux")
+def test_a_version_is_kept_among_data_not_among_settings(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("NEP_STUDIO_HOME", raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    (tmp_path / "Round.nepb").write_bytes(b"one")
+    kept = keep_earlier(tmp_path / "Round.nepb")
+    assert kept is not None
+    assert kept.copy.is_relative_to(tmp_path / "data" / "nep-studio")
+    assert not (tmp_path / "config").exists()
+
+
 def test_they_are_in_the_system_s_folder_for_data(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("NEP_STUDIO_HOME", raising=False)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))

@@ -133,6 +133,14 @@ def test_what_is_no_file_is_a_sentence_for_every_reader(tmp_path: Path, kind: st
     assert Settings(tmp_path).get("a", 1) == 2
 
 
+def test_a_pipe_in_place_of_a_file_holds_nobody_up(tmp_path: Path) -> None:
+    for name in ("settings.json", "Round.nepb"):
+        os.mkfifo(tmp_path / name)
+    assert Settings(tmp_path).get("a", 1) == 1
+    with pytest.raises(DocumentError):
+        read_file(tmp_path / "Round.nepb")
+
+
 # ---- who may read it -------------------------------------------------------------------------------
 
 
