@@ -206,3 +206,92 @@ def test_a_driver_whose_terminal_takes_nothing_answers_and_ends(network, tmp_pat
             assert process.wait(10.0) == 0
     finally:
         ended(process)
+
+
+HONEST = '''
+import asyncio, enum, sys
+from typing import Literal, Optional
+from app.robots.kit import Call, Kind, Link, action, main, safe_stop, sensor
+
+class Room(enum.Enum):
+    HALL = "hall"
+
+class Robot:
+    heat = sensor(float, title="heat")
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+
+    @safe_stop(within_s=0.2)
+    def stop(self) -> None:
+        """Still."""
+'''
+DO = '    @action("do %given", "Movement", "move", timeout_s=9)\n'
+MAIN = (
+    'if __name__ == "__main__":\n    raise SystemExit(main(Kind(model="robot", title="Robot", body=Robot)))\n'
+)
+WORKS = {
+    "later": (
+        "async def later(self, call: Call, given: int) -> int",
+        "await asyncio.sleep(0); return given + 1",
+    ),
+    "ends": ("def ends(self, call: Call, given: int) -> None", "sys.exit(given)"),
+    "numbers": ("def numbers(self, call: Call, given: list[float]) -> None", "pass"),
+    "senses": ("def senses(self, call: Call, given: str) -> None", 'self.link.sense("heat", given)'),
+    "returns": ("def returns(self, call: Call, given: str) -> int", "return given"),
+}
+TYPES = {
+    "pair": ("def pair(self, call: Call, given: tuple[float, int]) -> str", "return repr(given)"),
+    "map": ("def map(self, call: Call, given: dict[str, int]) -> str", "return repr(given)"),
+    "perhaps": ("def perhaps(self, call: Call, given: Optional[int] = 1) -> str", "return repr(given)"),
+    "choice": ("def choice(self, call: Call, given: Literal[1, 2]) -> str", "return repr(given)"),
+    "room": ("def room(self, call: Call, given: Room) -> Room", "assert given is Room.HALL; return given"),
+}
+
+
+@pytest.mark.parametrize(
+    ("functions", "given", "answers"),
+    [
+        (
+            WORKS,
+            {"later": 6, "ends": 3, "numbers": ["a"], "senses": "warm", "returns": "x"},
+            {"later": ("succeeded", 7)}
+            | dict.fromkeys(("ends", "numbers", "senses", "returns"), ("failed", None)),
+        ),
+        (
+            TYPES,
+            {"pair": [1.5, 2], "map": {"a": 1}, "perhaps": None, "choice": 2, "room": "hall"},
+            {
+                "pair": ("succeeded", "(1.5, 2)"),
+                "map": ("succeeded", "{'a': 1}"),
+                "perhaps": ("succeeded", "None"),
+                "choice": ("succeeded", "2"),
+                "room": ("succeeded", "hall"),
+            },
+        ),
+    ],
+    ids=["works", "types"],
+)
+def test_what_a_driver_declares_is_what_happens(network, tmp_path, functions, given, answers):
+    """Over the network, as another program sees it; a Stop behind it is answered in any case."""
+    actions = "".join(
+        f'{DO}    {head}:\n        """What the test says."""\n        {body}\n'
+        for head, body in functions.values()
+    )
+    (tmp_path / "robot.py").write_text(HONEST + actions + MAIN, encoding="utf-8")
+    process = start(str(tmp_path / "robot.py"), network=network)
+    try:
+        with nep.node("me", master=network) as node:
+            described = node.new_sub("/Robot/description", "robot/description").receive(30.0)
+            assert described is not None, ended(process, 0.1)
+            ears = Ears(node, "Robot")
+            got = {}
+            for name, value in given.items():
+                ears.invoke(name, name, given=value)
+                final = ears.final(name)
+                got[name] = (final["state"], final["output"].get("value"))
+            ears.command(id="stop", op="stop")
+            assert (got, ears.final("stop", "stop")["state"]) == (answers, "succeeded")
+    finally:
+        process.kill()
+        process.communicate()

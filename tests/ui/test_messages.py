@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import io
+import json
 import logging
+import os
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -89,6 +93,37 @@ def test_a_terminal_that_takes_nothing_does_not_stop_the_window():
     stuck.may_go_on.set()
     handler.close()
     assert stuck.getvalue().splitlines() == [f"qt: no. {n}\\x1b[2J" for n in range(1000)]
+
+
+WINDOWED = """
+import json, sys, threading
+sys.stdout = sys.stderr = None
+from PySide6.QtCore import qWarning
+from app.ui.messages import listen
+log = listen()
+def fail():
+    raise ValueError("in a thread")
+thread = threading.Thread(target=fail)
+thread.start()
+thread.join()
+qWarning("of Qt")
+told = []
+log.take(lambda *line: told.append(line))
+with open(sys.argv[1], "w") as file:
+    json.dump(told, file)
+raise ValueError("at the end")
+"""
+
+
+def test_a_windowed_studio_tells_the_console_and_a_file_what_nobody_caught(tmp_path: Path) -> None:
+    environment = {**os.environ, "NEP_STUDIO_HOME": str(tmp_path / "home")}
+    out = tmp_path / "told.json"
+    subprocess.run([sys.executable, "-c", WINDOWED, str(out)], env=environment, check=False, timeout=50)
+    told = json.loads(out.read_text("utf-8"))
+    assert any("in a thread" in words for _level, _origin, words in told)
+    assert any("of Qt" in words for _level, _origin, words in told)
+    written = "".join(file.read_text("utf-8") for file in (tmp_path / "home").rglob("*.log"))
+    assert [words in written for words in ("in a thread", "of Qt", "at the end")] == [True] * 3
 
 
 def test_what_the_console_has_in_its_own_words_is_in_the_log_file_only(tmp_path: Path) -> None:
