@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["control_in", "escaped", "shortened"]
+__all__ = ["control_in", "escaped", "harmless", "shortened"]
 
 _CONTROLS = (
     "\x00-\x1f\x7f-\x9f"  # C0, DEL and C1: cursor, colours, screen, title, clipboard
@@ -33,6 +33,16 @@ def escaped(text: str, *, lines: bool = False) -> str:
     With `lines` new lines and tabs stay: for a text of several lines, where nobody can forge one.
     """
     return (_CONTROL_IN_LINES if lines else _CONTROL).sub(_readable, text)
+
+
+def harmless(text: str, *, lines: bool = False) -> str:
+    """`text` without the letters that control, for sentences of somebody else between our own.
+
+    New lines and tabs become spaces, or stay with `lines`.
+    """
+    if lines:
+        return _CONTROL_IN_LINES.sub("", text)
+    return _CONTROL.sub("", re.sub("[\n\t\u2028\u2029]", " ", text))
 
 
 def shortened(text: str, most: int) -> str:

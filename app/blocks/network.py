@@ -14,7 +14,7 @@ from app.blocks.publishing import PublishGuard
 from app.blocks.wire import Node, Publisher, new_id, payload_of, value_of
 from app.robots import rize
 from app.robots.description import Robot
-from app.robots.identity import Senders, first_to_announce, hearing, publishing, said_of_stop
+from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
 from nep.errors import NepError
 from nep.message import Message
 from nep.views import GraphView
@@ -358,7 +358,7 @@ class Network:
             return  # another robot's answer, or no word of a robot
         output = answer.get("output")
         call.output = output if isinstance(output, Mapping) else {}
-        call.error = str(answer.get("error") or "")
+        call.error = said(answer.get("error"))
         feedback = answer.get("feedback")
         call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
         call.began = call.began or state == "running"

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from app.core.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink
 from app.robots import rize
 from app.robots.description import Action, Robot
+from app.robots.identity import said
 
 FIRST_ANSWER_S = 3.0
 """How long a robot may take to say anything to a command."""
@@ -74,7 +75,7 @@ class Tries:
         made.replaces = _names(answer.get("replaces")) or made.replaces
         error = answer.get("error")
         if state in FINAL_STATES:
-            self._end(link, made, state, str(error) if error else None)
+            self._end(link, made, state, said(error) if error else None)
             return
         made.state = state
         if state == "running" and made.begun_s is None:

@@ -17,6 +17,7 @@ from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor, Topi
 from app.robots.profile import validate
 from app.robots.reading import read
 from nep.message import Message
+from nep.text import harmless
 
 __all__ = [
     "Action", "Choice", "Event", "Field", "Parameter", "Robot", "SafeStop", "Sensor", "Topics",
@@ -25,6 +26,10 @@ __all__ = [
 
 LARGEST_BYTES = 1_000_000
 """A description that is larger is refused before it is decoded."""
+_BLOCK = "rb:block"
+_WORDS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
+"""Members of a description that are shown, or hold what is."""
+_VALUES = frozenset({"default", "enum", "const"})
 _NOT_IN_TOPICS = re.compile(r"[^\w.-]")
 
 
@@ -39,7 +44,29 @@ def parse(document: Mapping[str, object]) -> Robot:
     if problems:
         title = as_part(document).get("title")
         raise DescriptionError(title if isinstance(title, str) else "a robot", problems)
+    cleaned = _cleaned(document)
+    if cleaned != document:
+        return parse(cleaned)
     return read(document, default_topics(str(document["title"])))
+
+
+def _cleaned(document: Mapping[str, object]) -> dict[str, object]:
+    """The document with words that do nothing but say something; the name is right already.
+
+    One letter that turns the direction of writing, in an action's title, would turn ours behind it as well:
+    the question whether the robot may move, say.
+    """
+
+    def clean(value: object, place: str) -> object:
+        if place in _VALUES:
+            return value
+        if isinstance(value, Mapping):
+            return {key: clean(item, place if place == _BLOCK else key) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [clean(item, "") for item in value]
+        return harmless(value) if isinstance(value, str) and place in _WORDS else value
+
+    return {key: clean(item, "" if key == "title" else key) for key, item in document.items()}
 
 
 def announced(message: Message) -> Robot:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from app.robots.description import topic_of
 from app.robots.parts import Robot
 from nep.message import Message
+from nep.text import harmless, shortened
 from nep.views import GraphView
 
 DESCRIPTION_TYPE = "robot/description"
@@ -23,6 +24,7 @@ SHARED = frozenset({"robot_action", "action_state"})
 """Topics of all robots of RIZE together (`app.robots.rize`)."""
 MOST_SENDERS = 20_000
 WORDS_MOST = 200
+ERROR_MOST = 1000
 _NATIVE = frozenset({"native", GATEWAY})
 
 
@@ -107,6 +109,11 @@ def program_of(key: str) -> str:
 def is_home(robot_name: str, topic: str) -> bool:
     """Whether a topic lies among those that belong to a robot of this name: ``/NAME/...``."""
     return topic.startswith(topic_of(robot_name, ""))
+
+
+def said(error: object) -> str:
+    """The words of a robot's error, as a person may read them between our own: no more than they need be."""
+    return shortened(harmless(str(error or ""), lines=True), ERROR_MOST)
 
 
 def said_of_stop(name: str, error: object) -> str:

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QVBoxLayout, QWidg
 
 from app.robots.description import Action, Parameter
 from app.robots.inputs import wrong_value
+from app.ui import plain
 from app.ui.control_colour import ColourChoice
 from app.ui.controls import ROW_HEIGHT, Control, Pictures, control_for, sentence_case
 from app.ui.input_words import input_words
@@ -68,7 +69,9 @@ class ActionForm(QWidget):
 
     def _add(self, parameter: Parameter, options: Sequence[str]) -> None:
         control = control_for(self._theme, parameter, options, self._pictures)
-        name = label(sentence_case(parameter.title), "bodyLarge", role="textSecondary", wrap=True)
+        # with a buddy, an & would underline the next letter
+        words = plain.entry(sentence_case(parameter.title))
+        name = label(words, "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
         wrong = label("", "small", role="error", wrap=True)
         wrong.hide()

@@ -179,3 +179,11 @@ def test_two_tries_of_one_action_both_come_to_their_end(bench) -> None:
     assert bench.rested == []  # the second one still keeps the robot awake
     bench.answer(second, "succeeded")
     assert bench.rested == ["Turtle"]
+
+
+def test_what_a_robot_says_went_wrong_is_short_and_turns_no_words_behind_it(bench) -> None:
+    made = bench.begin("move", distance=0.5)
+    bench.answer(made, "failed", error="\u202ethe brake\x1b[2J\nis stuck" + "!" * 100_000)
+    assert made.error is not None
+    assert made.error.startswith("the brake[2J\nis stuck!")
+    assert len(made.error) < 1100

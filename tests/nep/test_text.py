@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import nep
 from nep.errors import DecodeError, RequestRefusedError
-from nep.text import control_in, escaped, shortened
+from nep.text import control_in, escaped, harmless, shortened
 from nep.wire import check_node_name, check_topic
 
 CONTROLS = [
@@ -90,3 +90,9 @@ def test_what_a_stranger_wrote_is_cleaned_and_cut_in_errors() -> None:
 def test_a_long_text_is_cut_and_says_so() -> None:
     assert shortened("abc", 3) == "abc"
     assert shortened("abcd", 3) == "abc… (4 characters)"
+
+
+def test_a_sentence_of_somebody_else_does_nothing_between_our_own() -> None:
+    assert harmless("a\u202eb\x1b[2J\nc\td") == "ab[2J c d"
+    assert harmless("a\u202eb\nc\td", lines=True) == "ab\nc\td"
+    assert harmless("".join(CONTROLS)).strip(" ") == ""

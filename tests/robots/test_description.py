@@ -333,6 +333,21 @@ def test_a_name_that_looks_like_another_one_is_refused_in_words_that_harm_nobody
     assert control_in(str(refused.value)) == ""
 
 
+def test_words_of_a_description_do_nothing_but_say_something():
+    """A letter that turns the direction of writing would turn the question that has it in its middle, too."""
+    described = td_for(model("pepper"), "Pepper")
+    say = described["actions"]["say"]
+    say["title"] = "\u202esay\n"
+    say["rb:block"] = {**say["rb:block"], "text": {"en": "s\u200bay\x1b %text"}, "category": "\u202eSpeech"}
+    words = say["input"]["properties"]["text"]
+    words |= {"title": "te\u2066xt", "description": "a\nb", "default": "a\n\u202eb"}
+    action = parse(described).action("say")
+    assert (action.title, action.category) == ("say ", "Speech")
+    assert control_in(action.text) == ""
+    assert action.parameters[0].title == "text"
+    assert action.parameters[0].default == "a\n\u202eb"
+
+
 def test_the_sentence_about_a_description_is_short_and_harmless():
     described = {**td_for(model("pepper"), "Pepper"), "title": "\x1b" + "A" * 100_000}
     described["actions"] = {"B" * 100_000: {"rb:block": 7}}

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLineEdit
+from PySide6.QtWidgets import QLabel, QLineEdit
 
 from app.robots.inputs import Choice as Option
 from app.robots.inputs import Parameter
@@ -151,3 +151,10 @@ def test_the_summary_says_the_values_in_a_few_words(qtbot, theme) -> None:
     form = ActionForm(theme, emotion)
     qtbot.addWidget(form)
     assert form.summary() == "happy, for 2 s"
+
+
+def test_the_name_of_a_value_is_shown_as_it_is(qtbot, theme) -> None:
+    form = ActionForm(theme, action(Parameter("p", "R&D", "text", default="hi")))
+    qtbot.addWidget(form)
+    (name,) = (each for each in form.findChildren(QLabel) if each.buddy() is not None)
+    assert name.text() == "R&&D"  # beside its control an & would underline the D
