@@ -114,18 +114,19 @@ _PAPER = {"node": "Node", "master": "Master"}
 
 
 def _imported(name: str) -> object:
-    """What the package has under this name, imported when it is first asked for.
+    """What the package has under this name; all of it is imported when anything of it is first asked for.
 
     So `import nep` takes a millisecond, and the command `nep`, which begins with it, can be told what Ctrl+C
-    does before it imports the rest. Raises `AttributeError`.
+    does before it imports the rest. All at once: a program that has opened all the files that it may, or has
+    left its folder, must not find a part of nep missing an hour later. Raises `AttributeError`.
     """
-    known = _PAPER.get(name, name)
-    for module, names in _FROM.items():
-        if known in names:
-            found: object = getattr(importlib.import_module(module), known)
-            break
-    else:
-        found = _submodule(name)
+    if name in __all__ and name != "__version__":
+        for module, names in _FROM.items():
+            loaded = importlib.import_module(module)
+            globals().update({each: getattr(loaded, each) for each in names})
+        globals().update({paper: globals()[known] for paper, known in _PAPER.items()})
+        return globals()[name]
+    found = importlib.import_module("nep.version").__version__ if name == "__version__" else _submodule(name)
     globals()[name] = found
     return found
 
