@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, Qt
-from PySide6.QtGui import QEnterEvent
+from PySide6.QtGui import QCursor, QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -83,6 +83,22 @@ def test_pages_stay_while_the_mouse_is_over_them_and_make_room_when_it_has_left(
     assert places(window) == after, "nothing comes under the mouse where the banner was"
     mouse.over(window.tool_bar)
     qtbot.waitUntil(lambda: places(window) == before)
+
+
+def test_what_is_under_the_real_mouse_stays_where_it_is(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    window.show()
+    window.show_layout("developer")
+    qtbot.waitUntil(lambda: window.bench is not None and window.bench.docks["topics"].isVisible())
+    assert window.bench is not None
+    topics = window.bench.docks["topics"]
+    QApplication.processEvents()
+    QCursor.setPos(topics.mapToGlobal(topics.rect().center()))
+    before = topics.mapToGlobal(QPoint())
+    say(window)
+    assert window.banner.isVisible()
+    assert topics.mapToGlobal(QPoint()) == before
 
 
 def test_it_comes_below_where_the_mouse_is_at_its_place(window: MainWindow, mouse: Mouse) -> None:
