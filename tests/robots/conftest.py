@@ -126,7 +126,7 @@ class Turtle:
     @action("ignore", category="Movement", icon="x", uses=("base",), timeout_s=5)
     def ignore(self, call: Call) -> None:
         """Does not listen to its call."""
-        self.go_on.wait(10)
+        self.go_on.wait(60)
 
     def _let(self, call: Call) -> None:
         # Not by the call's clock, which stands still: real drivers write call.until(...).
@@ -137,7 +137,7 @@ class Turtle:
     @safe_stop(watchdog_s=1.0, within_s=0.2)
     def stop(self) -> None:
         """Stands still once the test lets it."""
-        self.may_stop.wait(10)
+        self.may_stop.wait(60)
         if self.stop_fails is not None:
             raise self.stop_fails
         self.stops += 1

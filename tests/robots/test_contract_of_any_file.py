@@ -65,7 +65,7 @@ DEAF = '''
     def go(self, call: Call) -> None:
         """Hears nothing of its end."""
         import time
-        time.sleep(4)
+        time.sleep(8)
 
 
 ROBOT = Kind(model="deaf", title="Deaf", body=Robot)

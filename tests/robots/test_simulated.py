@@ -66,7 +66,7 @@ def test_every_action_can_be_done(pepper):
     assert set(QUICK) == {action.name for action in pepper.driver.robot.actions}
     for name, given in QUICK.items():
         pepper.invoke(name, name, **given)
-        assert pepper.final(name, timeout_s=10)["state"] == "succeeded", name
+        assert pepper.final(name)["state"] == "succeeded", name
     lit = ["#ff0000", "#ff0000"]
     eventually(lambda: [pepper.newest("state")[where] for where in ("eyes", "shoulders")] == lit)
 
@@ -233,12 +233,12 @@ def test_rize_drives_it(pepper):
         "id": "acti1-0",
     }
     pepper.rize(command)
-    eventually(lambda: pepper.heard["action_state"], timeout_s=5)
+    eventually(lambda: pepper.heard["action_state"])
     assert pepper.heard["action_state"] == [{**command, "state": "success"}]
     eventually(lambda: pepper.newest("state")["theta_deg"] == -20)
     eventually(lambda: pepper.newest("state")["eyes"] == "#ff0010")
     pepper.rize({**command, "id": "2", "primitives": primitive("walk", "backwards", {"meters": 0.1})})
-    eventually(lambda: len(pepper.heard["action_state"]) == 2, timeout_s=5)
+    eventually(lambda: len(pepper.heard["action_state"]) == 2)
     assert pepper.heard["action_state"][1]["state"] == "success"
     eventually(lambda: pepper.newest("state")["x"] < -0.55)
     pepper.rize({**command, "id": "3", "primitives": primitive("walk", "sideways", {"meters": 0.1})})

@@ -197,7 +197,7 @@ def test_a_stop_in_the_middle_of_a_move_ends_it_still(turtle) -> None:
 def test_something_in_the_way_fails_the_move_and_is_told(turtle) -> None:
     _, ears = turtle
     ears.invoke("1", "go_to", x=0.3, y=-2.2)  # into the shelf
-    ended = ears.final("1", timeout_s=15)
+    ended = ears.final("1")
     assert (ended["state"], ended["error"]) == ("failed", "go_to: something is in the way")
     assert ears.heard["bump"]
     eventually(lambda: any(told["value"] for told in ears.heard["bumper"]))
@@ -213,6 +213,6 @@ def test_wheels_that_go_on_turning_fail_the_stop(node: nep.Node) -> None:
     with nep.node("listener", "memory") as other, Driver(kind, "Turtle", node):
         ears = Ears(other, "Turtle")
         ears.command(id="s", op="stop")
-        ended = ears.final("s", "stop", timeout_s=8)
+        ended = ears.final("s", "stop")
         assert ended["state"] == "failed"
         assert "may still move" in ended["error"]

@@ -125,7 +125,7 @@ def test_every_tab_comes_back_after_the_web_process_was_killed(qtbot, view, two)
     view.highlight(["w"])
     again: list[bool] = []
     view.recovered.connect(lambda: again.append(True))
-    with qtbot.waitSignal(view.recovered, timeout=20_000):
+    with qtbot.waitSignal(view.recovered, timeout=60_000):
         os.kill(view.web.page.renderProcessPid(), signal.SIGKILL)
     assert two.tops() == [WAIT]
     two.wait_for(outlined("running"), ["w"])

@@ -52,7 +52,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=140,
         check=False,
     )
     return done.stdout

@@ -121,7 +121,7 @@ def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: 
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=140,
         check=True,
     )
     assert done.stdout.strip() == "[]"

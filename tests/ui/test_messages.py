@@ -79,7 +79,7 @@ class Stuck(io.StringIO):
         self.may_go_on = threading.Event()
 
     def write(self, text):
-        assert self.may_go_on.wait(10.0)
+        assert self.may_go_on.wait(60.0)
         return super().write(text)
 
 
