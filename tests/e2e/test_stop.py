@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from tests.e2e.behaviours import forever, say, started, turn, write
+from tests.e2e.behaviours import block, forever, say, started, turn, write
 from tests.e2e.person import middle
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
@@ -20,13 +20,22 @@ pytestmark = pytest.mark.timeout(240)
 def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     """Studio with the virtual robot and a behaviour that turns for ever; it runs."""
     speech = {**say("Round and round"), "x": 420, "y": 56}
-    studio = start(str(write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech)))
+    lights = {"ROBOT": "Pepper", "WHERE": "eyes", "COLOUR": "#35b0fa"}
+    light = {**block("robot_pepper_do_light", fields=lights), "x": 56, "y": 360}
+    path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech, light)
+    studio = start(str(path))
     studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.spot("[data-id=turn]")
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows")
     return studio
+
+
+def run_again(studio: Studio) -> None:
+    """The program runs once more, and nothing is open or in the hand."""
+    studio.click("Run", kind="RunButton")
+    until(lambda: "turn" in studio.outlined("running"), "the block glows again")
 
 
 def stands_still(studio: Studio) -> None:
@@ -39,6 +48,12 @@ def stands_still(studio: Studio) -> None:
     assert len({state["theta_deg"] for state in heard}) == 1
     until(lambda: not studio.children("app.blocks.child"), "the program's process has ended")
     assert not studio.outlined("running")
+
+
+def stands_still_again(studio: Studio) -> None:
+    """The same after another run, whose last stop is still to be read while this one is under way."""
+    studio.find("Run", kind="RunButton", enabled=True)
+    stands_still(studio)
 
 
 def test_f12_in_the_web_view_stops(turning: Studio) -> None:
@@ -65,6 +80,42 @@ def test_f12_in_a_field_of_the_developer_layout_stops(turning: Studio) -> None:
     turning.row("Topics", "/Pepper/pose")
     turning.screen.key("F12")
     stands_still(turning)
+
+
+def test_stop_while_something_of_a_block_is_open_or_in_the_hand(turning: Studio) -> None:
+    """It stops at once, and what was begun ends as it would have otherwise."""
+    before = sorted(turning.blocks())
+    left, top, _, _ = turning.spot("[data-id='say Round and round'] > .blocklyPath")
+    turning.screen.move(left + 12, top + 18)
+    turning.screen.press()
+    turning.screen.glide(left + 160, top + 90)
+    until(lambda: turning.page("!!document.querySelector('.blocklyDragging')"), "the block is in the hand")
+    turning.screen.key("F12")
+    stands_still_again(turning)
+    turning.screen.release()
+    until(lambda: not turning.page("!!document.querySelector('.blocklyDragging')"), "the block is put down")
+    assert sorted(turning.blocks()) == before
+
+    run_again(turning)
+    turning.point("[data-id=light] .nepColour", dx=8, dy=8)
+    turning.point(".nepPalette input", dx=12, dy=10)
+    typing = "document.hasFocus() && document.activeElement.matches('.nepPalette input')"
+    until(lambda: turning.page(typing), "the number of the colour has the keyboard")
+    turning.screen.key("a", ["Ctrl"])
+    turning.screen.type("#12")
+    number = "document.querySelector('.nepPalette input').value"
+    until(lambda: turning.page(number) == "#12", "the number is typed")
+    turning.screen.key(".", ["Ctrl"])
+    stands_still_again(turning)
+    assert turning.page(number) == "#12", "as it was typed"
+    turning.screen.key("Escape")
+    until(lambda: not turning.page("!!document.querySelector('.nepPalette')"), "the palette is closed")
+
+    run_again(turning)
+    turning.point("[data-id=turn] .blocklyDropdownField", dx=10, dy=10)
+    turning.spot(".blocklyDropDownDiv .blocklyMenuItem")
+    turning.screen.click(*middle(turning.find(kind="StopButton")["rect"]))
+    stands_still_again(turning)
 
 
 def test_stop_ends_a_program_that_hangs(turning: Studio) -> None:
