@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import TypeVar, cast
 
-__all__ = ["WrongTypeError", "at_least", "flag", "function", "one_of", "seconds", "text"]
+from nep.text import control_in, escaped, shortened
+
+__all__ = ["WrongTypeError", "at_least", "flag", "function", "limit", "one_of", "seconds", "text"]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
+
+
+_LETTERS = 200
+"""Of a type; the master takes no more."""
 
 
 class WrongTypeError(TypeError, ValueError):
@@ -17,11 +23,14 @@ class WrongTypeError(TypeError, ValueError):
 
 
 def text(name: str, value: object) -> str:
-    """`value` itself when it is a text with something in it. Raises `ValueError`."""
+    """`value` itself when it is a text that can be a type's name. Raises `ValueError`."""
     if not isinstance(value, str):
         raise WrongTypeError(f"{name} is a '{_kind(value)}'; give a 'str'")
     if not value:
         raise ValueError(f"{name} is empty; give a name such as 'json'")
+    if len(value) > _LETTERS or control_in(value):
+        said = escaped(shortened(value, 40))
+        raise ValueError(f"{name} is '{said}'; use {_LETTERS} letters at most, and none that controls")
     return value
 
 
@@ -57,6 +66,14 @@ def seconds(name: str, value: object) -> float | None:
     if not value >= 0.0:  # also what is not a number
         raise ValueError(f"{name} is {value}; give seconds, 0 or more, or None")
     return None if math.isinf(value) else value
+
+
+def limit(name: str, value: object) -> float:
+    """`value` itself when it is a time that ends: 0 or more seconds. Raises `ValueError`."""
+    if value is None:
+        raise WrongTypeError(f"{name} is None; give seconds, 0 or more")
+    seconds(name, value)
+    return cast("float", value)
 
 
 def function(name: str, value: F) -> F:

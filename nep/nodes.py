@@ -18,7 +18,7 @@ import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: 
 
 from nep import forks
 from nep.addresses import checked_host, master_address
-from nep.arguments import WrongTypeError, at_least, flag, function, one_of, seconds, text
+from nep.arguments import WrongTypeError, at_least, flag, function, limit, one_of, seconds, text
 from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
 from nep.backends.choosing import backend_named
 from nep.codecs import codec_for
@@ -325,7 +325,7 @@ class Node:
 
         What could not be delivered is logged as a warning. Happens by itself when the interpreter ends.
         """
-        seconds("timeout_s", timeout_s)
+        limit("timeout_s", timeout_s)
         _close((self,), timeout_s)
 
     def _end_log(self, timeout_s: float) -> None:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from nep.arguments import seconds
+from nep.arguments import limit, seconds
 from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
 from nep.codecs import codec_for
 from nep.encoded import Encoded, encoded
@@ -149,7 +149,7 @@ class Publisher:
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
-        seconds("timeout_s", timeout_s)
+        limit("timeout_s", timeout_s)
         if not self._is_closed:
             self._is_closed = True
             try:
@@ -235,7 +235,11 @@ class Subscriber:
         Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
         decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
         """
-        if timeout_s is not None and not timeout_s >= 0.0:
+        try:
+            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+        except TypeError:
+            is_wrong = True
+        if is_wrong:
             seconds("timeout_s", timeout_s)
         ready = self._ready
         while ready:  # read already
@@ -264,7 +268,11 @@ class Subscriber:
 
         Raises `ClosedError`, and `ValueError` for a time below 0.
         """
-        if timeout_s is not None and not timeout_s >= 0.0:
+        try:
+            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+        except TypeError:
+            is_wrong = True
+        if is_wrong:
             seconds("timeout_s", timeout_s)
         if self._ready:  # read already
             try:

@@ -35,6 +35,11 @@ def node(request: pytest.FixtureRequest, master: Master) -> Iterator[nep.Node]:
         ({"sink": "print"}, "sink is a 'str'; give a function"),
         ({"msg_type": 5}, "msg_type is a 'int'; give a 'str'"),
         ({"msg_type": ""}, "msg_type is empty; give a name such as 'json'"),
+        (
+            {"msg_type": "json\x00"},
+            r"msg_type is 'json\\x00'; use 200 letters at most, and none that controls",
+        ),
+        ({"msg_type": "x" * 201}, "characters\\)'; use 200 letters at most"),
         ({"topic": b"t"}, "a topic is a 'str'"),
         (
             {"configuration": "direct"},
@@ -86,6 +91,12 @@ def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
         nep.node("n", wait_s=time_s)
     with pytest.raises(ValueError, match=r"wait_s is '2'; give seconds"):
         nep.node("n", wait_s="2")  # type: ignore[arg-type]
+    for called in (sub.receive, lambda given: sub.listen(timeout_s=given)):
+        with pytest.raises(ValueError, match=r"timeout_s is '2'; give seconds"):
+            called("2")  # type: ignore[arg-type]
+    for close in (pub.close, node.close):
+        with pytest.raises(ValueError, match=r"timeout_s is None; give seconds, 0 or more"):
+            close(None)  # type: ignore[arg-type]
     pub.publish(1)
     assert sub.listen(timeout_s=math.inf) == (True, 1)
 
