@@ -340,7 +340,9 @@ class MemoryCarrier:
                 if messages and inlet.spec.sink is not None:
                     try:
                         inlet.spec.sink(messages)
-                    except Exception:  # a sink that fails gets the next batch all the same
+                    except (
+                        BaseException
+                    ):  # also SystemExit, which would end all sinks' thread: it gets the next batch
                         _logger.exception("the sink of '%s' failed", inlet.spec.topic)
             self._closing.wait(_BATCH_S)
 

@@ -316,12 +316,15 @@ def test_a_sink_gets_batches_in_a_thread_of_the_node(make: Make) -> None:
     assert len(batches) < 1000
 
 
-def test_a_sink_that_fails_gets_the_next_batch(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("error", [ZeroDivisionError, SystemExit])
+def test_a_sink_that_fails_gets_the_next_batch(
+    make: Make, caplog: pytest.LogCaptureFixture, error: type[BaseException]
+) -> None:
     got = threading.Semaphore(0)
 
     def sink(_messages: object) -> None:
         got.release()
-        raise ZeroDivisionError
+        raise error
 
     make("b").new_sub("topic", sink=sink)
     pub = make("a").new_pub("topic")

@@ -195,7 +195,9 @@ class SocketInlet(Reporting[R]):
         if sink is not None and batch:
             try:
                 sink(batch)
-            except Exception:  # a sink that fails gets the next batch all the same
+            except (
+                BaseException
+            ):  # also SystemExit, which would end all sinks' thread: it gets the next batch
                 _logger.exception("the sink of '%s' failed", self.spec.topic)
         return Rest(is_quiet=True, due=now + _BATCH_S) if count or batch else Rest()
 
