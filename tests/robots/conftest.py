@@ -38,19 +38,28 @@ def eventually(true: Callable[[], object], timeout_s: float = 30.0) -> None:
 
 
 class FakeClock:
-    """Time that passes when a test says so."""
+    """Time that passes when a test says so.
+
+    Whoever asks for the time and then waits for the rest of a span waits from when it was told: a test
+    may let time pass in between.
+    """
 
     def __init__(self) -> None:
         self._now = 100.0
+        self._told = threading.local()
 
     def now(self) -> float:
-        return self._now
+        self._told.now = now = self._now
+        return now
 
     def advance(self, seconds: float) -> None:
         self._now += seconds
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        end = None if timeout_s is None else self._now + timeout_s
+        began = getattr(self._told, "now", self._now)
+        if hasattr(self._told, "now"):
+            del self._told.now
+        end = None if timeout_s is None else began + timeout_s
         while not event.wait(0.001):
             if end is not None and self._now >= end:
                 return False

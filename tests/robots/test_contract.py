@@ -342,14 +342,8 @@ def test_it_tells_that_it_lives_while_it_does_something(bench) -> None:
 
     bench.begun()
     told = beats()
-
-    def beats_again() -> bool:
-        # Its thread may look at the clock only after this: then it waits for the next beat.
-        bench.clock.advance((bench.robot.beat_s or 0) + 0.01)
-        threading.Event().wait(0.2)
-        return beats() > told
-
-    eventually(beats_again)
+    bench.clock.advance((bench.robot.beat_s or 0) + 0.01)
+    eventually(lambda: beats() > told)
 
 
 # ---- what is wrong ---------------------------------------------------------------------------------
