@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QApplication
 
 from app import resources
 from app.core.earlier import bring_here
+from app.core.file_lock import Turn
 from app.core.journal import left_behind
 from app.core.session import Session
 from app.core.settings import home
@@ -146,7 +147,8 @@ def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order, 2 when none can open."""
     bring_here()
     meeting_place = single_window.place(home())
-    if not options.alone and single_window.hand_over(meeting_place, Asked(options.files, options.demo)):
+    turn = Turn(home() / "starting")
+    if not options.alone and single_window.found(meeting_place, Asked(options.files, options.demo), turn):
         return 0
     refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:
@@ -170,6 +172,7 @@ def run(options: Options) -> int:
     first = first_steps(window, commands, options)
     if not options.alone:
         first.append(lambda: single_window.Meeting(meeting_place, commands.do_asked, window))
+        first.append(turn.leave)
     soon.put_first(first)
     IncomingFiles(window, commands.files.open_all)
     if isinstance(application, Application):

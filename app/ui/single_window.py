@@ -15,6 +15,7 @@ import stat
 import struct
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject
 from shiboken6 import isValid
 
+from app.core.file_lock import Turn
 from app.core.files import private_folder
 from nep.later import later
 
@@ -34,6 +36,7 @@ else:
 
 CONNECT_MS = 300
 ANSWER_MS = 3000
+START_S, LOOK_S = 20.0, 0.05
 LONGEST = 1_000_000
 LONGEST_PATH = 100  # a Unix socket's name has 108 bytes at most
 OK = b"ok\n"
@@ -124,6 +127,26 @@ def hand_over(name: str, asked: Asked) -> bool:
         answer += line.readAll().data()
     line.disconnectFromServer()
     return answer == OK
+
+
+def found(name: str, asked: Asked, turn: Turn, within_s: float = START_S) -> bool:
+    """Whether the window that runs, or one that another start is bringing up, does it.
+
+    When not, this start has the ``turn`` and brings up a window; it leaves the turn when that can be found.
+    Who clicks twice on Studio's icon gets one window.
+    """
+    until, pause, waited = time.monotonic() + within_s, threading.Event(), False
+    while not hand_over(name, asked):
+        if not name or time.monotonic() >= until:
+            return False
+        if turn.take():
+            if waited and hand_over(name, asked):  # it came between the two questions
+                turn.leave()
+                return True
+            return False
+        waited = True
+        pause.wait(LOOK_S)
+    return True
 
 
 def _is_others(line: QtNetwork.QLocalSocket) -> bool:

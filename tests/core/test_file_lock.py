@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.file_lock import locked
+from app.core.file_lock import Turn, locked
 
 HOLDER = """
 import sys
@@ -67,3 +67,24 @@ def test_a_folder_that_cant_be_made_is_no_reason_to_stop(tmp_path: Path) -> None
     (tmp_path / "file").write_text("in the way")
     with locked(tmp_path / "file" / "below") as held:
         assert not held
+
+
+def test_a_turn_is_one_process_s_until_it_leaves_or_dies(
+    holder: subprocess.Popen[str], tmp_path: Path
+) -> None:
+    turn, other = Turn(tmp_path / "file"), Turn(tmp_path / "file")
+    assert not turn.take()
+    holder.kill()
+    holder.wait(30)
+    assert turn.take()
+    assert turn.take()
+    assert not other.take()
+    turn.leave()
+    turn.leave()
+    assert other.take()
+    other.leave()
+
+
+def test_where_there_are_no_locks_everybody_has_the_turn(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    assert Turn(tmp_path / "file" / "starting").take()

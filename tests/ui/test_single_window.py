@@ -7,15 +7,17 @@ import socket as socket_module
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalSocket
+from PySide6.QtWidgets import QApplication
 
+from app.core.file_lock import Turn
 from app.ui import single_window
-from app.ui.single_window import Asked, Meeting, hand_over, is_ours, parse, peer_of, place
+from app.ui.single_window import Asked, Meeting, found, hand_over, is_ours, parse, peer_of, place
 
 WAIT_MS = 30_000
 SECOND = """
@@ -25,6 +27,11 @@ from app.ui.single_window import Asked, hand_over
 files = tuple(Path(each) for each in sys.argv[2:])
 sys.exit(0 if hand_over(sys.argv[1], Asked(files)) else 3)
 """
+
+
+def meet(name: str, do: Callable[[Asked], object]) -> Meeting:
+    """As Studio makes it: Qt owns it. One that only its connections keep goes in the midst of their end."""
+    return Meeting(name, do, QApplication.instance())
 
 
 @pytest.fixture
@@ -43,7 +50,7 @@ def test_nobody_there_means_a_window_of_its_own(name: str) -> None:
 
 def test_another_process_hands_over_whole_paths(qtbot, name: str, tmp_path: Path) -> None:
     asked: list[Asked] = []
-    meeting = Meeting(name, asked.append)
+    meeting = meet(name, asked.append)
     assert meeting.open
     process = second(name, "a.nepb", str(tmp_path / "Grüße.nepb"), cwd=tmp_path)
     qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
@@ -53,10 +60,62 @@ def test_another_process_hands_over_whole_paths(qtbot, name: str, tmp_path: Path
     assert hand_over(name, Asked()) is False
 
 
+STARTING = """
+import sys
+from pathlib import Path
+from app.core.file_lock import Turn
+from app.ui.single_window import Asked, found
+print("begun", flush=True)
+turn = Turn(Path(sys.argv[2]))
+there = found(sys.argv[1], Asked((Path("a.nepb"),)), turn, 60.0)
+print("found" if there else "first", flush=True)
+sys.stdin.read()
+"""
+
+
+def starting(name: str, turn: Path) -> subprocess.Popen[str]:
+    environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    return subprocess.Popen(
+        [sys.executable, "-c", STARTING, name, str(turn)],
+        env=environ,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_of_two_starts_at_once_the_second_waits_for_the_window_of_the_first(
+    qtbot, name: str, tmp_path: Path
+) -> None:
+    turn, asked = Turn(tmp_path / "starting"), []
+    assert not found(name, Asked(), turn)
+    process = starting(name, tmp_path / "starting")
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    meeting = meet(name, asked.append)
+    qtbot.waitUntil(lambda: bool(asked), timeout=12 * WAIT_MS)
+    assert process.communicate(timeout=60)[0] == "found\n"
+    meeting.close()
+    turn.leave()
+
+
+def test_a_start_that_dies_before_its_window_is_there_is_not_waited_for(name: str, tmp_path: Path) -> None:
+    turn = Turn(tmp_path / "starting")
+    process = starting(name, tmp_path / "starting")
+    assert process.stdout is not None
+    assert [process.stdout.readline() for _ in range(2)] == ["begun\n", "first\n"]
+    assert not turn.take()
+    process.kill()
+    process.communicate(timeout=60)
+    assert not found(name, Asked(), turn, 60.0)
+    assert not Turn(tmp_path / "starting").take(), "it has the turn"
+    turn.leave()
+
+
 def test_the_second_window_does_not_take_the_place_of_the_first(qtbot, name: str, tmp_path: Path) -> None:
     asked: list[Asked] = []
-    first = Meeting(name, asked.append)
-    later = Meeting(name, asked.append)
+    first = meet(name, asked.append)
+    later = meet(name, asked.append)
     assert (first.open, later.open) == (True, False)
     process = second(name, cwd=tmp_path)
     qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
@@ -77,14 +136,14 @@ def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
     process.kill()
     process.communicate()
     assert Path(name).exists(), "its socket is still there"
-    meeting = Meeting(name, lambda _asked: None)
+    meeting = meet(name, lambda _asked: None)
     assert meeting.open
     meeting.close()
 
 
 def test_nonsense_is_no_start(qtbot, name: str) -> None:
     asked: list[Asked] = []
-    meeting = Meeting(name, asked.append)
+    meeting = meet(name, asked.append)
     for data in (b"{\n", b"[]\n", b'{"files": "x"}\n', b"[" * 200_000 + b"\n", b"x" * 1_100_000):
         socket = QLocalSocket()
         socket.connectToServer(name)
@@ -96,7 +155,7 @@ def test_nonsense_is_no_start(qtbot, name: str) -> None:
 
 
 def test_only_this_user_reaches_the_window(qtbot, name: str) -> None:
-    meeting = Meeting(name, lambda _asked: None)
+    meeting = meet(name, lambda _asked: None)
     if os.name == "posix":
         assert Path(name).stat().st_mode & 0o077 == 0
     meeting.close()
@@ -158,7 +217,7 @@ def test_what_is_no_socket_of_ours_is_not_talked_to(qtbot, runtime: Path, tmp_pa
     name = place(tmp_path)
     os.mkfifo(name)
     assert hand_over(name, Asked()) is False
-    meeting = Meeting(name, lambda _asked: None)
+    meeting = meet(name, lambda _asked: None)
     assert meeting.open, "what is left in our own folder is ours to take away"
     assert is_ours(name)
     Path(name).parent.chmod(0o777)
@@ -171,7 +230,7 @@ def test_another_user_at_the_other_end_is_not_served(
     qtbot, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Asked] = []
-    meeting = Meeting(name, asked.append)
+    meeting = meet(name, asked.append)
     monkeypatch.setattr(single_window, "peer_of", lambda _descriptor: os.geteuid() + 1)
     assert hand_over(name, Asked()) is False
     socket = QLocalSocket()
