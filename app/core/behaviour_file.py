@@ -5,6 +5,7 @@ What this version does not know (a description, a field of a later program) is k
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,8 @@ FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
 TOO_DEEP = "more than 4000 blocks hang in one stack; divide it into several scripts"
+FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
+"""What systems say of a disk, a file or a share of a disk that takes nothing more."""
 OURS = frozenset({"format", "version", "name", "workspace", "robots"})
 
 Workspace = Mapping[str, object]
@@ -92,6 +95,5 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         raise DocumentError(path, f"can't be written: {TOO_DEEP}") from error
     except OSError as error:
         reason = error.strerror or str(error)
-        raise DocumentError(
-            path, f"can't be written ({reason}); make room there or save it in another place"
-        ) from error
+        room = "make room there or " if error.errno in FULL else ""
+        raise DocumentError(path, f"can't be written ({reason}); {room}save it in another place") from error

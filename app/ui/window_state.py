@@ -31,6 +31,7 @@ class WindowState:
         """``complain`` is told, in a sentence, what can't be kept."""
         self._settings = settings
         self._complain = complain
+        self._said = ""
 
     def apply_theme(self, theme: Theme) -> None:
         """Give the theme what was chosen before; it is applied once."""
@@ -106,6 +107,9 @@ class WindowState:
         try:
             self._settings.set(key, value)
         except SettingsError as error:
-            self._complain(str(error))
+            if str(error) != self._said:  # a line for each of the many things that are kept helps nobody
+                self._said = str(error)
+                self._complain(self._said)
             return False
+        self._said = ""
         return True

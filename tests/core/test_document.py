@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
 
+from app.core import behaviour_file
 from app.core.beside import Beside
 from app.core.compiled import Compiled
 from app.core.document import Document, read
@@ -215,6 +218,27 @@ def test_work_that_was_saved_is_no_longer_told_as_lost(tmp_path: Path) -> None:
     assert document.journal_error is not None
     document.new()
     assert document.journal_error is None
+
+
+@pytest.mark.parametrize(
+    ("number", "then"),
+    [
+        (errno.ENOSPC, "; make room there or save it in another place"),
+        (errno.EROFS, "; save it in another place"),
+        (errno.EACCES, "; save it in another place"),
+    ],
+)
+def test_only_on_a_full_disk_room_is_asked_for(
+    document: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, then: str
+) -> None:
+    def refuse(*_given: object, **_named: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    document.edited(STARTED)
+    monkeypatch.setattr(behaviour_file, "write_atomically", refuse)
+    with pytest.raises(DocumentError) as raised:
+        document.save(tmp_path / "Mine.nepb")
+    assert str(raised.value).endswith(f"can't be written ({os.strerror(number)}){then}")
 
 
 def test_the_file_carries_the_robots_that_its_blocks_name(document: Document, tmp_path: Path) -> None:

@@ -111,3 +111,21 @@ def test_recent_files_that_are_gone_say_so_and_the_list_can_be_cleared(
     window.show()
     QTest.mouseClick(window.toast.button, Qt.MouseButton.LeftButton)
     assert [file.name for file in settings.recent_known] == ["there", "gone"]
+
+
+def test_a_disk_that_keeps_nothing_is_told_once_until_it_keeps_again(tmp_path: Path) -> None:
+    (tmp_path / "home").write_text("no folder")
+    told: list[str] = []
+    state = WindowState(Settings(tmp_path / "home"), told.append)
+    for number in range(3):
+        state.keep(f"key{number}", number)
+    assert len(told) == 1
+    (tmp_path / "home").unlink()
+    state.keep("key", 1)
+    assert len(told) == 1
+    for file in (tmp_path / "home").iterdir():
+        file.unlink()
+    (tmp_path / "home").rmdir()
+    (tmp_path / "home").write_text("no folder")
+    state.keep("key", 2)
+    assert len(told) == 2
