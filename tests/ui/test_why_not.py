@@ -49,9 +49,10 @@ def test_without_a_screen_it_ends_with_a_sentence(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
 def test_as_root_with_the_browsers_sandbox_it_ends_with_a_sentence(tmp_path: Path) -> None:
     environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "NEP_STUDIO_HOME": str(tmp_path)}
+    environ["NEP_MASTER"] = "127.0.0.1:1"
     for name in ("QTWEBENGINE_DISABLE_SANDBOX", "QTWEBENGINE_CHROMIUM_FLAGS"):
         environ.pop(name, None)
-    command = [sys.executable, "-m", "app", "--master", "127.0.0.1:1"]
+    command = [sys.executable, "-m", "app"]
     done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False, timeout=50)
     assert done.returncode == 2
     assert "refuses to run as root with its sandbox; start Studio as another user" in done.stderr
