@@ -348,3 +348,26 @@ def test_everything_that_is_installed_for_us_is_pinned() -> None:
         needs = [Requirement(text) for text in found.requires or []]
         waiting += [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
     assert len(seen) > 20
+
+
+def test_links_between_the_documents_lead_somewhere() -> None:
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    missing = [
+        f"{page.relative_to(ROOT)}: {target}"
+        for page in pages
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8"))
+        if target != "NNNN-title.md"
+        and "://" not in target
+        and not target.startswith("mailto:")
+        and not (page.parent / target).exists()
+    ]
+    assert missing == []
+
+
+def test_a_page_says_who_can_do_what() -> None:
+    page = (ROOT / "docs" / "trust.md").read_text(encoding="utf-8")
+    for named in ("Programs of yours on this computer", "Other users of this computer", "after `--listen`"):
+        assert named in page
+    for part in ("What is made sure of", "What is not made sure of", "What pairing will change"):
+        assert f"\n## {part}\n" in page
+    assert "(docs/trust.md)" in (ROOT / "README.md").read_text(encoding="utf-8")
