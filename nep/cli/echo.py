@@ -15,7 +15,7 @@ import typer
 
 from nep.cli.complete import complete_more, complete_topic
 from nep.cli.graphs import Waiting, node_for
-from nep.cli.options import JsonOption, MasterOption
+from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json, size, write
 from nep.cli.table_file import Fields, Table
 from nep.cli.values import cleaned, json_of, presented
@@ -53,12 +53,7 @@ def echo(
     count: Annotated[
         int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N messages; 0 goes on.")
     ] = 0,
-    timeout_s: Annotated[
-        float | None,
-        typer.Option(
-            "--timeout", metavar="SECONDS", help="End when no message came for so long.", show_default=False
-        ),
-    ] = None,
+    timeout_s: TimeoutOption = None,
     master: MasterOption = None,
     as_json: JsonOption = False,
     as_csv: Annotated[

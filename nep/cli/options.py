@@ -19,3 +19,21 @@ MasterOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Write JSON, for programs.")]
+
+
+def _time(given: float | None) -> float | None:
+    if given is not None and not given >= 0.0:  # also what is not a number
+        raise typer.BadParameter(f"{given:g} is no time; give seconds, 0 or more")
+    return given
+
+
+TimeoutOption = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout",
+        metavar="SECONDS",
+        help="End when no message came for so long.",
+        show_default=False,
+        callback=_time,
+    ),
+]

@@ -15,6 +15,7 @@ from typing import Annotated
 import orjson
 import typer
 
+from nep.arguments import text
 from nep.cli.complete import complete_topic
 from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
@@ -40,6 +41,15 @@ _Payload = Annotated[
         show_default=False,
     ),
 ]
+
+
+def _type(given: str | None) -> str | None:
+    try:
+        return text("it", given) if given else None
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
 _TypeOption = Annotated[
     str | None,
     typer.Option(
@@ -48,6 +58,7 @@ _TypeOption = Annotated[
         metavar="TYPE",
         help="The topic's type; else the one it has, else json.",
         show_default=False,
+        callback=_type,
     ),
 ]
 _RateOption = Annotated[

@@ -15,7 +15,7 @@ import typer
 from nep.cli.complete import complete_topic
 from nep.cli.graphs import Waiting, node_for
 from nep.cli.measure import Frequency, Traffic, Window
-from nep.cli.options import JsonOption, MasterOption
+from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
 from nep.errors import WaitTimeoutError
 from nep.message import Message
@@ -43,12 +43,6 @@ WindowOption = Annotated[
 ]
 CountOption = Annotated[
     int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N reports; 0 goes on.")
-]
-TimeoutOption = Annotated[
-    float | None,
-    typer.Option(
-        "--timeout", metavar="SECONDS", help="End when no message came for so long.", show_default=False
-    ),
 ]
 Figures = Mapping[str, object]
 

@@ -326,3 +326,18 @@ def test_a_master_that_listens_says_what_others_type_and_warns(address, start):
 def test_the_command_starts_without_loading_rich():
     code = "import sys, nep.cli.app; sys.exit(any(name.split('.')[0] == 'rich' for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], env=environment(), check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("topic", "echo", "t", "--timeout", "nan"), "nan is no time; give seconds, 0 or more"),
+        (("topic", "hz", "t", "--timeout", "-1"), "-1 is no time; give seconds, 0 or more"),
+        (("topic", "pub", "t", "1", "--type", "a\x01"), "it is 'a\\x01'; use 200 letters at most"),
+        (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use 200"),
+    ],
+)
+def test_what_cannot_be_is_told_before_a_master_is_looked_for(words, sentence):
+    done = run(*words)
+    assert done.returncode == 2
+    assert sentence in done.stderr
