@@ -130,5 +130,7 @@ def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
 
 
 def _check_word(what: str, word: str, most: int) -> None:
-    if len(word) > most or control_in(word):
-        raise WireError(f"'{escaped(shortened(word, 40))}' cannot be its {what}; use {most} letters at most")
+    control = control_in(word)
+    if len(word) > most or control:
+        hint = f"the character '{control}' is not allowed in it" if control else f"use {most} letters at most"
+        raise WireError(f"'{escaped(shortened(word, 40))}' cannot be its {what}; {hint}")
