@@ -70,6 +70,7 @@ class Runs:
         self._robots_told = -1
         self._run = RunState()
         self._stop_number = 0
+        self._asked_again: set[str] = set()
         self._stop_thread: threading.Thread | None = None
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
@@ -131,6 +132,7 @@ class Runs:
 
     def stop(self) -> None:
         """End the program and stop every robot; what they answer is the run bar's result."""
+        self._asked_again.clear()
         self._stop(None)
         self._fleet.moving.withdraw()
 
@@ -139,6 +141,10 @@ class Runs:
         if self.active:
             self.stop()
             return
+        self._asked_again.discard(name)
+        self._stop_one(name)
+
+    def _stop_one(self, name: str) -> None:
         stopper, post = self._network.stopper, self._post_event
         self._fleet.told_to_stop([name])
 
@@ -148,12 +154,19 @@ class Runs:
         threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
 
     def stop_again(self, name: str) -> None:
-        """A robot that was not stopped says that it could end what went on: it is asked to prove it."""
-        report = self._run.report
-        if self._run.state == "unanswered" and report is not None and name in report.silent:
+        """A robot that was not stopped says that it could end what went on: it is asked to prove it.
+
+        Once after a person's Stop: one whose stop takes longer each time than it may is not stopped for ever.
+        """
+        report, state = self._run.report, self._run.state
+        if name in self._asked_again:
+            return
+        if state == "unanswered" and report is not None and name in report.silent:
+            self._asked_again.add(name)
             self._stop(self._run.asked)
-        elif self._run.state in {"ready", "proven"}:
-            self.stop_robot(name)
+        elif state in {"ready", "proven"}:
+            self._asked_again.add(name)
+            self._stop_one(name)
 
     def follow_robots(self) -> None:
         """Robots came, or were started anew: the program is told, of what moves after the question."""

@@ -258,6 +258,27 @@ def test_an_action_that_goes_on_is_shown_until_the_robot_says_that_it_has_ended(
     tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
 
 
+def test_one_whose_stop_is_too_late_each_time_is_asked_once_more_and_not_for_ever(
+    session: Session, pepper: WireRobot
+) -> None:
+    link = the_link(session, "Pepper")
+    say_ = pepper._say
+    pepper._say = lambda command, state, error="": say_(command, "failed", SAID)  # type: ignore[method-assign]
+    session.runs.stop()
+    for stops in (1, 2, 2, 2):  # it is late, says so, and ends at last
+        tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
+        lives(pepper, "the stop itself")
+        tick_until(session, lambda: link.goes_on, LONG_S)
+        assert len(pepper.heard("stop")) == stops
+        lives(pepper)
+        tick_until(session, lambda: not link.goes_on, LONG_S)
+        session.tick()
+    assert (link.state, session.runs.view().confirm) == ("not stopped", "Pepper is still")
+    session.runs.stop()  # a person asks: it is given another chance
+    tick_until(session, lambda: len(pepper.heard("stop")) == 3, LONG_S)
+    tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
+
+
 def test_one_that_says_that_it_may_still_move_and_goes_away_stays_red(
     session: Session, master: Master
 ) -> None:
