@@ -322,6 +322,17 @@ def test_no_program_without_a_key_registers_such_an_endpoint_either(master: Mast
         assert isinstance(attacker.ask(AddPublisher(own, record("tcp://127.0.0.1:9"))), Added)
 
 
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [("x\u202ey", r"'\u202e' is not allowed in it"), ("j" * 1000, "use 200 letters at most")],
+)
+def test_why_a_type_is_refused_is_said(master: Master, word: str, said: str) -> None:
+    with attacker_at(master) as attacker:
+        refused = attacker.ask(AddPublisher(node(), publisher(msg_type=word)))
+        assert isinstance(refused, Refused)
+        assert said in refused.reason
+
+
 def test_what_no_program_may_register_is_refused_counted_and_named(master: Master, victims: Victims) -> None:
     with attacker_at(master) as attacker:
         nonsense: list[Request] = [
