@@ -123,6 +123,7 @@ class Announcements:
                 known.watch = self._watches.open([topic])
             if known.owner is None or known.owner.node_id not in nodes:
                 known.owner, known.robot, known.parsed = identity_of(view, nodes[0]), None, None
+                known.wrong = None
                 known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MOST_OWNERS]
             others = (node for node in nodes if node != known.owner.node_id)
             known.twins = tuple(identity_of(view, node) for node in others)

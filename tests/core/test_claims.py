@@ -383,6 +383,18 @@ def test_a_robot_that_slept_while_another_had_its_name_is_there_again(crowd: int
     assert [identity.node_id for _, _, identity in announcements.robots] == ["first"]
 
 
+def test_what_one_program_said_wrongly_is_not_held_against_the_next() -> None:
+    opened: list[str] = []
+    announcements = Announcements(Watches(opened.append, opened.remove), Senders())
+    announcements.update(_two_programs("first"))
+    payload = json.dumps(description("Turtle")).encode()  # on the topic of Pepper
+    wrong = nep.Message("/Pepper/description", payload, "json", DESCRIPTION_TYPE, publisher=1)
+    announcements.add({"/Pepper/description": Batch([wrong])})
+    assert "/Pepper/description" in announcements.claims
+    announcements.update(_two_programs("second"))  # it has said nothing yet
+    assert not announcements.claims
+
+
 def test_a_robot_that_slept_is_there_again_though_somebody_else_kept_its_topic_subscribed() -> None:
     opened: list[str] = []
     watches = Watches(opened.append, opened.remove)
