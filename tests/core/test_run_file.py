@@ -246,7 +246,7 @@ LAST = {
 def test_the_examples_run_on_the_virtual_robot(master, virtual_pepper, name):
     files = sorted(resources.path("examples").glob("*.nepb"))
     (path,) = [each for each in files if json.loads(each.read_text("utf-8"))["name"] == name]
-    code, out = run(path, robot_wait_s=20)
+    code, out = run(path, robot_wait_s=100)
     assert code == OK, out
     assert f"Pepper says “{LAST[name]}”" in out
     assert "Pepper stopped (" in out
@@ -275,7 +275,7 @@ def test_the_examples_that_listen_do_so_on_the_virtual_robot(master, virtual_pep
     out, interrupted = io.StringIO(), threading.Event()
     found: list[int] = []
     run = threading.Thread(
-        target=lambda: found.append(run_file(path, out=out, robot_wait_s=20, interrupted=interrupted))
+        target=lambda: found.append(run_file(path, out=out, robot_wait_s=100, interrupted=interrupted))
     )
     with nep.node("somebody", master=master.address) as node:
         hand, weather = node.new_pub("/Pepper/world", "json"), node.new_pub("/weather", "json")
