@@ -18,7 +18,8 @@ class RunState:
     """Where the run is. ``state`` is ready, running, paused, stopping, proven or unanswered.
 
     ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the
-    program's clock stands while it is paused (``held_s``, ``pause_began_s``).
+    program's clock stands while it is paused (``held_s``, ``pause_began_s``). ``again``: the stop before this
+    one is not proven.
     """
 
     state: str = "ready"
@@ -31,6 +32,7 @@ class RunState:
     pause_began_s: float | None = None
     elapsed_s: float | None = None
     pressed_s: float = 0.0
+    again: bool = False
     asked: tuple[str, ...] = ()
     answered: list[RobotStop] = field(default_factory=list)
     report: StopReport | None = None
@@ -107,7 +109,7 @@ def _named(view: RunView, run: RunState) -> RunView:
 
 
 def _view(run: RunState, connected: Sequence[str], now: float) -> RunView:
-    early = run.state == "stopping" and now - run.pressed_s < STOPPING_SHOWN_AFTER_S
+    early = run.state == "stopping" and not run.again and now - run.pressed_s < STOPPING_SHOWN_AFTER_S
     views: dict[str, Callable[[RunState, float], RunView]] = {
         "running": _running,
         "paused": _paused,

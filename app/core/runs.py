@@ -340,6 +340,7 @@ class Runs:
         """Stop these robots, or all."""
         run = self._run
         run.pressed_s = self._clock()
+        run.again = run.state == "unanswered" or (run.state == "stopping" and run.again)
         if self.active:
             run.elapsed_s = run.elapsed(run.pressed_s)
         elif run.state not in {"stopping", "unanswered"}:

@@ -87,6 +87,7 @@ def test_a_robot_that_refuses_stop_is_said_to_refuse_everywhere(session: Session
     assert any("the brake does not answer" in record.text for record in session.console.records)
     arm.body.stuck = False  # type: ignore[attr-defined]
     session.runs.stop()
+    assert session.runs.view().title == "Stopping"  # at once: it was not "Ready" before
     tick_until(session, lambda: session.runs.view().state == "proven")
     assert link.chip.removeprefix("virtual, ") == "ready"
     assert not session.alerts.has("stop")

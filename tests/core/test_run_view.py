@@ -66,6 +66,12 @@ def test_stopping_shows_only_after_100_ms_and_counts_the_answers() -> None:
     assert not view.can_run
 
 
+def test_a_stop_after_one_that_is_not_proven_never_says_ready() -> None:
+    run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper",), again=True)
+    view = view_of(run, [], 10.01)
+    assert (view.state, view.title, view.stop_word) == ("stopping", "Stopping", "Stopping")
+
+
 def test_proven_says_how_long_it_took() -> None:
     view = view_of(after(PEPPER, TURTLE, elapsed_s=14.0, dashed=True), [], 0)
     assert (view.title, view.detail) == ("Stopped after 14 s", "The dashed outline shows where")
