@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -11,6 +12,8 @@ from nep.gateway.processes import Processes
 from nep.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
+_COMING_S = 10.0
+"""So long after it asked a program may still be about to come: who comes and goes may be somebody else."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +44,20 @@ class Program:
 class Census:
     """Follows the registrations of a port map. Belongs to the gateway's thread."""
 
-    def __init__(self, known: PortMap, processes: Processes, pair_of: Callable[[Line], Pair | None]) -> None:
+    def __init__(
+        self,
+        known: PortMap,
+        processes: Processes,
+        pair_of: Callable[[Line], Pair | None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock = clock
         self._known = known
         self._processes = processes
         self._pair_of = pair_of
         self._roles: dict[Registration, frozenset[Role]] = {}
         self._was_joined: set[Registration] = set()
-        self._openings: dict[Registration, int] = {}
+        self._openings: dict[Registration, tuple[int, float]] = {}
 
     def look(self, lines: Iterable[Line] | None = None) -> None:
         """Find out who is joined to these lines (all, when none are named)."""
@@ -181,8 +191,10 @@ class Census:
         pair = self._pair_of(registration.line)
         if pair is None:
             return False
-        before = self._openings.setdefault(registration, pair.openings)
-        return pair.openings > before and not any(pair.connections.values())
+        now = self._clock()
+        before, asked_at = self._openings.setdefault(registration, (pair.openings, now))
+        came = pair.openings > before and not any(pair.connections.values())
+        return came and now - asked_at >= _COMING_S
 
     def _is_gone(self, registration: Registration) -> bool:
         if registration.pid is not None and registration.started is not None:

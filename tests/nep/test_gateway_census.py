@@ -34,8 +34,9 @@ def scene():
     pair = SimpleNamespace(
         ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0, unserved={}
     )
-    census = Census(known, processes, lambda line: pair if line == LINE else None)
-    return SimpleNamespace(known=known, processes=processes, pair=pair, census=census)
+    now = [0.0]
+    census = Census(known, processes, lambda line: pair if line == LINE else None, lambda: now[0])
+    return SimpleNamespace(known=known, processes=processes, pair=pair, census=census, now=now)
 
 
 def register(scene, pid=7, socket="publisher", node="n", started=100.0):
@@ -111,8 +112,23 @@ def test_a_program_that_left_before_anybody_looked_is_gone(scene):
     register(scene)
     scene.census.look()
     scene.pair.openings = 1
+    scene.now[0] = 11.0
     scene.census.look()
     assert scene.census.forget_the_gone()
+
+
+def test_a_stranger_that_comes_and_goes_ends_no_program_that_is_about_to_come(scene):
+    register(scene)
+    scene.census.look()
+    scene.pair.openings = 1
+    scene.now[0] = 3.0
+    scene.census.look()
+    assert not scene.census.forget_the_gone()
+    scene.pair.connections["subscriber"] = 1
+    scene.processes.joined = {(7, 9001)}
+    scene.now[0] = 11.0
+    assert roles(scene) == ["subscriber"]
+    assert not scene.census.forget_the_gone()
 
 
 def test_one_program_that_publishes_and_subscribes_is_one_node_with_two_links(scene):

@@ -127,9 +127,9 @@ def test_a_huge_filter_ends_its_connection_and_nothing_else(gateway, original):
         ended = bool(monitor.poll(10_000))
         os._exit(0 if ended else 1)  # its own tree is as deep: without closing anything
     """
-    attack = subprocess.run(
-        [sys.executable, "-c", code, f"tcp://127.0.0.1:{port + 1}"], timeout=30, check=False
-    )
-    assert attack.returncode == 0, "it was not disconnected"
+    attacker = [sys.executable, "-c", code, f"tcp://127.0.0.1:{port + 1}"]
     with original.subscriber(port + 1, b"t") as subscriber, original.publisher(port) as publisher:
         original.publish_until(publisher, b't {"n":1}', lambda: subscriber.poll(0))
+        assert subprocess.run(attacker, timeout=60, check=False).returncode == 0, "it was not disconnected"
+        original.waiting(subscriber)
+        original.publish_until(publisher, b't {"n":2}', lambda: subscriber.poll(0))
