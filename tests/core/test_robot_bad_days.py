@@ -37,6 +37,7 @@ class Turtles:
     """Turtles as processes."""
 
     def __init__(self, address: str) -> None:
+        self.address = address
         self._environment = {**os.environ, "NEP_MASTER": address, "PYTHONPATH": str(ROOT)}
         self._processes: list[subprocess.Popen[bytes]] = []
 
@@ -77,10 +78,13 @@ def turns_for_long(session: Session) -> None:
     session.document.edited(workspace(started(turn, again)))
 
 
-def runs(session: Session) -> None:
+def runs(session: Session, turtles: Turtles) -> None:
     turns_for_long(session)
-    session.runs.run()
-    tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
+    with nep.node("listener", master=turtles.address) as node:
+        answers = node.new_sub("/Turtle/answer", "robot/answer")
+        session.runs.run()
+        tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
+        tick_until(session, lambda: answers.listen()[0])  # one that never did "does not answer"
     moving = lambda: "turns 360" in session.runs.view().detail  # noqa: E731
     tick_until(session, moving)
 
@@ -90,11 +94,11 @@ def says_so_at_the_block(session: Session) -> None:
     assert session.runs.block_errors == {"x": "Turtle has stopped answering. Start the virtual robot again."}
 
 
-def well_again(session: Session) -> None:
+def well_again(session: Session, turtles: Turtles) -> None:
     """A person says that it stands still; then it can be used as before."""
     there(session)
     session.runs.confirm_still()
-    runs(session)
+    runs(session, turtles)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "proven")
     assert session.runs.view().result_ok
@@ -103,7 +107,7 @@ def well_again(session: Session) -> None:
 def test_a_robot_that_is_killed_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
     process = turtles.start()
     there(session)
-    runs(session)
+    runs(session, turtles)
     process.kill()
     says_so_at_the_block(session)
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
@@ -111,13 +115,13 @@ def test_a_robot_that_is_killed_in_the_middle_of_an_action(session: Session, tur
     assert "Switch Turtle off by hand." in session.runs.view().detail
     tick_until(session, lambda: not session.fleet.connected, FOUND_S)
     turtles.start()
-    well_again(session)
+    well_again(session, turtles)
 
 
 def test_a_robot_that_hangs_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
     process = turtles.start()
     link = there(session)
-    runs(session)
+    runs(session, turtles)
     process.send_signal(signal.SIGSTOP)
     says_so_at_the_block(session)
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
@@ -131,7 +135,7 @@ def test_a_robot_that_hangs_in_the_middle_of_an_action(session: Session, turtles
     tick_until(session, lambda: there(session).state == "ready", FOUND_S)
     with session.fleet.look_at("Turtle"):  # what it was doing does not go on: it was told to stop
         tick_until(session, lambda: link.drawing is not None and not link.drawing["moving"])
-    well_again(session)
+    well_again(session, turtles)
 
 
 # ---- a robot that lies -----------------------------------------------------------------------------

@@ -125,10 +125,12 @@ def test_uses_and_inputs_follow_when_an_input_is_renamed_added_or_taken_away(qtb
     them = person(state=greeting())
     type_into(them, qtbot, "[data-id=g] .blocklyInputField ~ .blocklyInputField", "name")
     qtbot.waitUntil(lambda: "name" in parts(them, "c") and "name" in parts(them, "inside"), timeout=WAIT_MS)
+    at_first = them.box("[data-id=g] .nepButton")
     them.click("[data-id=g] .nepButton ~ .nepButton", dx=8, dy=8)
     qtbot.waitUntil(lambda: "input" in parts(them, "c"), timeout=WAIT_MS)
     view.undo()
     qtbot.waitUntil(lambda: "input" not in parts(them, "c"), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: them.box("[data-id=g] .nepButton") == at_first, timeout=WAIT_MS)  # drawn later
     before = them.newest()
     them.click("[data-id=g] .nepButton", dx=8, dy=8)
     qtbot.waitUntil(lambda: len(them.tops()) == 3, timeout=WAIT_MS)  # the text “Ada” lies beside
