@@ -10,6 +10,8 @@ from app.core.stop_report import RobotStop, StopReport
 
 STOPPING_SHOWN_AFTER_S = 0.1
 MOST_NAMED = 4
+WIDEST_NAMES = 24
+"""Longer names of robots are not repeated on the button beside the sentence that has them."""
 NOTHING = "Take “when started” from Events and hang blocks below it"
 
 
@@ -259,12 +261,15 @@ def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
         slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in still)
         stopped = f"{listed(still)} stopped ({max(1, round(slowest))} ms). "
     them = names if len(report.silent) <= 2 else "them"
+    is_one = len(report.silent) == 1
+    if len(names) > WIDEST_NAMES:  # the sentence beside the button must have room
+        names = "It" if is_one else "They"
     title = _wrong_words(report)
     return (
         title,
         f"{stopped}Switch {them} off by hand.",
-        f"{title}; switch {'it' if len(report.silent) == 1 else 'them'} off by hand",
-        f"{names} {'is' if len(report.silent) == 1 else 'are'} still",
+        f"{title}; switch {'it' if is_one else 'them'} off by hand",
+        f"{names} {'is' if is_one else 'are'} still",
     )
 
 

@@ -117,6 +117,13 @@ def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
     assert view_of(after(*refused), [], 0).title.endswith("R3 may still move: no; 5 more may still move")
 
 
+def test_the_button_beside_the_sentence_leaves_it_room() -> None:
+    long = RobotStop("The old blue robot in the entrance hall", False, None)
+    view = view_of(after(PEPPER, long), [], 0)
+    assert (view.title, view.confirm) == (f"{long.name} did not answer", "It is still")
+    assert view_of(after(long, SILENT), [], 0).confirm == "They are still"
+
+
 def test_robots_are_counted_not_the_programs_that_serve_them() -> None:
     twin = RobotStop("Pepper", False, None, program="pepper 2")
     view = view_of(after(PEPPER, twin, TURTLE), [], 0)
