@@ -24,12 +24,12 @@ from nep.backends.choosing import backend_named
 from nep.codecs import codec_for
 from nep.configuration import Configuration, Direct, Hybrid, checked_mode, checked_port
 from nep.errors import ClosedError, DecodeError
-from nep.graph import GraphView
 from nep.inbox import MAX_MESSAGES, Keep
 from nep.logs import LogHandler, handler_of
 from nep.pubsub import SLICE_S, Publisher, Subscriber
 from nep.records import NodeRecord
 from nep.registration import id_from, node_id_from
+from nep.views import GraphView
 from nep.wire import check_node_name, check_topic
 
 if TYPE_CHECKING:

@@ -26,7 +26,10 @@ else:
 
 _FILES = 16
 
-__all__ = ["Owner", "is_running", "listen", "look", "start_process"]
+NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+"""A `creationflags`: Windows opens a window for every console program otherwise."""
+
+__all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "look", "start_process"]
 
 
 class Owner:
@@ -116,7 +119,7 @@ def start_process(
     words = [*(command or (sys.executable, "-m", "nep")), "master"]
     if owner_pid is not None:
         words += ["--owner-pid", str(owner_pid)]
-    detached = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | getattr(subprocess, "CREATE_NO_WINDOW", 0)
+    detached = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | NO_CONSOLE
     process = subprocess.Popen(
         words,
         stdin=subprocess.DEVNULL,

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 
 from app.errors import RunnerError
 from nep.later import later
+from nep.starting import NO_CONSOLE
 
 if TYPE_CHECKING:
     import psutil
 else:
     psutil = later("psutil")
 
-NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-"""Windows opens a window for every console program otherwise."""
 MOST_BYTES = 1_000_000_000
 """How much memory a program may use, together with what it starts."""
 FAMILY_S = 1.0

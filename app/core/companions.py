@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO
 
-from app.core.child_process import NO_CONSOLE
 from app.core.master_start import MasterStart
+from nep.starting import NO_CONSOLE
 
 END_WAIT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}

@@ -18,8 +18,8 @@ from app.core.mailbox import Batch
 from app.core.moving import MayNotMoveError, Moving
 from app.core.rize_names import RizeNames
 from app.core.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
-from app.core.run_view import STOPPING_SHOWN_AFTER_S
 from app.core.settings import Settings
+from app.core.stop_report import STOPPING_SHOWN_AFTER_S
 from app.core.stopping import MOST_TOPICS
 from app.core.tries import Tries
 from app.core.watches import Watch, Watches

@@ -139,3 +139,12 @@ class Reach:
 
         self._asking = threading.Thread(target=work, name="studio-reach", daemon=True)
         self._asking.start()
+
+
+def words_of(reach: Reach) -> tuple[str, str, str | None]:
+    """What the status bar says of it: icon, words, status."""
+    if reach.hosts:
+        return "wifi", f"Other computers connect at {', '.join(reach.hosts)}", "warn"
+    if not reach.is_near:
+        return "network", f"Master on {reach.master_host}", None
+    return "lock", "This computer only", None

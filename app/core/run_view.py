@@ -6,9 +6,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from app.core.stop_report import RobotStop, StopReport
+from app.core.stop_report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport
 
-STOPPING_SHOWN_AFTER_S = 0.1
 MOST_NAMED = 4
 WIDEST_NAMES = 24
 """Longer names of robots are not repeated on the button beside the sentence that has them."""

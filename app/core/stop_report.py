@@ -111,3 +111,6 @@ class StopReport:
 def not_reached(name: str, why: str = "") -> RobotStop:
     """The line of a robot that could not be told to stop, and why."""
     return RobotStop(name, False, None, error=f"{name} was not told to stop{f': {why}' if why else ''}")
+
+
+STOPPING_SHOWN_AFTER_S = 0.1

@@ -5,43 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.robots.description import Action
 from app.ui.controls import Pictures
 from app.ui.flow import Flow
 from app.ui.forms import ActionForm
-from app.ui.icons import paint_icon
 from app.ui.theme import Theme
 from app.ui.try_list import TryList
 from app.ui.try_words import end_words, left_words, now_words, output_words, progress_of
-from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, paint, set_role
+from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, set_role
+from app.ui.widgets.small import Tile
 
 if TYPE_CHECKING:
     from app.core.robot_link import Invocation
 
-TILE = 28
 RISKS = {"moves": "moves the robot", "locomotes": "moves the robot"}
-
-
-class Tile(QWidget):
-    """A white icon on the colour of a block category."""
-
-    def __init__(self, theme: Theme, icon: str, category: str = "robot", side: int = TILE) -> None:
-        super().__init__()
-        self._theme, self._icon, self._category = theme, icon, category
-        self.setFixedSize(side, side)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
-        paint.box(painter, rect, self._theme.radius("small"), self._theme.block_colour(self._category))
-        inset = rect.width() * 0.22
-        ink = self._theme.block_text(self._category)
-        paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), self._icon, ink)
-        painter.end()
 
 
 class ActionCard(Card):

@@ -10,6 +10,7 @@ from app.ui.control_colour import colour_control
 from app.ui.control_number import number_control
 from app.ui.control_picture import NoPictures, Pictures, picture_control
 from app.ui.control_text import text_control
+from app.ui.input_words import NUMBERS
 from app.ui.theme import Theme
 from app.ui.widgets import Choice, Segments, Switch
 
@@ -19,7 +20,6 @@ __all__ = [
 
 SEGMENTS_AT_MOST = 4
 SEGMENT_LETTERS = 44
-NUMBERS = frozenset({"number", "integer", "angle"})
 
 
 def control_for(

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.ui.start_parts import LinkButton
 from app.ui.theme import Theme
 from app.ui.widgets import Elided, Line
+from app.ui.widgets.button import LinkButton
 
 COMMAND = "help.doctor"
 

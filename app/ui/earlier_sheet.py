@@ -16,10 +16,10 @@ from app.core.behaviour_file import read_file
 from app.core.block_difference import Difference, difference
 from app.core.earlier import Version, namesakes_of, versions_of
 from app.errors import DocumentError
+from app.ui.dates import when_words
 from app.ui.entry_list import EntryList, Heading, Line
 from app.ui.overlay import Overlay
 from app.ui.palette_match import Entry, Found
-from app.ui.start_parts import day_words
 from app.ui.theme import Theme
 from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton, label, paint
 from app.ui.words import plural
@@ -31,12 +31,6 @@ WHAT_MAKES_ONE = (
     " close a tab with unsaved work."
 )
 SAVE_FIRST = "Save it. From then on Studio keeps what the file said before each time that you save again."
-
-
-def when_words(then: dt.datetime, now: dt.datetime) -> str:
-    """Say "Today, 8:12", "Yesterday, 8:12", "17 November, 8:12"."""
-    day = day_words(then, now)
-    return day if then.date() == now.date() else f"{day}, {then.hour}:{then.minute:02d}"
 
 
 def difference_words(found: Difference) -> str:

@@ -13,9 +13,9 @@ from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemD
 from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.palette_match import Entry, Found
-from app.ui.shortcuts import spoken_key
 from app.ui.theme import Theme
 from app.ui.widgets import paint
+from app.ui.words import spoken_key
 
 ROW, HEADING, INSET = 40, 30, 8
 ICON_LEFT, TEXT_LEFT, RIGHT = 10, 38, 10

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 from app.robots.description import Action, Parameter
 from app.robots.inputs import to_words
-from app.ui.controls import NUMBERS
 
 UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
 LONGEST_TEXT = 32
@@ -37,3 +36,6 @@ def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
         words = to_words(value)
         return words if len(words) <= LONGEST_TEXT else f"{words[: LONGEST_TEXT - 1]}…"
     return str(value) if parameter.kind == "colour" and value else ""
+
+
+NUMBERS = frozenset({"number", "integer", "angle"})

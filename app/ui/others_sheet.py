@@ -135,12 +135,3 @@ class OthersSheet(Overlay):
     def _let_nobody_in(self) -> None:
         self._reach.let_in(())
         self.shut()
-
-
-def words_of(reach: Reach) -> tuple[str, str, str | None]:
-    """What the status bar says of it: icon, words, status."""
-    if reach.hosts:
-        return "wifi", f"Other computers connect at {', '.join(reach.hosts)}", "warn"
-    if not reach.is_near:
-        return "network", f"Master on {reach.master_host}", None
-    return "lock", "This computer only", None

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 from app.ui.entry_list import EntryList, Heading, Line
 from app.ui.icons import paint_icon
 from app.ui.overlay import Overlay
-from app.ui.palette_entries import TITLES
 from app.ui.palette_match import Entry, Finder, Found
 from app.ui.theme import Theme
 from app.ui.widgets import label, paint
@@ -236,3 +235,15 @@ class Palette(Overlay):
         if entry is not None and entry.kind == "command":
             self.shut()
             self._rebind(entry.name)
+
+
+TITLES = {
+    "recent": "Recently used",
+    "command": "Commands",
+    "panel": "Panels",
+    "topic": "Topics",
+    "robot": "Robots",
+    "layout": "Layouts",
+    "file": "Recent files",
+    "example": "Examples",
+}

@@ -6,22 +6,12 @@ import datetime as dt
 from collections.abc import Sequence
 
 from app.ui.actions import TABLE
+from app.ui.dates import day_words
 from app.ui.main_window import MainWindow
 from app.ui.palette_match import Entry
 from app.ui.reasons import why_not
 from app.ui.shortcuts import Shortcuts
-from app.ui.start_parts import day_words
 
-TITLES = {
-    "recent": "Recently used",
-    "command": "Commands",
-    "panel": "Panels",
-    "topic": "Topics",
-    "robot": "Robots",
-    "layout": "Layouts",
-    "file": "Recent files",
-    "example": "Examples",
-}
 TOPIC_ICONS = {"json": "braces", "string": "type", "bytes": "binary", "image": "image"}
 HIDDEN = {"palette.open", *(f"panel.{number}" for number in range(1, 10))}
 

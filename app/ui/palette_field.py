@@ -7,9 +7,9 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from app.ui.icons import paint_icon
-from app.ui.shortcuts import spoken_key
 from app.ui.theme import Theme
 from app.ui.widgets import paint
+from app.ui.words import spoken_key
 
 WORDS = "Find a command or panel"
 WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9

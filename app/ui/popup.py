@@ -9,9 +9,9 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.overlay import Overlay
-from app.ui.shortcuts import spoken_key as spoken_key
 from app.ui.theme import Theme
 from app.ui.widgets import IconButton, label, paint
+from app.ui.words import spoken_key
 
 
 class KeyCap(QWidget):

@@ -11,7 +11,7 @@ from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.ui import plain
-from app.ui.earlier_sheet import when_words
+from app.ui.dates import when_words
 from app.ui.robot_item import LIST_WIDTH, RobotItem
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Card, label

@@ -11,9 +11,10 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from app.ui.entry_list import EntryList, Heading, Line
 from app.ui.overlay import Overlay
 from app.ui.palette_match import Entry, Found, match
-from app.ui.shortcuts import FIXED, STOP, Shortcuts, key_of, spoken_key
+from app.ui.shortcuts import FIXED, STOP, Shortcuts, key_of
 from app.ui.theme import Theme
 from app.ui.widgets import Button, IconButton, SearchField, label, paint
+from app.ui.words import spoken_key
 
 WIDE, HIGH = 680, 640
 ONLY_MODIFIERS = frozenset(

@@ -18,7 +18,7 @@ from app.core.settings import Settings
 from app.errors import SettingsError
 from app.ui import plain
 from app.ui.actions import TABLE, Row
-from app.ui.words import spoken_key as spoken_key
+from app.ui.words import spoken_key
 
 STOP, STOP_KEY = "run.stop", "F12"
 NEEDS_WITH = "A key alone is for typing. Hold Ctrl or Alt with it, or use a function key."

@@ -24,9 +24,10 @@ from app.core.files import read_whole
 from app.core.settings import RecentFile
 from app.ui.miniature import Row, rows
 from app.ui.start_art import EmptyPageArt, RobotArt
-from app.ui.start_parts import BigCard, DevelopersLine, ExampleCard, LinkButton, RecentRow
+from app.ui.start_parts import BigCard, DevelopersLine, ExampleCard, RecentRow
 from app.ui.theme import Theme
 from app.ui.widgets import Button, label, paint
+from app.ui.widgets.button import LinkButton
 
 WIDTH = 1080
 BANNER_ROOM = 40

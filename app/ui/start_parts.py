@@ -6,21 +6,22 @@ import datetime as dt
 from pathlib import Path
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.settings import RecentFile
 from app.ui import plain
+from app.ui.dates import day_words
 from app.ui.icons import paint_icon
 from app.ui.miniature import Row, paint_rows
 from app.ui.start_art import Art, upper_corners
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Card, Chip, Elided, label, paint
+from app.ui.widgets.button import LinkButton
 
 EXAMPLE_ART = 112
 RECENT_HEIGHT = 48
 TILE = 30
-ARROW = 16
 
 
 class CardTitle(QLabel):
@@ -114,17 +115,6 @@ class ExampleCard(QAbstractButton):
         painter.end()
 
 
-def day_words(then: dt.datetime, now: dt.datetime) -> str:
-    """Say "Today, 8:12", "Yesterday", "17 November", "17 November 2025"."""
-    days = (now.date() - then.date()).days
-    if days == 0:
-        return f"Today, {then.hour}:{then.minute:02d}"
-    if days == 1:
-        return "Yesterday"
-    words = f"{then.day} {then:%B}"
-    return words if then.year == now.year else f"{words} {then.year}"
-
-
 class RecentRow(QAbstractButton):
     """A file opened lately: its tile, its name, and when."""
 
@@ -161,52 +151,6 @@ class RecentRow(QAbstractButton):
         paint.words(painter, area, self.text(), theme.font("label"), theme.colour("text"))
         area = rect.adjusted(54, 0, -12, 0)
         paint.words(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
-        painter.end()
-
-
-class LinkButton(QAbstractButton):
-    """Words in the accent that lead somewhere, perhaps with an arrow."""
-
-    def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
-        super().__init__()
-        self._theme, self._icon = theme, icon
-        self.setText(text)
-        self.setAccessibleName(text)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
-
-    def set_word(self, text: str, icon: str | None) -> None:
-        """Other words, and another arrow or none."""
-        self._icon = icon
-        self.setText(text)
-        self.setAccessibleName(text)
-        self.updateGeometry()
-        self.update()
-
-    def sizeHint(self) -> QSize:
-        font = self._theme.font("title")
-        width = round(paint.width_of(font, self.text())) + 2 + (ARROW + 6 if self._icon else 0)
-        return QSize(width, max(24, round(paint.height_of(font)) + 4))
-
-    def minimumSizeHint(self) -> QSize:
-        return QSize(80, self.sizeHint().height())
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        paint.tell_whole(self, self.text())
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        font = self._theme.font("title")
-        font.setUnderline(self.underMouse())
-        rect, ink = QRectF(self.rect()), self._theme.colour("accentText")
-        if self._icon is not None:
-            square = QRectF(rect.right() - ARROW, rect.center().y() - ARROW / 2, ARROW, ARROW)
-            paint_icon(painter, square, self._icon, ink)
-            rect.adjust(0, 0, -ARROW - 6, 0)
-        paint.words(painter, rect, self.text(), font, ink)
         painter.end()
 
 

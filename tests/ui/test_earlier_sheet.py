@@ -13,7 +13,8 @@ from PySide6.QtTest import QTest
 from app.core.block_difference import Difference
 from app.core.earlier import keep_earlier
 from app.ui.commands import Commands
-from app.ui.earlier_sheet import EarlierSheet, difference_words, when_words
+from app.ui.dates import when_words
+from app.ui.earlier_sheet import EarlierSheet, difference_words
 from app.ui.entry_list import Heading
 from app.ui.main_window import MainWindow
 from app.ui.palette_match import Found

@@ -11,10 +11,11 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QScrollArea, QVBoxLayout,
 
 from app.ui.banner import BannerPlace
 from app.ui.focus_ring import FocusRing
-from app.ui.popup import Sheet, spoken_key
+from app.ui.popup import Sheet
 from app.ui.theme import Theme
 from app.ui.toast import Toast
 from app.ui.widgets import Button
+from app.ui.words import spoken_key
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.alerts import Alerts
-from app.core.reach import Reach
+from app.core.reach import Reach, words_of
 from app.core.settings import Settings
-from app.ui.others_sheet import OthersSheet, words_of
+from app.ui.others_sheet import OthersSheet
 from app.ui.theme import Theme
 from nep.network import OwnAddress
 from nep.views import GraphView

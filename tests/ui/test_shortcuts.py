@@ -23,9 +23,9 @@ from app.ui.main_window import MainWindow
 from app.ui.palette import Palette
 from app.ui.palette_match import Found
 from app.ui.shortcut_sheet import ShortcutSheet
-from app.ui.shortcuts import FIXED, Shortcuts, spoken_key
+from app.ui.shortcuts import FIXED, Shortcuts
 from app.ui.theme import Theme
-from app.ui.words import tip_with_key
+from app.ui.words import spoken_key, tip_with_key
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 CTRL = Qt.KeyboardModifier.ControlModifier

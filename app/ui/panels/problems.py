@@ -19,12 +19,12 @@ from PySide6.QtWidgets import (
 from app.core.companions import VIRTUAL_ROBOTS
 from app.core.problem_list import Listed, Mend, listed
 from app.ui import plain
-from app.ui.action_card import Tile
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.rich_line import BoldInLine, is_pressed_key
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Chip, Scrolled, label, paint
+from app.ui.widgets.small import Tile
 
 if TYPE_CHECKING:
     from app.blocks import Program

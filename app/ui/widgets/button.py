@@ -234,3 +234,52 @@ class IconButton(QAbstractButton):
         square.moveCenter(rect.center())
         paint_icon(painter, square, self._icon, theme.colour(ink if self.isEnabled() else "textDisabled"))
         painter.end()
+
+
+ARROW = 16
+
+
+class LinkButton(QAbstractButton):
+    """Words in the accent that lead somewhere, perhaps with an arrow."""
+
+    def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
+        super().__init__()
+        self._theme, self._icon = theme, icon
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def set_word(self, text: str, icon: str | None) -> None:
+        """Other words, and another arrow or none."""
+        self._icon = icon
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("title")
+        width = round(paint.width_of(font, self.text())) + 2 + (ARROW + 6 if self._icon else 0)
+        return QSize(width, max(24, round(paint.height_of(font)) + 4))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(80, self.sizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        font = self._theme.font("title")
+        font.setUnderline(self.underMouse())
+        rect, ink = QRectF(self.rect()), self._theme.colour("accentText")
+        if self._icon is not None:
+            square = QRectF(rect.right() - ARROW, rect.center().y() - ARROW / 2, ARROW, ARROW)
+            paint_icon(painter, square, self._icon, ink)
+            rect.adjust(0, 0, -ARROW - 6, 0)
+        paint.words(painter, rect, self.text(), font, ink)
+        painter.end()

@@ -270,3 +270,24 @@ class SearchField(QLineEdit):
         if self._key and not self.text():
             paint.key_cap(painter, self._theme, self.width() - 5, middle, self._key)
         painter.end()
+
+
+TILE = 28
+
+
+class Tile(QWidget):
+    """A white icon on the colour of a block category."""
+
+    def __init__(self, theme: Theme, icon: str, category: str = "robot", side: int = TILE) -> None:
+        super().__init__()
+        self._theme, self._icon, self._category = theme, icon, category
+        self.setFixedSize(side, side)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, self._theme.radius("small"), self._theme.block_colour(self._category))
+        inset = rect.width() * 0.22
+        ink = self._theme.block_text(self._category)
+        paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), self._icon, ink)
+        painter.end()
