@@ -15,10 +15,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from nep.addresses import MASTER_VARIABLE, master_address
-from nep.descriptors import allow_many
 from nep.errors import NepError
-from nep.streams import close_streams, prepare_streams, words_given
+from nep.system.addresses import MASTER_VARIABLE, master_address
+from nep.system.descriptors import allow_many
+from nep.system.streams import close_streams, prepare_streams, words_given
 from nep.version import __version__
 
 PROCESSES = ("app.blocks.child", "app.robots.simulated", "app.robots.turtle", "nep")

@@ -33,7 +33,7 @@ from app.errors import AppError, DescriptionError
 from app.robots.description import Robot, parse
 from app.robots.identity import DESCRIPTION_TYPE
 from nep.errors import NepError
-from nep.streams import tell
+from nep.system.streams import tell
 from nep.text import escaped
 
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130

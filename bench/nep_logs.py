@@ -14,8 +14,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from app.core.console import Console
-from nep.logs import LOG_TOPIC, LOG_TYPE, LogHandler
-from nep.message import Message
+from nep.messages.message import Message
+from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE, LogHandler
 
 ROUNDS = 60
 COUNT = 500

@@ -32,8 +32,8 @@ import zmq
 from blocks import Child, is_trusted, other_process
 
 import nep
-from nep.bodies import encode_request
-from nep.requests import Look
+from nep.protocol.encoding import encode_request
+from nep.protocol.requests import Look
 
 MASTER = """
 import os, sys, nep
@@ -44,10 +44,11 @@ with nep.master("127.0.0.1:0", learn_s=0.0) as master:
 
 NODES = """
 import os, sys, time, zmq
-from nep.backends.native.pace import Pace
-from nep.bodies import decode_answer, encode_request
-from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.requests import Found, Join, Renew, Renewed
+from nep.backends.zeromq.pace import Pace
+from nep.protocol.encoding import decode_answer, encode_request
+from nep.protocol.records import (NodeRecord, PublisherCount, PublisherRecord,
+    SubscriberCount, SubscriberRecord)
+from nep.protocol.requests import Found, Join, Renew, Renewed
 count, topics = int(sys.argv[1]), int(sys.argv[2])
 each = topics // count
 context = zmq.Context()

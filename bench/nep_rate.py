@@ -32,14 +32,14 @@ import zmq
 from blocks import Child, Sample, cpu_s, interleaved, other_process, verdict
 
 import nep
-from nep.message import Message
+from nep.messages.message import Message
 
 SIZE = 1000
 NATIVE = ("listen", "spin", "sink", "json", "text")
 
 SENDER = """
 import json, os, sys, time, zmq, nep
-from nep.backends.native.local import is_there
+from nep.backends.zeromq.local import is_there
 count, state = int(sys.argv[1]), json.loads(sys.argv[2])
 data = os.urandom(1000)
 node = nep.node("sender")

@@ -28,7 +28,7 @@ import zmq
 from blocks import Child, Sample, cpu_s, interleaved, is_trusted, other_process, verdict
 
 import nep
-from nep.backends.native.local import is_there
+from nep.backends.zeromq.local import is_there
 
 SIZES = (100, 1_024, 16_384, 65_536, 262_144, 1_048_576, 4_194_304, 8_388_608)
 JUDGED = 16_384

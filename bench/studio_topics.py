@@ -19,7 +19,7 @@ from PySide6.QtCore import QTimer
 from studio_window import BARE, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
 from app.core.source import GraphSeen
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 SHARE, HZ, SETTLE_S = 0.25, 20, 4.0
 NODES = 50

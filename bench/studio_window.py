@@ -24,7 +24,7 @@ from app.ui import messages
 from app.ui.application import Options, make_application, make_window
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
-from nep.masters import start_process
+from nep.masters.master import start_process
 
 __all__ = [
     "BARE",

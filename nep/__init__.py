@@ -13,8 +13,7 @@ TYPE_CHECKING = False
 """As `typing` has it, whose import would take ten times as long as this module."""
 
 if TYPE_CHECKING:
-    from nep.configuration import Configuration, Direct, Hybrid
-    from nep.encoded import Encoded
+    from nep.backends.connection import Configuration, Direct, Hybrid
     from nep.errors import (
         AddressInUseError,
         BackendUnavailableError,
@@ -30,12 +29,13 @@ if TYPE_CHECKING:
         UnknownBackendError,
         WaitTimeoutError,
     )
-    from nep.graph import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
-    from nep.images import raw_image
-    from nep.masters import Master, is_running, master_address, start_process
-    from nep.message import Message
-    from nep.nodes import Node
-    from nep.pubsub import Publisher, Subscriber
+    from nep.masters.graph import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+    from nep.masters.master import Master, is_running, master_address, start_process
+    from nep.messages.encoded import Encoded
+    from nep.messages.image_codec import raw_image
+    from nep.messages.message import Message
+    from nep.nodes.node import Node
+    from nep.nodes.publisher import Publisher, Subscriber
     from nep.version import __version__
 
     node = Node
@@ -83,8 +83,8 @@ __all__ = [
 ]
 
 _FROM = {
-    "nep.configuration": ("Configuration", "Direct", "Hybrid"),
-    "nep.encoded": ("Encoded",),
+    "nep.backends.connection": ("Configuration", "Direct", "Hybrid"),
+    "nep.messages.encoded": ("Encoded",),
     "nep.errors": (
         "AddressInUseError",
         "BackendUnavailableError",
@@ -100,12 +100,12 @@ _FROM = {
         "UnknownBackendError",
         "WaitTimeoutError",
     ),
-    "nep.graph": ("Alert", "GraphView", "NodeInfo", "PublisherInfo", "SubscriberInfo", "TopicInfo"),
-    "nep.images": ("raw_image",),
-    "nep.masters": ("Master", "is_running", "master_address", "start_process"),
-    "nep.message": ("Message",),
-    "nep.nodes": ("Node",),
-    "nep.pubsub": ("Publisher", "Subscriber"),
+    "nep.masters.graph": ("Alert", "GraphView", "NodeInfo", "PublisherInfo", "SubscriberInfo", "TopicInfo"),
+    "nep.messages.image_codec": ("raw_image",),
+    "nep.masters.master": ("Master", "is_running", "master_address", "start_process"),
+    "nep.messages.message": ("Message",),
+    "nep.nodes.node": ("Node",),
+    "nep.nodes.publisher": ("Publisher", "Subscriber"),
     "nep.version": ("__version__",),
 }
 """The imports above, for `_imported`."""

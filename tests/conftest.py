@@ -13,7 +13,7 @@ import pytest
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
-from nep.masters import Master
+from nep.masters.master import Master
 from nep.text import escaped
 from tests.nep.programs import GREETINGS_S
 
@@ -89,7 +89,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
     Whoever had to give up waiting needs this long.
     """
-    monkeypatch.setattr("nep.backends.zeromq.HANDSHAKE_S", GREETINGS_S)
+    monkeypatch.setattr("nep.backends.zeromq.backend.HANDSHAKE_S", GREETINGS_S)
 
 
 @pytest.fixture

@@ -241,7 +241,7 @@ def places_that_replace_files(tree: ast.AST) -> list[int]:
 def test_files_are_replaced_in_one_place_which_tries_again_on_windows() -> None:
     assert places_that_replace_files(ast.parse("path.replace(other)\n'a'.replace('a', 'b')\n")) == [1]
     found = {module.name for module in modules() if places_that_replace_files(module.tree)}
-    assert found - {"nep.replacing", "app.ui.blockly_view"} == set(), "the latter replaces a tab"
+    assert found - {"nep.system.replace_file", "app.ui.blockly_view"} == set(), "the latter replaces a tab"
 
 
 def test_qt_does_not_lose_references_of_none() -> None:

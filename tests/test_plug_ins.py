@@ -17,8 +17,8 @@ from app.blocks import compile_behaviour, editor_definitions
 from app.blocks.catalogue import categories
 from app.robots.description import parse, td_for
 from app.robots.kit import Driver
-from nep.masters import Master
-from nep.plugins import discover
+from nep.masters.master import Master
+from nep.system.plugins import discover
 
 Write = Callable[[str, str, str], ModuleType]
 

@@ -25,7 +25,7 @@ from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
 from app.ui.palette import Palette
 from app.ui.self_drive import SelfDrive, Step
-from nep.masters import is_running
+from nep.masters.master import is_running
 from tools.small_png import shrink
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -8,7 +8,7 @@ from functools import lru_cache
 from app.blocks.block import Block
 from app.blocks.category import Category
 from app.robots.description import Robot
-from nep.plugins import discover
+from nep.system.plugins import discover
 
 
 class Catalogue:

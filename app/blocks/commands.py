@@ -14,7 +14,7 @@ from app.blocks.network import Network
 from app.blocks.runtime import Runtime
 from app.blocks.undisturbed import undisturbed
 from nep import node as new_node
-from nep.streams import prepare_streams
+from nep.system.streams import prepare_streams
 
 __all__ = [
     "add_item", "contains", "each", "fail", "insert_item", "is_known", "item", "join", "join_items", "length",

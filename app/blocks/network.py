@@ -16,8 +16,8 @@ from app.robots import rize
 from app.robots.description import Robot
 from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
 from nep.errors import NepError
-from nep.message import Message
-from nep.views import GraphView
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
 
 ALIVE_S = 0.2
 LOOK_S = 0.2

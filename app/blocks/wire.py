@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from nep.errors import NepError
-from nep.message import Message
-from nep.views import GraphView
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
 
 
 class Publisher(Protocol):

@@ -16,8 +16,8 @@ from app.errors import DescriptionError
 from app.robots.description import Robot, announced
 from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
 from nep.errors import NepError
-from nep.message import Message
-from nep.views import GraphView
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
 
 MOST_ROBOTS = 200
 MOST_CLAIMANTS = 8

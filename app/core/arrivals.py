@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from nep.views import GraphView, NodeInfo
+from nep.protocol.graph_view import GraphView, NodeInfo
 
 NATIVE = "native"
 GATEWAY = "gateway"

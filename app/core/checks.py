@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from nep.errors import NepError
-from nep.message import Message
+from nep.messages.message import Message
 
 READABLE = frozenset({"json", "string", "msgpack"})
 LARGE_BYTES = 300_000

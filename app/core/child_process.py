@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.errors import RunnerError
-from nep.later import later
-from nep.starting import NO_CONSOLE
+from nep.masters.process import NO_CONSOLE
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     import psutil

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import IO
 
 from app.core.master_start import MasterStart
-from nep.starting import NO_CONSOLE
+from nep.masters.process import NO_CONSOLE
 
 END_WAIT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}

@@ -1,7 +1,7 @@
 """What happened, line by line: the newest 5000 records, Studio's own and those that programs log on the bus.
 
-Records of the bus (`nep.logs`) are kept as the messages that they are and decoded when somebody reads
-`Console.records`: a console that nobody looks at costs next to nothing.
+Records of the bus (`nep.nodes.log_handler`) are kept as the messages that they are and decoded when somebody
+reads `Console.records`: a console that nobody looks at costs next to nothing.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from nep import logs
 from nep.errors import NepError
-from nep.message import Message
+from nep.messages.message import Message
+from nep.nodes import log_handler
 
 CAPACITY = 5000
 TEXT_LIMIT = 2000
@@ -47,7 +47,7 @@ class Console:
         self._lines: deque[LogRecord | Message] = deque(maxlen=capacity)
         self._unread = 0
         self._own: deque[int] = deque(maxlen=OWN_KEPT)
-        self._errors = logs.ShownErrors()
+        self._errors = log_handler.ShownErrors()
         self._count = 0
         self.left_out = 0
         """Records of the bus that were dropped because too many came at once."""
@@ -100,16 +100,16 @@ class Console:
     def _of_bus(self, message: Message) -> Sequence[LogRecord]:
         """The records in a message; a list of a node's last errors has those that did not come before."""
         try:
-            if message.topic == logs.LAST_ERRORS_TOPIC:
+            if message.topic == log_handler.LAST_ERRORS_TOPIC:
                 given = self._errors.new_in(message.payload)
             else:
-                one = logs.LogRecord.from_plain(message.payload, message.stamp_ns)
+                one = log_handler.LogRecord.from_plain(message.payload, message.stamp_ns)
                 given = [one] if self._errors.is_new(one) else []
         except NepError:
             return ()  # an alert says so, as for every topic
         return [self._record(each) for each in given if each.pid is None or each.pid not in self._own]
 
-    def _record(self, given: logs.LogRecord) -> LogRecord:
+    def _record(self, given: log_handler.LogRecord) -> LogRecord:
         place = f"{given.file}:{given.line}" if given.file and given.line else given.file or ""
         return LogRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),

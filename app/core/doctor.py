@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nep.later import later
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     from nep import doctor

@@ -14,7 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from nep.replacing import replace_file
+from nep.system.replace_file import replace_file
 
 LEFT_AFTER_S = 60.0
 LARGEST_BYTES = 10_000_000

@@ -36,9 +36,9 @@ from app.robots.identity import (
     said_of_stop,
 )
 from nep.errors import NepError
-from nep.message import Message
-from nep.nodes import Node
-from nep.views import GraphView
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
 
 COMMAND_TYPE = "robot/command"
 MOST_HELD = 256

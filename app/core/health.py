@@ -10,7 +10,7 @@ from app.core.checks import Checked
 from app.core.fleet import Fleet
 from app.core.robot_link import RobotLink
 from app.core.topics import Topics
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
 
 SILENT_S = 3.0
 CURE_S = 1.0

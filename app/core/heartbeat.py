@@ -6,7 +6,7 @@ import threading
 import uuid
 
 from nep.errors import NepError
-from nep.pubsub import Publisher
+from nep.nodes.publisher import Publisher
 
 ALIVE_S = 0.2
 

@@ -15,7 +15,7 @@ from typing import Protocol
 
 from app.core.pictures import Picture, Size, decode
 from app.core.watches import Look
-from nep.message import Message
+from nep.messages.message import Message
 
 RATE_WINDOW_S = 2.0
 RATE_DELAY_S = 0.25

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from app.core import deep_json
 from app.core.files import make_private, read_whole, write_atomically
 from app.core.settings import home
-from nep.later import later
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     import psutil

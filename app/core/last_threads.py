@@ -11,7 +11,7 @@ import os
 import threading
 import time
 
-from nep.streams import close_streams
+from nep.system.streams import close_streams
 
 GRACE_S = 5.0
 

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from nep.message import Message
+from nep.messages.message import Message
 
 MESSAGES_PER_TOPIC = 256
 BYTES_PER_TOPIC = 64 * 1024 * 1024

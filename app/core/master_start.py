@@ -10,8 +10,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from nep.errors import NepError
-from nep.later import later
-from nep.masters import is_running, start_process
+from nep.masters.master import is_running, start_process
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     from nep import doctor

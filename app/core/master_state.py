@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
 
 LEARNING_S = 1.5
 """How long a master that has just started may not know everybody yet (it learns for one second)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from nep.views import GraphView, NodeInfo
+from nep.protocol.graph_view import GraphView, NodeInfo
 
 GONE_SHOWN_S = 10.0
 GATEWAY = "gateway"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from nep import images
 from nep.errors import EncodeError, NepError
-from nep.image_files import examine
-from nep.message import Message
+from nep.messages import image_codec
+from nep.messages.image_files import examine
+from nep.messages.message import Message
 
 if TYPE_CHECKING:
     import numpy as np
@@ -93,7 +93,7 @@ def png_of(message: Message) -> bytes:
     """
     import cv2  # noqa: PLC0415  heavy
 
-    if images.raw_layout(message.extension.get("encoding")) is None:
+    if image_codec.raw_layout(message.extension.get("encoding")) is None:
         file = examine(message.data)
         if file.kind == "png":
             return bytes(file.data)
@@ -108,9 +108,9 @@ def png_of(message: Message) -> bytes:
 
 def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
     """The picture as OpenCV has it (grey, BGR or BGRA; any numbers), perhaps smaller, and its whole size."""
-    layout = images.raw_layout(message.extension.get("encoding"))
+    layout = image_codec.raw_layout(message.extension.get("encoding"))
     if layout is not None:
-        frame = images.raw_array(message.data, layout, message.extension.get("shape"))
+        frame = image_codec.raw_array(message.data, layout, message.extension.get("shape"))
         size = (frame.shape[1], frame.shape[0])
         frame = _smaller(frame, _factor(size, fit))
         if layout.is_red_first:
@@ -120,8 +120,8 @@ def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
     size = (file.width, file.height)
     factor = _factor(size, fit)
     if file.kind == "jpeg":
-        return images.read_file(file, factor), size
-    return _smaller(images.read_file(file), factor), size
+        return image_codec.read_file(file, factor), size
+    return _smaller(image_codec.read_file(file), factor), size
 
 
 def _smaller(frame: NDArray[Any], factor: int) -> NDArray[Any]:

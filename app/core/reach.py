@@ -9,11 +9,11 @@ from typing import Protocol
 
 from app.core.alerts import Alerts
 from app.errors import SettingsError
-from nep.addresses import host_of, is_loopback
 from nep.errors import NepError
-from nep.masters import listen
-from nep.network import OwnAddress, own_addresses
-from nep.views import GraphView
+from nep.masters.master import listen
+from nep.protocol.graph_view import GraphView
+from nep.system.addresses import host_of, is_loopback
+from nep.system.interfaces import OwnAddress, own_addresses
 
 KEPT = "listen_at"
 ALERT, NOT_KEPT = "reach", "reach:kept"

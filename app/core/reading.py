@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from app.core.lazy_json import JsonIndex
 from nep.errors import NepError
-from nep.message import Message
+from nep.messages.message import Message
 
 EVERY_S = 1.0
 

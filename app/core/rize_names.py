@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
 
 COMMANDS = "robot_action"
 NATIVE = frozenset({"native", "gateway"})

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from app.core.watches import Watch
 from app.robots.description import Robot, Topics
 from app.robots.identity import Identity
-from nep.pubsub import Publisher
+from nep.nodes.publisher import Publisher
 
 SENDER = "studio"
 """Who the commands of try-outs are from."""

@@ -49,11 +49,11 @@ from app.core.stopping import RobotStopper, StopTarget
 from app.core.topics import Topics
 from app.core.traffic import Traffic
 from app.core.watches import Watch, Watches
-from nep.logs import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE
-from nep.masters import master_address
-from nep.message import Message
-from nep.nodes import Node
-from nep.views import GraphView
+from nep.masters.master import master_address
+from nep.messages.message import Message
+from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
 
 CHECK_S = 1.0
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
@@ -74,7 +74,7 @@ class Session:
         clock_ns: Callable[[], int] = time.time_ns,
         start_companions: bool = True,
     ) -> None:
-        """Join the master at ``address`` (default: `nep.masters.master_address`).
+        """Join the master at ``address`` (default: `nep.masters.master.master_address`).
 
         ``source`` may replace the network.
         """

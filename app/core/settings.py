@@ -15,7 +15,7 @@ import platformdirs
 from app.core.file_lock import locked
 from app.core.files import make_private, read_whole, write_atomically
 from app.errors import SettingsError
-from nep.replacing import replace_file
+from nep.system.replace_file import replace_file
 
 RECENT_LIMIT = 12
 T = TypeVar("T")

@@ -11,7 +11,7 @@ import platformdirs
 
 from app.core.pictures import png_of
 from app.core.settings import Settings, home
-from nep.message import Message
+from nep.messages.message import Message
 
 NAME = "NEP Studio"
 

@@ -16,11 +16,11 @@ from typing import Protocol
 import nep
 from app.core.faults import survived, words_of
 from nep.errors import NepError
-from nep.message import Message
-from nep.nodes import Node
-from nep.pubsub import Subscriber
-from nep.starting import look
-from nep.views import GraphView
+from nep.masters.process import look
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.publisher import Subscriber
+from nep.protocol.graph_view import GraphView
 
 POLL_S = 0.4
 POLL_PAUSE = 5.0

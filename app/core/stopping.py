@@ -28,8 +28,8 @@ from app.robots.identity import (
     said_of_stop,
 )
 from nep.errors import NepError
-from nep.message import Message
-from nep.views import GraphView
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
 
 RIZE = "rize"
 MOST_TOPICS = 8

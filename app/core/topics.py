@@ -11,8 +11,8 @@ from itertools import islice
 
 from app.core.mailbox import Batch
 from nep.errors import NepError
-from nep.message import Message
-from nep.views import GraphView, TopicInfo
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, TopicInfo
 
 GONE_SHOWN_S = 10.0
 RATES_KEPT = 60

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from app.core.losses import WINDOW_S, RecentLosses
 from app.core.mailbox import Batch
 from app.core.topics import AT_ONCE, Topics, total_rate_hz
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
 
 SUM_EVERY_S = 0.5
 """Figures of very many topics are summed up this often, however often they are told."""

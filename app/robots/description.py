@@ -16,7 +16,7 @@ from app.robots.members import as_part, part, text
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor, Topics
 from app.robots.profile import validate
 from app.robots.reading import read
-from nep.message import Message
+from nep.messages.message import Message
 from nep.text import harmless
 
 __all__ = [

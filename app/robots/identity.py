@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 from app.robots.description import topic_of
 from app.robots.parts import Robot
-from nep.message import Message
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
 from nep.text import harmless, shortened
-from nep.views import GraphView
 
 DESCRIPTION_TYPE = "robot/description"
 GATEWAY = "gateway"

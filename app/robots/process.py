@@ -20,8 +20,8 @@ from app.robots.calls import Failed
 from app.robots.declare import Kind
 from app.robots.description import topic_of
 from app.robots.driver import Driver
-from nep.addresses import master_address
-from nep.terminal import Terminal, log_to
+from nep.system.addresses import master_address
+from nep.system.terminal import Terminal, log_to
 from nep.text import escaped
 
 _OWNER_CHECK_S = 0.5

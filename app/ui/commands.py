@@ -25,7 +25,7 @@ from app.ui.shortcuts import STOP
 from app.ui.single_window import Asked
 from app.ui.stop_keys import StopKeys
 from app.ui.tabs import Tabs
-from nep.later import later
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     from app.ui import earlier_sheet

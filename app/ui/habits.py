@@ -22,7 +22,7 @@ from app.ui.shortcuts import Shortcuts
 from app.ui.theme import Mode
 from app.ui.theme_system import Wish
 from app.ui.widgets.menus import Menu
-from nep.later import later
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     from app.ui import name_sheet, palette, settings_sheet, shortcut_sheet

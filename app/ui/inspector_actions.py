@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from app.ui.inspector_body import InspectorBody
     from app.ui.theme import Theme
     from app.ui.tree import Node
-    from nep.message import Message
+    from nep.messages.message import Message
 
 
 FIND = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)

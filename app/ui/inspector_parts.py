@@ -20,7 +20,7 @@ from nep.errors import NepError
 
 if TYPE_CHECKING:
     from app.core.topics import Topic
-    from nep.message import Message
+    from nep.messages.message import Message
 
 FACTS_S = 0.1  # nobody reads faster, and each time is painted
 LARGE_BYTES = 1_000_000  # above, a message is never decoded in the window's thread

@@ -18,7 +18,7 @@ from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
 
 from app.core import faults
 from app.core.faults import SaidOnce
-from nep import terminal
+from nep.system import terminal
 
 FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
 QUIET = "--log-level=3"  # Chromium's own lines: only what ends it

@@ -9,7 +9,7 @@ from functools import cached_property, partial
 
 from app.ui import panels
 from app.ui.panels.base import Panel
-from nep.plugins import discover
+from nep.system.plugins import discover
 
 
 class PanelShelf(Mapping[str, Panel]):

@@ -1,6 +1,7 @@
 """A picture file as it is sent to a robot: read with care, and made small enough.
 
-What Qt may decode is decided by `nep.image_files`, as for every other picture: by the bytes, JPEG or PNG.
+What Qt may decode is decided by `nep.messages.image_files`, as for every other picture: by the bytes, JPEG
+or PNG.
 
 It is sent as NEP's pictures in JSON are: ``data:image/jpeg;base64,…``, or the bare base64 text where the
 description asks for that (``contentEncoding`` and no ``format``).
@@ -15,7 +16,7 @@ from PySide6.QtCore import QBuffer, QByteArray, QIODevice, Qt
 from PySide6.QtGui import QImage, QImageReader, QTransform
 
 from nep.errors import DecodeError
-from nep.image_files import MOST_BYTES, ImageFile, examine
+from nep.messages.image_files import MOST_BYTES, ImageFile, examine
 
 FILES = "Pictures (*.png *.jpg *.jpeg)"
 LONGEST_SIDE, QUALITY = 1280, 85

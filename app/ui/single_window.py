@@ -27,7 +27,7 @@ from shiboken6 import isValid
 
 from app.core.file_lock import Turn
 from app.core.files import private_folder
-from nep.later import later
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     from PySide6 import QtNetwork

@@ -16,7 +16,7 @@ from app.core.pictures import png_of
 from nep.errors import NepError
 
 if TYPE_CHECKING:
-    from nep.message import Message
+    from nep.messages.message import Message
 
 LOOK_MS = 30
 Made = Path | QImage | str

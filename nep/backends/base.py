@@ -12,13 +12,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from nep.codecs import Codec
-from nep.configuration import Configuration
-from nep.encoded import Encoded
-from nep.inbox import MAX_BYTES, MAX_MESSAGES, Keep
-from nep.message import Message
-from nep.records import NodeRecord
-from nep.views import GraphView
+from nep.backends.connection import Configuration
+from nep.messages.codecs import Codec
+from nep.messages.encoded import Encoded
+from nep.messages.message import Message
+from nep.messages.queue import MAX_BYTES, MAX_MESSAGES, Keep
+from nep.protocol.graph_view import GraphView
+from nep.protocol.records import NodeRecord
 
 __all__ = [
     "HANDSHAKE_S",
@@ -42,7 +42,7 @@ Sink = Callable[[Sequence[Message]], None]
 class PublisherSpec:
     """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit.
 
-    `number` proves the id: see `nep.registration`.
+    `number` proves the id: see `nep.protocol.registration`.
     """
 
     id: int

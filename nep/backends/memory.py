@@ -11,17 +11,24 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from nep import forks, requests
 from nep.backends.base import Backend, Inlet, PublisherSpec, SubscriberSpec
-from nep.configuration import Configuration, Hybrid
-from nep.encoded import Encoded
+from nep.backends.connection import Configuration, Hybrid
 from nep.errors import NepError, RequestRefusedError
-from nep.graph import Graph, GraphView
-from nep.inbox import Inbox
-from nep.load import CpuLoad
-from nep.message import Message, arrived, kind_of
-from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.wire import extension_part
+from nep.masters.graph import Graph, GraphView
+from nep.messages.encoded import Encoded
+from nep.messages.message import Message, arrived, kind_of
+from nep.messages.queue import Inbox
+from nep.protocol import requests
+from nep.protocol.records import (
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.protocol.wire import extension_part
+from nep.system import forks
+from nep.system.cpu import CpuLoad
 
 __all__ = ["BACKEND"]
 

@@ -24,7 +24,7 @@ def main() -> None:
 
 def _run() -> int:
     from nep.cli import interrupts  # noqa: PLC0415 - see `main`
-    from nep.streams import buffer_output, close_streams, prepare_streams  # noqa: PLC0415
+    from nep.system.streams import buffer_output, close_streams, prepare_streams  # noqa: PLC0415
 
     prepare_streams()
     buffer_output()

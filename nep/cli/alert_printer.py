@@ -6,10 +6,10 @@ import logging
 from collections.abc import Sequence
 
 from nep.cli.screen import console, show_alerts
-from nep.graph import Alert, GraphView
-from nep.masters import Master
-from nep.nodes import Node
-from nep.terminal import Terminal
+from nep.masters.graph import Alert, GraphView
+from nep.masters.master import Master
+from nep.nodes.node import Node
+from nep.system.terminal import Terminal
 from nep.text import escaped
 
 __all__ = ["AlertLog", "AlertPrinter", "Changes"]
@@ -35,7 +35,7 @@ class Changes:
 class AlertPrinter:
     """Attached to the master: writes each alert to `out` when it comes, and when it is cured.
 
-    It does so in the master's thread: `out` must not let it wait, see `nep.terminal`.
+    It does so in the master's thread: `out` must not let it wait, see `nep.system.terminal`.
     """
 
     def __init__(self, out: Terminal) -> None:

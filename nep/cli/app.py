@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from nep.addresses import MASTER_VARIABLE, master_address
 from nep.cli import doctor, log, masters, nodes, topics
 from nep.cli.screen import say_error, write
 from nep.errors import NepError
-from nep.streams import output_problem, words_given
+from nep.system.addresses import MASTER_VARIABLE, master_address
+from nep.system.streams import output_problem, words_given
 from nep.version import __version__
 
 

@@ -12,12 +12,12 @@ from collections.abc import Iterator
 
 import typer
 
-from nep.addresses import host_of, master_address
 from nep.cli.fields import leaves
 from nep.cli.graphs import look
 from nep.errors import NepError
-from nep.graph import GraphView
-from nep.nodes import Node
+from nep.masters.graph import GraphView
+from nep.nodes.node import Node
+from nep.system.addresses import host_of, master_address
 
 _ASK_S = 0.4
 _ANSWER_S = 3.0

@@ -8,7 +8,7 @@ import typer
 
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, show_json
-from nep.later import later
+from nep.system.lazy_import import later
 from nep.text import escaped
 
 if TYPE_CHECKING:

@@ -20,10 +20,10 @@ from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json
 from nep.cli.table_file import Fields, Table
 from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
-from nep.message import Message
-from nep.pubsub import Subscriber
+from nep.messages.message import Message
+from nep.nodes.publisher import Subscriber
+from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
-from nep.views import GraphView
 
 _SHOWN_BYTES = 64
 _SHOWN_LETTERS = 2_000

@@ -9,9 +9,9 @@ from contextlib import suppress
 
 from nep.cli.screen import say
 from nep.errors import NepError, did_you_mean
-from nep.graph import GraphView
-from nep.nodes import Node
-from nep.wire import check_topic
+from nep.masters.graph import GraphView
+from nep.nodes.node import Node
+from nep.protocol.wire import check_topic
 
 _AGAIN_S = 1.0
 _SLICE_S = 0.1

@@ -16,7 +16,8 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, say, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import DecodeError, did_you_mean
-from nep.logs import (
+from nep.messages.message import Message
+from nep.nodes.log_handler import (
     LAST_ERRORS_TOPIC,
     LAST_ERRORS_TYPE,
     LEVELS,
@@ -27,9 +28,8 @@ from nep.logs import (
     ShownErrors,
     level_of,
 )
-from nep.message import Message
-from nep.nodes import Node
-from nep.pubsub import Subscriber
+from nep.nodes.node import Node
+from nep.nodes.publisher import Subscriber
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:

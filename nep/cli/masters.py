@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nep.addresses import host_of, is_loopback, master_address
 from nep.cli.alert_printer import AlertLog, AlertPrinter
 from nep.cli.options import MasterOption
 from nep.cli.screen import console, say
-from nep.descriptors import allow_many
 from nep.errors import AddressInUseError, NepError
-from nep.later import later
-from nep.masters import Attachment, Master, is_running
-from nep.network import ANY, own_addresses
-from nep.terminal import Terminal, log_to
+from nep.masters.master import Attachment, Master, is_running
+from nep.system.addresses import host_of, is_loopback, master_address
+from nep.system.descriptors import allow_many
+from nep.system.interfaces import ANY, own_addresses
+from nep.system.lazy_import import later
+from nep.system.terminal import Terminal, log_to
 
 if TYPE_CHECKING:
     from nep import doctor

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from nep.addresses import DEFAULT_MASTER
+from nep.system.addresses import DEFAULT_MASTER
 
 MasterOption = Annotated[
     str | None,

@@ -20,11 +20,11 @@ from nep.cli.complete import complete_topic
 from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say, size
-from nep.codecs import CODECS, codec_for
-from nep.encoded import Encoded
 from nep.errors import EncodeError, NepError
-from nep.pubsub import Publisher
-from nep.views import TopicInfo
+from nep.messages.codecs import CODECS, codec_for
+from nep.messages.encoded import Encoded
+from nep.nodes.publisher import Publisher
+from nep.protocol.graph_view import TopicInfo
 
 _SHOWN = 40
 _MOST_BYTES = 10**9

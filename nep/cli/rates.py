@@ -18,9 +18,9 @@ from nep.cli.measure import Frequency, Traffic, Window
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
 from nep.errors import WaitTimeoutError
-from nep.message import Message
-from nep.nodes import Node
-from nep.pubsub import Subscriber
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.publisher import Subscriber
 
 _EVERY_S = 1.0
 _SLICE_S = 0.1

@@ -12,15 +12,15 @@ from functools import cache
 from typing import IO, TYPE_CHECKING, Literal, cast
 
 from nep.cli.values import json_of
-from nep.streams import tell
+from nep.system.streams import tell
 from nep.text import escaped
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-    from nep.graph import Alert
-    from nep.terminal import Terminal
+    from nep.masters.graph import Alert
+    from nep.system.terminal import Terminal
 
 _GAP = 3
 _NARROWEST = 6

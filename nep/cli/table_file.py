@@ -12,7 +12,7 @@ from nep.cli.fields import MISSING, Path, parse_path, pick
 from nep.cli.screen import say
 from nep.cli.values import json_of
 from nep.errors import DecodeError
-from nep.message import Message
+from nep.messages.message import Message
 from nep.text import escaped
 
 __all__ = ["Fields", "Table"]

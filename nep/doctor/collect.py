@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING
 import zmq
 
 import nep.errors
-from nep import descriptors
-from nep.addresses import host_of, master_address
 from nep.doctor import installs, processes
 from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact, PortFact, ProgramFact
 from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
-from nep.later import later
-from nep.nodes import Node
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
+from nep.system import descriptors
+from nep.system.addresses import host_of, master_address
+from nep.system.lazy_import import later
 from nep.version import __version__
-from nep.views import GraphView
 
 if TYPE_CHECKING:
     from importlib import metadata

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from nep.doctor.installs import Install
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
 
 __all__ = [
     "ClockFact",

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nep.later import later
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     from importlib import metadata

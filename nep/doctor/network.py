@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nep.addresses import host_of, is_loopback
 from nep.doctor.facts import Facts, PortFact, ProcessFact
 from nep.doctor.verdict import Finding, ago, counted
+from nep.system.addresses import host_of, is_loopback
 
 __all__ = ["clocks", "loopback", "masters", "originals", "ports", "told_by_master"]
 

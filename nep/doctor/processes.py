@@ -10,7 +10,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from nep.doctor.facts import ProcessFact
-from nep.later import later
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     import psutil

@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nep.descriptors import allow_many
 from nep.errors import ClosedError, WaitTimeoutError
-from nep.gateway.desk import Ports
 from nep.gateway.gateway import Gateway
 from nep.gateway.listing import Listing
 from nep.gateway.native import Native
 from nep.gateway.portmap import default_file
 from nep.gateway.processes import SystemProcesses
-from nep.graph import Alert, GraphView
-from nep.later import later
-from nep.masters import Master
-from nep.nodes import Node
-from nep.requests import Reply, ReportAlerts, Request
+from nep.gateway.request_server import Ports
+from nep.masters.graph import Alert, GraphView
+from nep.masters.master import Master
+from nep.nodes.node import Node
+from nep.protocol.requests import Reply, ReportAlerts, Request
+from nep.system.descriptors import allow_many
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     import psutil
@@ -29,7 +29,7 @@ _WAIT_S = 3.0
 
 
 class GatewayAttachment:
-    """Joins programs of the original NEP to the master that it is attached to (see `nep.masters.Attachment`).
+    """Joins programs of the original NEP to the master that it is attached to (`Attachment`).
 
     `file` keeps who has which ports; by default it lies where the system keeps such files.
     """

@@ -10,17 +10,17 @@ from typing import Protocol
 
 import zmq
 
-from nep.descriptors import SPARE, has_room
-from nep.forks import give_up, watch
-from nep.gateway.census import Census, Program
-from nep.gateway.desk import Desk, Ports
 from nep.gateway.inbox import Inbox
-from nep.gateway.pair import Pair, is_free, port_to_tell
 from nep.gateway.portmap import Line, PortMap, Registration
 from nep.gateway.processes import Processes
+from nep.gateway.programs import Census, Program
+from nep.gateway.proxy_pair import Pair, is_free, port_to_tell
 from nep.gateway.relay import Alerts, NativeSide, Relay
+from nep.gateway.request_server import Desk, Ports
 from nep.gateway.requests import LOOPBACK, Request, RequestError, Role
-from nep.message import Message
+from nep.messages.message import Message
+from nep.system.descriptors import SPARE, has_room
+from nep.system.forks import give_up, watch
 
 _LOOK_S = 1.0
 """How often programs that ended are looked for, and taken ports are tried again."""
@@ -87,7 +87,7 @@ class Gateway:
         watch(self)
 
     def forked(self) -> None:
-        """In a child: the originals' ports are the parent's. See `nep.forks`."""
+        """In a child: the originals' ports are the parent's. See `nep.system.forks`."""
         for port in self._desk.ports:
             give_up(f"tcp://{LOOPBACK}:{port}")
         for pair in tuple(self._relay.pairs):

@@ -7,7 +7,7 @@ import socket
 import threading
 from collections import deque
 
-from nep.message import Message
+from nep.messages.message import Message
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 64 * 1024 * 1024

@@ -9,14 +9,20 @@ from dataclasses import dataclass
 from hashlib import blake2b
 
 from nep.errors import BadTopicError
-from nep.gateway.census import Link, Program
 from nep.gateway.processes import load_of
+from nep.gateway.programs import Link, Program
 from nep.gateway.relay import Key
-from nep.load import CpuLoad
-from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.requests import Join, Leave, Renew, Reply, Request
+from nep.protocol.records import (
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.protocol.requests import Join, Leave, Renew, Reply, Request
+from nep.protocol.wire import check_topic
+from nep.system.cpu import CpuLoad
 from nep.text import escaped, shortened
-from nep.wire import check_topic
 
 _LANGUAGES = {
     "python": "Python",

@@ -6,17 +6,17 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from nep import images
 from nep.errors import BadTopicError, DecodeError, EncodeError, NepError
-from nep.gateway.census import Program
 from nep.gateway.inbox import Inbox
 from nep.gateway.listing import Listing
+from nep.gateway.programs import Program
 from nep.gateway.relay import Key
-from nep.graph import Alert
-from nep.image_files import examine
-from nep.message import Message
-from nep.nodes import Node
-from nep.pubsub import Publisher, Subscriber
+from nep.masters.graph import Alert
+from nep.messages import image_codec
+from nep.messages.image_files import examine
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.nodes.publisher import Publisher, Subscriber
 from nep.text import escaped
 
 _AGAIN_S = 1.0
@@ -66,7 +66,7 @@ class Native:
                 return
             self._publishers[topic, codec] = publisher
             self._own |= {publisher.id}
-        publisher.publish_bytes(data, images.picture_info(data) if codec == "image" else None)
+        publisher.publish_bytes(data, image_codec.picture_info(data) if codec == "image" else None)
 
     def stop_publishing(self, topic: str, codec: str) -> None:
         """See `NativeSide`."""
@@ -93,11 +93,11 @@ class Native:
         if message.codec != "image":
             return message.data
         try:
-            if images.raw_layout(message.extension.get("encoding")) is None:
+            if image_codec.raw_layout(message.extension.get("encoding")) is None:
                 examine(message.data)  # the originals decode whatever they get, a bomb as well
                 return message.data
-            made = images.encode(message.payload)
-            if images.raw_layout((made.extension or {}).get("encoding")) is not None:
+            made = image_codec.encode(message.payload)
+            if image_codec.raw_layout((made.extension or {}).get("encoding")) is not None:
                 raise EncodeError("image", "picture", "they read JPEG and PNG, which have no such numbers")
             return made.data
         except (DecodeError, EncodeError) as error:

@@ -13,7 +13,7 @@ from typing import get_args
 
 from nep.gateway.framing import Framing
 from nep.gateway.requests import Mode
-from nep.replacing import replace_file
+from nep.system.replace_file import replace_file
 from nep.text import escaped
 
 FIRST_PORT = 9000

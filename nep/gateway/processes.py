@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Protocol
 
-from nep.later import later
-from nep.load import CpuLoad
+from nep.system.cpu import CpuLoad
+from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
     import psutil

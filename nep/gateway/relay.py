@@ -9,8 +9,8 @@ from typing import Protocol
 import zmq
 
 from nep.gateway.framing import FrameError, lost_numbers
-from nep.gateway.pair import Pair
 from nep.gateway.portmap import Line
+from nep.gateway.proxy_pair import Pair
 from nep.gateway.requests import Role
 
 _BATCH = 200

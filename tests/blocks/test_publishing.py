@@ -13,7 +13,7 @@ from app.blocks.network import Network
 from app.blocks.program import Program
 from app.blocks.publishing import PublishGuard, guarded, moved_by
 from app.robots import rize
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.blocks.samples import block, robot, started, text, workspace
 from tests.blocks.wire_robot import WireRobot
 

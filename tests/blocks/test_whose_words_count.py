@@ -12,7 +12,7 @@ import nep
 from app.blocks.fleet_search import find_robots
 from app.blocks.network import Network
 from app.robots.identity import DESCRIPTION_TYPE
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.blocks.fakes import until
 from tests.blocks.samples import robot
 from tests.blocks.wire_robot import WireRobot

@@ -9,7 +9,7 @@ import pytest
 
 from app.core.session import Session
 from app.core.settings import Settings
-from nep.masters import Master
+from nep.masters.master import Master
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.core.arrivals import MOST_LINES, arrivals
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 
 def graph(**nodes: list[str]) -> GraphView:

@@ -15,8 +15,8 @@ import pytest
 import nep
 from app.core.mailbox import MESSAGES_PER_TOPIC
 from app.core.session import Session
-from nep.logs import LAST_ERRORS_TOPIC, LOG_TOPIC
-from nep.masters import Master
+from nep.masters.master import Master
+from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
 from tests.core.waiting import tick_until
 from tests.e2e.waiting import until
 

@@ -9,7 +9,7 @@ import pytest
 
 from app.core import checks as module
 from app.core.checks import Checks
-from nep.message import Message
+from nep.messages.message import Message
 
 BAD, GOOD = b"{not json", b'{"n": 1}'
 

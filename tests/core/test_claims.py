@@ -16,8 +16,8 @@ from app.core.robot_link import RobotLink
 from app.core.session import Session
 from app.core.watches import Watches
 from app.robots.identity import DESCRIPTION_TYPE, Senders
-from nep.masters import Master
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.masters.master import Master
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 from tests.blocks.samples import block, number, robot, started, workspace
 from tests.blocks.wire_robot import WireRobot
 from tests.core.waiting import tick_until

@@ -17,8 +17,8 @@ from app.core.settings import Settings
 from app.core.watches import Watches
 from app.robots import simulated
 from app.robots.driver import Driver
-from nep.masters import Master
-from nep.views import GraphView, PublisherInfo, TopicInfo
+from nep.masters.master import Master
+from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from tests.core.waiting import tick_until
 
 

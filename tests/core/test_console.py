@@ -5,8 +5,8 @@ from __future__ import annotations
 import orjson
 
 from app.core.console import TEXT_LIMIT, Console
-from nep.logs import LOG_TOPIC, LOG_TYPE
-from nep.message import Message
+from nep.messages.message import Message
+from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 
 
 def test_it_keeps_the_newest_records_in_order() -> None:

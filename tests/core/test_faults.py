@@ -20,8 +20,8 @@ from app.core.session import Session
 from app.core.settings import Settings
 from app.core.source import GraphSeen, JobFailed, LiveSource, MasterFound
 from app.core.stop_events import StopDone, StopReport
-from nep.masters import Master
-from nep.message import Message
+from nep.masters.master import Master
+from nep.messages.message import Message
 
 ADDRESS = "127.0.0.1:1"
 

@@ -17,7 +17,7 @@ from app.core.files import read_whole, write_atomically
 from app.core.journal import Journal, left_behind
 from app.core.settings import Settings
 from app.errors import DocumentError
-from nep.replacing import replace_file
+from nep.system.replace_file import replace_file
 
 
 def test_it_writes_and_replaces(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from app.core.earlier import keep_earlier
 from app.core.journal import Journal, left_behind
 from app.core.settings import Settings
 from app.errors import AppError
-from nep.message import Message
+from nep.messages.message import Message
 
 disk = Path(sys.argv[1])
 

@@ -13,9 +13,9 @@ from app.core.fleet import Fleet
 from app.core.health import AWAY_S, CURE_S, Health
 from app.core.mailbox import Batch
 from app.core.topics import Topics
-from nep import graph
-from nep.message import Message
-from nep.views import PublisherInfo, SubscriberInfo, TopicInfo
+from nep.masters.master import graph
+from nep.messages.message import Message
+from nep.protocol.graph_view import PublisherInfo, SubscriberInfo, TopicInfo
 
 
 class Case:

@@ -19,7 +19,7 @@ import nep
 from app.blocks.compiler import compile_behaviour
 from app.blocks.fleet_search import find_robots
 from app.core.runner import Runner
-from nep.message import Message
+from nep.messages.message import Message
 from tests.blocks.samples import block, number, started, workspace
 from tests.core.test_runner import Heard
 

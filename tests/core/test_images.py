@@ -12,7 +12,7 @@ import pytest
 from app.core.images import Images, Rate
 from app.core.pictures import decode
 from app.core.watches import Watches
-from nep.message import Message
+from nep.messages.message import Message
 
 
 def jpeg(colour: tuple[int, int, int], topic: str = "/camera", seq: int = 1) -> Message:

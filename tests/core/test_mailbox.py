@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from app.core.mailbox import Mailbox
-from nep.message import Message
+from nep.messages.message import Message
 
 
 def message(topic: str, number: int, size: int = 10) -> Message:

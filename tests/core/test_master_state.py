@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.core.master_state import LEARNING_S, Learning
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
 
 
 def view(epoch: int) -> GraphView:

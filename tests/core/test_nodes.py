@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.core.nodes import GONE_SHOWN_S, Nodes
-from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 
 def node(id: str, name: str = "", generation: str = "native", cpu: float | None = None) -> NodeInfo:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from app.core.pictures import decode, png_of
 from nep.errors import DecodeError, EncodeError, NepError
-from nep.message import Message
+from nep.messages.message import Message
 
 
 def message(data: bytes, **extension: object) -> Message:

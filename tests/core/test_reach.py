@@ -10,8 +10,8 @@ from app.core.alerts import Alerts
 from app.core.reach import ALERT, Reach
 from app.core.settings import Settings
 from nep.errors import RequestRefusedError
-from nep.network import OwnAddress
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
+from nep.system.interfaces import OwnAddress
 
 
 class World:

@@ -11,7 +11,7 @@ import pytest
 from app.core import reading
 from app.core.lazy_json import LazyObject
 from app.core.reading import Reader, Reading, read
-from nep.message import Message
+from nep.messages.message import Message
 
 WAIT_S = 30.0  # a busy computer may take long; the test ends as soon as it is there
 

@@ -18,7 +18,7 @@ from app.core.session import Session
 from app.robots.kit import Call, Driver, Failed, Kind, Link, action, safe_stop
 from app.run import FAILED, run_file
 from app.ui.robots_chip import robots_chip
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace
 from tests.blocks.wire_robot import WireRobot
 from tests.core.waiting import tick_until

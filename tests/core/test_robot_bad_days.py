@@ -22,7 +22,7 @@ from app.core.robot_link import Invocation, RobotLink
 from app.core.session import Session
 from app.robots.description import td_for
 from app.robots.turtle import ROBOT
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace
 from tests.core.waiting import tick_until
 

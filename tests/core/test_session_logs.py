@@ -13,7 +13,7 @@ from app.core.companions import CompanionFailed
 from app.core.session import Session
 from app.core.settings import Settings
 from app.core.source import MasterFound, MasterLost
-from nep.logs import LAST_ERRORS_TOPIC
+from nep.nodes.log_handler import LAST_ERRORS_TOPIC
 from tests.blocks.samples import number, stack, started, text, workspace, write
 from tests.core.waiting import tick_until
 from tests.nep.programs import eventually

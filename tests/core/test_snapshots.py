@@ -8,7 +8,7 @@ import pytest
 
 from app.core import snapshots
 from nep.errors import DecodeError
-from nep.message import Message
+from nep.messages.message import Message
 
 STAMP_NS = 1_795_164_093_412_000_000
 

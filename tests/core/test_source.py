@@ -8,9 +8,9 @@ import pytest
 
 import nep
 from app.core.source import GraphSeen, LiveSource, MasterFound, MasterLost
-from nep.logs import LOG_TOPIC, LOG_TYPE
-from nep.masters import Master
-from nep.starting import look
+from nep.masters.master import Master
+from nep.masters.process import look
+from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 from tests.e2e.waiting import until
 
 

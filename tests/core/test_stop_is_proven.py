@@ -15,7 +15,7 @@ from app.core.stopping import RobotStopper, StopTarget
 from app.robots.description import Topics
 from app.robots.identity import first_to_announce, identity_of
 from nep.errors import AddressInUseError
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.blocks.fakes import until
 from tests.blocks.wire_robot import WireRobot
 

@@ -7,8 +7,8 @@ from itertools import count
 
 from app.core.mailbox import Batch
 from app.core.topics import FIGURES_LATE_S, GONE_SHOWN_S, START_S, Topics, total_rate_hz
-from nep.message import Message
-from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 NODE = NodeInfo("n1", "camera_driver", "here", 5, "python", "native", 0)
 

@@ -9,8 +9,8 @@ from app.core.losses import WINDOW_S
 from app.core.mailbox import Batch
 from app.core.topics import AT_ONCE, Topics
 from app.core.traffic import Traffic
-from nep.message import Message
-from nep.views import GraphView, PublisherInfo, TopicInfo
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 
 
 def batch(kept: int, dropped: int) -> Batch:

@@ -13,7 +13,7 @@ from app.core.moving import MayNotMoveError
 from app.core.session import Session
 from app.robots import simulated, turtle
 from app.robots.driver import Driver
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.blocks.samples import block, number, say, started, text, workspace, write
 from tests.core.waiting import tick_until
 

@@ -23,8 +23,8 @@ from app.core.watches import Watches
 from app.robots.description import Robot, parse, td_for
 from app.robots.identity import Identity
 from app.robots.turtle import ROBOT
-from nep.masters import Master
-from nep.pubsub import Publisher
+from nep.masters.master import Master
+from nep.nodes.publisher import Publisher
 from tests.core.waiting import tick_until
 
 HERE = platform.node()

@@ -10,7 +10,7 @@ import pytest
 from app.core.session import Session
 from app.core.settings import Settings
 from app.core.source import GraphSeen, Job
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 
 class Recorded:

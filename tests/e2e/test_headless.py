@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.e2e.behaviours import EXAMPLES, forever, say, started, turn, write
 from tests.e2e.programs import Program
 

@@ -126,7 +126,7 @@ def test_a_master_that_dies_loses_no_message(
 
         def known() -> bool:
             found = studio.children("nep", "master")
-            return bool(found) and found[0].pid != master.pid and nep.masters.is_running(address, 0.2)
+            return bool(found) and found[0].pid != master.pid and nep.masters.master.is_running(address, 0.2)
 
         until(known, "Studio starts another master")
         with nep.node("looker", master=address) as node:

@@ -16,7 +16,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from nep.masters import is_running
+from nep.masters.master import is_running
 from tests.interop.port_lock import one_run_at_a_time
 
 REPOSITORY = Path(__file__).resolve().parents[2]

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from nep.gateway.attachment import GatewayAttachment
-from nep.masters import Master
+from nep.masters.master import Master
 
 pytestmark = [pytest.mark.ports]
 

@@ -16,13 +16,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import nep
-from nep import bodies, requests, wire
 from nep.errors import WireError
-from nep.graph import Graph
-from nep.masters import Master
-from nep.outgoing import with_hosts
-from nep.packing import pack_surely
-from nep.records import (
+from nep.masters.graph import Graph
+from nep.masters.master import Master
+from nep.masters.outgoing import with_hosts
+from nep.masters.renewals import read_renewal, renewed_body
+from nep.messages.packing import pack_surely
+from nep.protocol import encoding, requests, wire
+from nep.protocol.records import (
     COUNT_MAX,
     NodeRecord,
     PublisherCount,
@@ -30,9 +31,8 @@ from nep.records import (
     SubscriberCount,
     SubscriberRecord,
 )
-from nep.renewals import read_renewal, renewed_body
-from nep.requests import AddPublisher, AddSubscriber, Join, Look, Renew, Request, Seen
-from nep.viewpacking import ViewPacker
+from nep.protocol.requests import AddPublisher, AddSubscriber, Join, Look, Renew, Request, Seen
+from nep.protocol.viewpacking import ViewPacker
 from tests.nep.programs import eventually
 
 MANY = settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
@@ -78,7 +78,7 @@ def test_every_request_can_be_sent_and_read(kind: type[Request]) -> None:
     @MANY
     @given(of(kind))
     def check(request: Request) -> None:
-        asked = bodies.decode_request(bodies.encode_request(request, 7))
+        asked = encoding.decode_request(encoding.encode_request(request, 7))
         assert asked.call == 7
         assert isinstance(asked.request, kind)
 
@@ -90,8 +90,8 @@ def test_every_answer_can_be_sent_and_read(kind: type[Any]) -> None:
     @MANY
     @given(of(kind))
     def check(answer: Any) -> None:
-        for body in (bodies.encode_answer(answer, 7), ViewPacker().body(answer, 7)):
-            call, read = bodies.decode_answer(body)
+        for body in (encoding.encode_answer(answer, 7), ViewPacker().body(answer, 7)):
+            call, read = encoding.decode_answer(body)
             assert (call, type(read)) == (7, kind)
         with_hosts(answer, ("127.0.0.1",))
 
@@ -103,18 +103,18 @@ def test_every_answer_can_be_sent_and_read(kind: type[Any]) -> None:
 def test_every_quick_answer_to_a_renewal_can_be_read(
     last_seqs: dict[int, int], epoch: int, next_s: float
 ) -> None:
-    call, read = bodies.decode_answer(renewed_body(7, epoch, epoch, last_seqs, ("h",), next_s))
+    call, read = encoding.decode_answer(renewed_body(7, epoch, epoch, last_seqs, ("h",), next_s))
     assert (call, type(read)) == (7, requests.Renewed)
 
 
 @MANY
-@given(st.sampled_from(sorted(bodies._REQUESTS)), PLAIN, PLAIN)
+@given(st.sampled_from(sorted(encoding._REQUESTS)), PLAIN, PLAIN)
 def test_nothing_that_comes_in_raises_anything_unexpected(name: str, what: object, call: object) -> None:
-    bodies.decode_request(pack_surely({"do": name, "call": call, "what": what}))
+    encoding.decode_request(pack_surely({"do": name, "call": call, "what": what}))
     read_renewal(pack_surely({"do": "renew", "call": call, "what": what}))
-    for answer in bodies._ANSWERS:
+    for answer in encoding._ANSWERS:
         with contextlib.suppress(WireError):
-            bodies.decode_answer(pack_surely({"is": answer, "re": call, "what": what}))
+            encoding.decode_answer(pack_surely({"is": answer, "re": call, "what": what}))
 
 
 @settings(MANY, max_examples=150)
@@ -134,7 +134,7 @@ def test_no_request_raises_in_the_graph_and_everybody_can_still_look(
         graph.tick(float(now) / 100)
     (answer,) = graph.apply(Look(), 1, 1.0, "looker")
     assert isinstance(answer.answer, Seen)
-    call, seen = bodies.decode_answer(packer.body(answer.answer, 5))
+    call, seen = encoding.decode_answer(packer.body(answer.answer, 5))
     assert (call, type(seen)) == (5, Seen)
     for topic in answer.answer.view.topics.values():
         assert topic.lost is None or 0 <= topic.lost <= COUNT_MAX
@@ -164,7 +164,7 @@ def test_a_message_with_a_number_that_cannot_be_breaks_nobodys_graph(master: Mas
             dealer.setsockopt(zmq.LINGER, 0)
             dealer.setsockopt(zmq.ROUTING_ID, b"0" * 16)
             dealer.connect(f"tcp://{master.address}")
-            dealer.send(bodies.encode_request(AddPublisher(NodeRecord("0" * 16, "x", "h", 1), record), 1))
+            dealer.send(encoding.encode_request(AddPublisher(NodeRecord("0" * 16, "x", "h", 1), record), 1))
             assert xpub.poll(5000)
             for _ in range(2):  # its topic and its hello
                 xpub.recv()
@@ -224,7 +224,7 @@ def test_a_share_of_a_processor_that_cannot_be_is_none(value: float) -> None:
     for request in (Renew("n", 7, 99, (), (), value),):
         graph.apply(request, 1, 0.1, "n")
         assert graph.view().nodes["n"].cpu_ratio is None
-        said = read_renewal(bodies.encode_request(request, 1))
+        said = read_renewal(encoding.encode_request(request, 1))
         assert said is not None
         assert graph.renew_quickly(said, 0.2, "n") is not None
         assert graph.view().nodes["n"].cpu_ratio is None

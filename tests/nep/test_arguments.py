@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 import nep
-from nep.addresses import is_endpoint, master_address
-from nep.backends.native.subsocket import SubSocket
-from nep.masters import Master
-from nep.records import PublisherRecord, RemotePublisher
+from nep.backends.zeromq.sub_socket import SubSocket
+from nep.masters.master import Master
+from nep.protocol.records import PublisherRecord, RemotePublisher
+from nep.system.addresses import is_endpoint, master_address
 from tests.nep.programs import eventually
 
 

@@ -14,11 +14,18 @@ import pytest
 import zmq
 
 import nep
-from nep import bodies
-from nep.masters import Master
-from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.registration import id_from, is_endpoint, node_id_from
-from nep.requests import (
+from nep.masters.master import Master
+from nep.protocol import encoding
+from nep.protocol.graph_view import GraphView
+from nep.protocol.records import (
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.protocol.registration import id_from, is_endpoint, node_id_from
+from nep.protocol.requests import (
     Added,
     AddPublisher,
     AddSubscriber,
@@ -38,7 +45,6 @@ from nep.requests import (
     Request,
     Seen,
 )
-from nep.views import GraphView
 from tests.nep.programs import eventually
 
 OWN_KEY = "an attacker has a key of its own"
@@ -60,7 +66,7 @@ class Attacker:
     def send(self, request: Request) -> int:
         """Ask and do not wait."""
         self._call += 1
-        self.socket.send(bodies.encode_request(request, self._call))
+        self.socket.send(encoding.encode_request(request, self._call))
         return self._call
 
     def ask(self, request: Request) -> Reply:
@@ -68,7 +74,7 @@ class Attacker:
         call = self.send(request)
         while True:
             assert self.socket.poll(5000), "the master does not answer"
-            number, answer = bodies.decode_answer(self.socket.recv())
+            number, answer = encoding.decode_answer(self.socket.recv())
             if number == call and isinstance(answer, Reply):
                 return answer
 
@@ -403,7 +409,7 @@ def test_who_evicts_is_told_to_those_who_listen(master: Master) -> None:
         assert isinstance(squatter.ask(AddPublisher(node(), replace(real, number=0))), Added)
         owned = NodeRecord(node_id_from("k"), "Owner", "host", 1, key="k")
         assert isinstance(owner.ask(AddPublisher(owned, real)), Added)
-        came, gone, again = (bodies.decode_answer(ear.socket.recv())[1] for _ in range(3))
+        came, gone, again = (encoding.decode_answer(ear.socket.recv())[1] for _ in range(3))
         assert isinstance(gone, PublisherGone)
         assert not gone.is_closed
         assert [each.publisher.node_name for each in (came, again)] == ["Mallory", "Owner"]

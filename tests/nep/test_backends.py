@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import nep
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.nep.programs import eventually
 
 _names = count()

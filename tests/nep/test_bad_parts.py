@@ -20,13 +20,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import nep
-from nep import bodies, wire
 from nep.errors import WireError
-from nep.masters import Master
-from nep.message import Message
-from nep.packing import pack
-from nep.records import NodeRecord
-from nep.requests import AddSubscriber, Done, Found, Ping, Refused, SubscriberRecord
+from nep.masters.master import Master
+from nep.messages.message import Message
+from nep.messages.packing import pack
+from nep.protocol import encoding, wire
+from nep.protocol.records import NodeRecord
+from nep.protocol.requests import AddSubscriber, Done, Found, Ping, Refused, SubscriberRecord
 from tests.nep.programs import eventually
 
 FEW = settings(
@@ -245,7 +245,7 @@ VALUES = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
     max_leaves=8,
 )
-NAMES = st.sampled_from([*bodies._REQUESTS, "fly", ""])
+NAMES = st.sampled_from([*encoding._REQUESTS, "fly", ""])
 FIELDS = st.dictionaries(
     st.sampled_from(
         [
@@ -290,11 +290,11 @@ def test_a_master_answers_everything_and_serves_on(
             for parts in messages:
                 attacker.send_multipart(parts)
             call = next(calls)
-            attacker.send(bodies.encode_request(Ping(), call))
+            attacker.send(encoding.encode_request(Ping(), call))
             answers = 0
             while True:
                 assert attacker.poll(5000), "the master does not answer any more"
-                number, answer = bodies.decode_answer(attacker.recv())
+                number, answer = encoding.decode_answer(attacker.recv())
                 if number == call:
                     assert isinstance(answer, Done)
                     break
@@ -325,11 +325,11 @@ def ask_with_id(dealer: zmq.Socket[bytes], master: Master, size: int) -> None:
     said = NodeRecord("\udcfe" * size if size else "x", "odd", "host", None)
     body = pack({"do": "subscriber+", "call": 3, "what": {}})
     if not size:
-        body = bodies.encode_request(AddSubscriber(said, record), 3)
+        body = encoding.encode_request(AddSubscriber(said, record), 3)
     dealer.send(body)
     assert dealer.poll(2000)
-    assert isinstance(bodies.decode_answer(dealer.recv())[1], Refused)
-    dealer.send(bodies.encode_request(Ping(), 4))
+    assert isinstance(encoding.decode_answer(dealer.recv())[1], Refused)
+    dealer.send(encoding.encode_request(Ping(), 4))
     assert dealer.poll(2000)
 
 
@@ -340,7 +340,7 @@ ANSWERS = (
     | VALUES.map(pack)
     | st.builds(
         lambda name, call, what: pack({"is": name, "re": call, "what": what}),
-        st.sampled_from([*bodies._ANSWERS, "fly"]),
+        st.sampled_from([*encoding._ANSWERS, "fly"]),
         st.integers(0, 20) | VALUES,
         st.dictionaries(
             st.sampled_from(
@@ -369,11 +369,11 @@ def test_a_node_stands_whatever_a_master_says(
             while True:
                 assert router.poll(5000), "the node says nothing any more"
                 sender, body = router.recv_multipart()
-                asked = bodies.decode_request(body)
-                name = bodies._REQUEST_NAMES[type(asked.request)]  # type: ignore[index]
+                asked = encoding.decode_request(body)
+                name = encoding._REQUEST_NAMES[type(asked.request)]  # type: ignore[index]
                 answered.append(asked.request)
                 reply = Found(9, 1) if name in {"subscriber+", "join"} else Done(9, 1)
-                router.send_multipart([sender, bodies.encode_answer(reply, asked.call)])
+                router.send_multipart([sender, encoding.encode_answer(reply, asked.call)])
                 if name == until:
                     return sender
 

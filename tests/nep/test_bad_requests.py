@@ -8,11 +8,11 @@ import pytest
 import zmq
 
 import nep
-from nep import bodies
-from nep.badrequests import BadRequests, who_sends
-from nep.masters import Master
-from nep.packing import pack
-from nep.requests import Refused
+from nep.masters.bad_requests import BadRequests, who_sends
+from nep.masters.master import Master
+from nep.messages.packing import pack
+from nep.protocol import encoding
+from nep.protocol.requests import Refused
 from tests.nep.programs import eventually
 
 
@@ -79,7 +79,7 @@ def test_the_master_logs_the_first_then_rarely_and_shows_an_alert(
                 socket.connect(f"tcp://{master.address}")
                 socket.send(b"\xc1" if n % 2 else pack({"do": "fly", "call": 3}))
                 assert socket.poll(2000)
-                assert isinstance(bodies.decode_answer(socket.recv())[1], Refused)
+                assert isinstance(encoding.decode_answer(socket.recv())[1], Refused)
         eventually(lambda: any("(25 times so far)" in each.sentence for each in node.graph().alerts))
         (alert,) = node.graph().alerts
     context.term()
@@ -99,6 +99,6 @@ def test_what_only_begins_as_a_renewal_counts_too(master: Master) -> None:
         socket.connect(f"tcp://{master.address}")
         socket.send(pack({"do": "renew", "call": 3, "what": [1]}))
         assert socket.poll(2000)
-        assert isinstance(bodies.decode_answer(socket.recv())[1], Refused)
+        assert isinstance(encoding.decode_answer(socket.recv())[1], Refused)
     context.term()
     eventually(lambda: bool(master.view().alerts))

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 import pytest
 
 import nep
-from nep.masters import is_running
+from nep.masters.master import is_running
 from tests.nep.programs import ROOT, eventually
 
 if sys.platform == "win32":

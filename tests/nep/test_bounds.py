@@ -10,24 +10,24 @@ from types import SimpleNamespace
 import pytest
 import zmq
 
-from nep import bodies
-from nep.backends.native.calls import Calls
-from nep.badrequests import BadRequests
-from nep.census import Census
-from nep.gateway.census import Census as GatewayCensus
-from nep.gateway.census import Link, Program
+from nep.backends.zeromq.rpc import Calls
 from nep.gateway.framing import PORT_A
 from nep.gateway.listing import Listing
 from nep.gateway.native import Native
 from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.programs import Census as GatewayCensus
+from nep.gateway.programs import Link, Program
 from nep.gateway.requests import RequestError, read_request
-from nep.graph import Graph
-from nep.masterport import MasterPort
-from nep.records import NodeRecord, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.requests import AddPublisher, Done, Join, Look, Ping, Renew, Renewed, Seen, TopicPublishers
+from nep.masters.bad_requests import BadRequests
+from nep.masters.graph import Graph
+from nep.masters.registry import Census
+from nep.masters.router import MasterPort
+from nep.masters.snapshot import Viewer
+from nep.protocol import encoding
+from nep.protocol.graph_view import GraphView, TopicInfo
+from nep.protocol.records import NodeRecord, PublisherRecord, SubscriberCount, SubscriberRecord
+from nep.protocol.requests import AddPublisher, Done, Join, Look, Ping, Renew, Renewed, Seen, TopicPublishers
 from nep.text import control_in
-from nep.viewing import Viewer
-from nep.views import GraphView, TopicInfo
 from tests.nep.programs import eventually
 
 
@@ -104,7 +104,7 @@ def test_who_asks_for_a_graph_decodes_it_and_not_the_nodes_thread(pair: SimpleNa
     sender, body = pair.router.recv_multipart()
     topics = {f"/t{n}": TopicInfo(f"/t{n}", "json", "json") for n in range(3)}
     seen = Seen(7, 1, GraphView(7, 1, {}, topics))
-    pair.router.send_multipart([sender, bodies.encode_answer(seen, bodies.decode_request(body).call)])
+    pair.router.send_multipart([sender, encoding.encode_answer(seen, encoding.decode_request(body).call)])
     eventually(lambda: pair.calls.read() == [] and asked.view is not None)
     assert asked.reply is None  # nothing was decoded yet
     assert pair.calls.wait(asked, 1.0) == seen
@@ -114,8 +114,8 @@ def test_a_graph_that_nobody_waits_for_any_more_is_not_decoded(pair: SimpleNames
     pair.calls.begin(Ping())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()
-    pair.router.send_multipart([sender, bodies.encode_answer(Seen(7, 1, GraphView(7, 1)), 12345)])
-    pair.router.send_multipart([sender, bodies.encode_answer(Done(7, 1), 1)])
+    pair.router.send_multipart([sender, encoding.encode_answer(Seen(7, 1, GraphView(7, 1)), 12345)])
+    pair.router.send_multipart([sender, encoding.encode_answer(Done(7, 1), 1)])
     answers: list[object] = []
     eventually(lambda: bool(answers.extend(pair.calls.read()) or answers))
     assert [type(each.what) for each in answers] == [Done]  # type: ignore[attr-defined]
@@ -126,7 +126,7 @@ def test_many_pushes_are_read_in_slices(pair: SimpleNamespace) -> None:
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()
     for _ in range(120):
-        pair.router.send_multipart([sender, bodies.encode_answer(Renewed(7, 1))])
+        pair.router.send_multipart([sender, encoding.encode_answer(Renewed(7, 1))])
     sizes: list[int] = []
 
     def read() -> bool:
@@ -224,7 +224,7 @@ def test_a_thread_that_waits_for_a_graph_is_told_when_it_is_unreadable(pair: Sim
     asked = pair.calls.begin(Look())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, body = pair.router.recv_multipart()
-    good = bodies.encode_answer(Seen(7, 1, GraphView(7, 1)), bodies.decode_request(body).call)
+    good = encoding.encode_answer(Seen(7, 1, GraphView(7, 1)), encoding.decode_request(body).call)
     pair.router.send_multipart([sender, good[:-3]])
     failed: list[str] = []
 
@@ -271,4 +271,4 @@ def test_a_request_is_sent_at_once_when_the_connection_comes_while_it_is_made() 
     socket = JustConnected()
     calls = Calls(socket, "127.0.0.1:9", lambda: None)  # type: ignore[arg-type]
     calls.begin(Ping())
-    assert socket.sent == [bodies.encode_request(Ping(), 1)]
+    assert socket.sent == [encoding.encode_request(Ping(), 1)]

@@ -12,8 +12,8 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.native.window import WINDOW_BYTES
-from nep.masters import Master
+from nep.backends.zeromq.byte_window import WINDOW_BYTES
+from nep.masters.master import Master
 from tests.nep.programs import Program, eventually, running
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot stop a process")

@@ -17,7 +17,7 @@ from nep.cli.screen import (
     show_table,
     size,
 )
-from nep.graph import Alert
+from nep.masters.graph import Alert
 
 
 @pytest.mark.parametrize(

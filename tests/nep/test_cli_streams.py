@@ -14,8 +14,8 @@ import pytest
 
 import nep
 from nep.cli.screen import say, say_error, show_alerts
-from nep.graph import Alert
-from nep.streams import words_given
+from nep.masters.graph import Alert
+from nep.system.streams import words_given
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LONG_S = 60

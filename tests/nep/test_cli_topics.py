@@ -8,7 +8,7 @@ import pytest
 from nep.cli.echo import Lines, show_record
 from nep.cli.publish import value_of
 from nep.errors import EncodeError, NepError
-from nep.message import Message
+from nep.messages.message import Message
 
 
 def message(data, codec="json", **more):

@@ -17,8 +17,8 @@ import nep
 from nep.cli.echo import Lines, echo, show_record, sorted_out
 from nep.cli.values import ids_as_text, json_of, presented
 from nep.errors import WaitTimeoutError
-from nep.message import Message
-from nep.packing import pack
+from nep.messages.message import Message
+from nep.messages.packing import pack
 
 DEEP = b"[" * 900 + b"]" * 900
 ANYTHING = st.recursive(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 import nep
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.nep.programs import eventually, running
 
 

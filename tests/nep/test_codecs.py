@@ -16,9 +16,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep import images
-from nep.codecs import CODECS, codec, codec_for, codec_numbered
 from nep.errors import DecodeError, EncodeError
+from nep.messages import image_codec
+from nep.messages.codecs import CODECS, codec, codec_for, codec_numbered
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 SMALL = st.integers(-(2**63), 2**63 - 1)
@@ -197,7 +197,7 @@ def picture() -> np.ndarray:
 def test_a_picture_is_published_as_jpeg(picture: np.ndarray) -> None:
     data, extension = codec("image").encode(picture)
     assert extension == {"shape": [48, 64, 3], "encoding": "jpeg"}
-    assert images.picture_info(data) == extension
+    assert image_codec.picture_info(data) == extension
     read = back("image", picture)
     assert isinstance(read, np.ndarray)
     assert (read.shape, read.dtype) == ((48, 64, 3), np.uint8)
@@ -206,11 +206,11 @@ def test_a_picture_is_published_as_jpeg(picture: np.ndarray) -> None:
 
 
 def test_raw_pictures_are_exact(picture: np.ndarray) -> None:
-    def read(encoded: images.Encoded) -> object:
+    def read(encoded: image_codec.Encoded) -> object:
         return codec("image").decode(memoryview(encoded.data), encoded.extension or {})
 
-    assert np.array_equal(read(images.raw_image(picture)), picture)  # type: ignore[arg-type]
-    assert np.array_equal(read(images.raw_image(picture[::2, ::2])), picture[::2, ::2])  # type: ignore[arg-type]
+    assert np.array_equal(read(image_codec.raw_image(picture)), picture)  # type: ignore[arg-type]
+    assert np.array_equal(read(image_codec.raw_image(picture[::2, ::2])), picture[::2, ::2])  # type: ignore[arg-type]
     rgb = codec("image").decode(
         memoryview(picture[:, :, ::-1].tobytes()), {"shape": [48, 64, 3], "encoding": "rgb8"}
     )
@@ -234,7 +234,7 @@ def numbers_of(kind: str, shape: tuple[int, ...]) -> np.ndarray:
 def test_any_numbers_and_channels_are_kept_without_loss(kind: str, shape: tuple[int, ...]) -> None:
     made = numbers_of(kind, shape)
     wanted = made[:, :, 0] if shape[2:] == (1,) else made
-    sent = [images.raw_image(made), images.raw_image(made.astype(made.dtype.newbyteorder(">")))]
+    sent = [image_codec.raw_image(made), image_codec.raw_image(made.astype(made.dtype.newbyteorder(">")))]
     if kind != "uint8" or shape[2:] in ((2,), (4,)):  # all but what is a JPEG
         sent.append(codec("image").encode(made))
         sent.append(codec("image").encode(np.asfortranarray(made)))
@@ -261,7 +261,7 @@ def test_any_numbers_and_channels_are_kept_without_loss(kind: str, shape: tuple[
     ],
 )
 def test_how_an_array_is_sent(made: np.ndarray, encodings: tuple[str, str]) -> None:
-    sent = codec("image").encode(made), images.raw_image(made)
+    sent = codec("image").encode(made), image_codec.raw_image(made)
     assert tuple((extension or {})["encoding"] for _, extension in sent) == encodings
 
 

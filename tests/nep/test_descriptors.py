@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 import nep
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.nep.programs import Program, eventually, running
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
@@ -194,7 +194,7 @@ def test_a_gateway_without_files_refuses_originals_and_goes_on(tmp_path: Path) -
 from pathlib import Path
 import json, zmq
 from nep.gateway.attachment import GatewayAttachment
-from nep.gateway.desk import Ports
+from nep.gateway.request_server import Ports
 attached = GatewayAttachment(Path(sys.argv[1]) / "ports.json", Ports(int(sys.argv[2]), 0, 0))
 def ask(topic):
     said = {"node": "n", "topic": topic, "mode": "many2many", "socket": "publisher", "msg_type": "json"}

@@ -11,7 +11,7 @@ import sys
 import pytest
 
 import nep
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.nep.programs import eventually, running
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from nep.gateway.census import Census, Link
-from nep.gateway.pair import ends_of
 from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.programs import Census, Link
+from nep.gateway.proxy_pair import ends_of
 
 LINE = Line("t", "prefixed", "json", "many2many")
 

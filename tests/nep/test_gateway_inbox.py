@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from nep.gateway.inbox import Inbox
-from nep.message import Message
+from nep.messages.message import Message
 
 
 @pytest.fixture

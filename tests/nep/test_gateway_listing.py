@@ -5,12 +5,12 @@ import os
 
 import pytest
 
-from nep.gateway.census import Link, Program
 from nep.gateway.listing import Listing
 from nep.gateway.processes import load_of
-from nep.graph import Graph
-from nep.load import CpuLoad
-from nep.requests import Look
+from nep.gateway.programs import Link, Program
+from nep.masters.graph import Graph
+from nep.protocol.requests import Look
+from nep.system.cpu import CpuLoad
 
 EPOCH = 77
 

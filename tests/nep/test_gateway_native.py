@@ -6,7 +6,7 @@ import nep
 from nep.gateway.inbox import Inbox
 from nep.gateway.listing import Listing
 from nep.gateway.native import Native
-from nep.message import Message
+from nep.messages.message import Message
 from tests.nep.bad_pictures import BOMBS
 
 LONG_S = 30

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import pytest
 import zmq
 
-from nep.gateway.pair import MOST_KEPT_BYTES, Pair
 from nep.gateway.portmap import Line
+from nep.gateway.proxy_pair import MOST_KEPT_BYTES, Pair
 
 LONG_MS = 30_000
 Socket: TypeAlias = zmq.Socket[bytes]

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep import bodies
 from nep.errors import WireError
-from nep.graph import Graph, GraphView
-from nep.outgoing import Outgoing, without
-from nep.packing import pack
-from nep.rates import Meter
-from nep.records import (
+from nep.masters.graph import Graph, GraphView
+from nep.masters.outgoing import Outgoing, without
+from nep.masters.rates import Meter
+from nep.messages.packing import pack
+from nep.protocol import encoding
+from nep.protocol.records import (
     Expected,
     NodeRecord,
     PublisherCount,
@@ -20,7 +20,7 @@ from nep.records import (
     SubscriberCount,
     SubscriberRecord,
 )
-from nep.requests import (
+from nep.protocol.requests import (
     Added,
     AddPublisher,
     AddSubscriber,
@@ -259,7 +259,7 @@ REQUESTS: list[Request] = [
 
 @pytest.mark.parametrize("request_", REQUESTS, ids=lambda each: type(each).__name__)
 def test_requests_survive_the_wire(request_: Request) -> None:
-    assert bodies.decode_request(bodies.encode_request(request_, 42)) == (42, request_)
+    assert encoding.decode_request(encoding.encode_request(request_, 42)) == (42, request_)
 
 
 def test_answers_survive_the_wire(graph: Graph) -> None:
@@ -268,7 +268,7 @@ def test_answers_survive_the_wire(graph: Graph) -> None:
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 5, 5),)))
     for request in REQUESTS:
         for each in ask(graph, request):
-            assert bodies.decode_answer(bodies.encode_answer(each.answer, 3)) == (3, each.answer)
+            assert encoding.decode_answer(encoding.encode_answer(each.answer, 3)) == (3, each.answer)
     (seen,) = ask(graph, Look())
     assert isinstance(seen.answer, Seen)
     assert isinstance(seen.answer.view, GraphView)
@@ -276,9 +276,9 @@ def test_answers_survive_the_wire(graph: Graph) -> None:
 
 @given(st.binary(max_size=50))
 def test_any_bytes_are_a_request_or_a_sentence(body: bytes) -> None:
-    assert isinstance(bodies.decode_request(body).request, str | Ping | Look)
+    assert isinstance(encoding.decode_request(body).request, str | Ping | Look)
     with pytest.raises(WireError):
-        bodies.decode_answer(body)
+        encoding.decode_answer(body)
 
 
 @given(
@@ -294,7 +294,7 @@ def test_any_bytes_are_a_request_or_a_sentence(body: bytes) -> None:
     ),
 )
 def test_any_map_is_a_request_or_a_sentence(do: object, what: object) -> None:
-    asked = bodies.decode_request(pack({"do": do, "call": 5, "what": what}))
+    asked = encoding.decode_request(pack({"do": do, "call": 5, "what": what}))
     assert asked.call == 5
     if isinstance(asked.request, str):
         assert asked.request
@@ -302,14 +302,14 @@ def test_any_map_is_a_request_or_a_sentence(do: object, what: object) -> None:
 
 def test_a_wrong_field_is_named() -> None:
     body = pack({"do": "renew", "call": 1, "what": {"node_id": "a", "epoch": "x", "revision": 1}})
-    assert bodies.decode_request(body).request == "'Renew.epoch' is a 'str', not 'int'"
+    assert encoding.decode_request(body).request == "'Renew.epoch' is a 'str', not 'int'"
     body = pack({"do": "leave", "call": 1, "what": {}})
-    assert bodies.decode_request(body).request == "'Leave.node_id' is missing"
+    assert encoding.decode_request(body).request == "'Leave.node_id' is missing"
 
 
 def test_newer_peers_may_send_more() -> None:
     body = pack({"do": "leave", "call": 1, "what": {"node_id": "a", "mood": "fine"}})
-    assert bodies.decode_request(body).request == Leave("a")
+    assert encoding.decode_request(body).request == Leave("a")
 
 
 def test_a_meter_needs_two_readings_and_forgets() -> None:

@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nep import images
-from nep.codecs import codec
 from nep.errors import DecodeError, EncodeError
-from nep.image_files import MOST_PIXELS, check_size, examine
+from nep.messages import image_codec
+from nep.messages.codecs import codec
+from nep.messages.image_files import MOST_PIXELS, check_size, examine
 from tests.nep import bad_pictures as bad
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -30,7 +30,7 @@ def test_a_bomb_never_reaches_the_decoder(name: str) -> None:
     with pytest.raises(DecodeError) as caught:
         examine(data)
     assert caught.value.size_bytes == len(data)
-    assert images.picture_info(data) is None
+    assert image_codec.picture_info(data) is None
     with pytest.raises(EncodeError):
         codec("image").encode(data)
 
@@ -40,7 +40,7 @@ import json, resource, sys, time
 import cv2, numpy
 from app.core.pictures import decode, png_of
 from nep.errors import NepError
-from nep.message import Message
+from nep.messages.message import Message
 from tests.nep.bad_pictures import BOMBS
 
 used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
@@ -137,7 +137,7 @@ def test_a_camera_that_was_turned(kind: str, orientation: int, order: str) -> No
     read = codec("image").decode(memoryview(made), {})
     assert isinstance(read, np.ndarray)
     assert np.array_equal(read, cv2.imdecode(np.frombuffer(made, np.uint8), cv2.IMREAD_COLOR))
-    assert images.picture_info(made) == {"shape": list(read.shape), "encoding": kind}
+    assert image_codec.picture_info(made) == {"shape": list(read.shape), "encoding": kind}
 
 
 def test_a_jpeg_in_refinements_and_one_with_restarts_are_read() -> None:
@@ -165,7 +165,7 @@ def test_what_is_let_through_is_as_large_as_was_said(
         changed[at : at + 1] = bytes([byte])
     try:
         file = examine(bytes(changed[:end]))
-        read = images.read_file(file)
+        read = image_codec.read_file(file)
     except DecodeError:
         return
     assert read.shape[:2] == (file.height, file.width)

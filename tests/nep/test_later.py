@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from nep.later import later
+from nep.system.lazy_import import later
 
 
 def in_a_new_process(program: str) -> str:
@@ -21,7 +21,7 @@ def in_a_new_process(program: str) -> str:
 def test_it_is_imported_when_something_of_it_is_used() -> None:
     program = (
         "import sys\n"
-        "from nep.later import later\n"
+        "from nep.system.lazy_import import later\n"
         "colorsys = later('colorsys')\n"
         "print('colorsys' in sys.modules, colorsys.rgb_to_hsv(0, 0, 0), 'colorsys' in sys.modules)\n"
     )

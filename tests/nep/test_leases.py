@@ -11,15 +11,15 @@ import pytest
 import zmq
 
 import nep
-from nep import leases
-from nep.backends.native.pace import Pace
-from nep.census import Census
-from nep.graph import Graph
-from nep.leases import LEASE_S, Leases
-from nep.masterport import MasterPort
-from nep.masters import Master
-from nep.records import NodeRecord
-from nep.requests import Join, Renew, Renewed
+from nep.backends.zeromq.pace import Pace
+from nep.masters import leases
+from nep.masters.graph import Graph
+from nep.masters.leases import LEASE_S, Leases
+from nep.masters.master import Master
+from nep.masters.registry import Census
+from nep.masters.router import MasterPort
+from nep.protocol.records import NodeRecord
+from nep.protocol.requests import Join, Renew, Renewed
 from tests.nep.programs import eventually, running
 
 

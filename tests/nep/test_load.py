@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from nep.load import CpuLoad
+from nep.system.cpu import CpuLoad
 
 
 class Hand:

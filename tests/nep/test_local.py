@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.backends.native import local
-from nep.masters import Master
+from nep.backends.zeromq import local
+from nep.masters.master import Master
 from tests.nep.programs import eventually
 
 NAMES = Path("/proc/net/unix")

@@ -10,7 +10,7 @@ import pytest
 
 import nep
 from nep.errors import ClosedError, MasterUnreachable
-from nep.logs import (
+from nep.nodes.log_handler import (
     BURST,
     LAST_ERRORS,
     LEVELS,
@@ -288,7 +288,7 @@ def test_a_record_that_gets_no_thread_any_more_ends_nothing():
     """As at the end of the interpreter from Python 3.12 on: the same error, here for want of memory."""
     code = """
     import resource, threading
-    from nep.logs import LogHandler
+    from nep.nodes.log_handler import LogHandler
     handler = LogHandler("robot", lambda: None)
     threading.stack_size(1 << 30)
     resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))

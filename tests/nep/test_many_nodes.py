@@ -9,17 +9,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nep import bodies
-from nep.graph import Graph
-from nep.masters import Master
-from nep.packing import pack
-from nep.plain import write
-from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.renewals import read_renewal, renewed_body
-from nep.requests import Join, Leave, Look, Ping, RemovePublisher, Renew, Renewed, ReportAlerts, Seen
-from nep.viewing import Viewer
-from nep.viewpacking import ViewPacker
-from nep.views import Alert, GraphView
+from nep.masters.graph import Graph
+from nep.masters.master import Master
+from nep.masters.renewals import read_renewal, renewed_body
+from nep.masters.snapshot import Viewer
+from nep.messages.packing import pack
+from nep.protocol import encoding
+from nep.protocol.graph_view import Alert, GraphView
+from nep.protocol.plain import write
+from nep.protocol.records import (
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.protocol.requests import Join, Leave, Look, Ping, RemovePublisher, Renew, Renewed, ReportAlerts, Seen
+from nep.protocol.viewpacking import ViewPacker
 from tests.nep.programs import eventually
 
 EPOCH = 5
@@ -56,7 +62,7 @@ def renewal(n: int, graph: Graph, count: int = 10, problem: str = "", **more: An
 
 def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
     """The quick way, as the master's loop goes it."""
-    said = read_renewal(bodies.encode_request(request, 7))
+    said = read_renewal(encoding.encode_request(request, 7))
     if said is None:
         return None
     last_seqs = graph.renew_quickly(said, now, said.node_id)
@@ -76,7 +82,7 @@ def test_a_quick_renewal_says_and_does_what_the_long_way_does() -> None:
             body = renew(quick, request, now)
             assert body is not None
             (answer,) = long.apply(request, 7, now, f"n{n}")
-            assert bodies.decode_answer(body) == (7, answer.answer)
+            assert encoding.decode_answer(body) == (7, answer.answer)
             assert isinstance(answer.answer, Renewed)
             assert set(answer.answer.last_seqs) == {100 + (n + 1) % 5}
     assert view(quick) == view(long)
@@ -124,11 +130,11 @@ def test_an_unusual_renewal_goes_the_long_way(change: dict[str, object]) -> None
 @given(st.binary(max_size=60) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(write))
 def test_what_is_no_renewal_is_none(junk: object) -> None:
     bodies_of_junk = [junk] if isinstance(junk, bytes) else []
-    begins = bodies.encode_request(Renew("n0", 1, 1), 7)
+    begins = encoding.encode_request(Renew("n0", 1, 1), 7)
     bodies_of_junk += [begins[:14] + (junk if isinstance(junk, bytes) else b""), begins[:-1], begins + b"x"]
     for body in bodies_of_junk:
         assert read_renewal(body) is None
-    assert read_renewal(bodies.encode_request(Ping(), 7)) is None
+    assert read_renewal(encoding.encode_request(Ping(), 7)) is None
     assert read_renewal(begins) is not None
 
 
@@ -156,7 +162,7 @@ def test_a_view_of_what_changed_is_the_view_of_everything(changes: list[tuple[st
         (answer,) = graph.apply(Look(), 3, float(now), "somebody")
         assert isinstance(answer.answer, Seen)
         assert answer.answer.view == view(graph)
-        assert bodies.decode_answer(packer.body(answer.answer, 3)) == (3, answer.answer)
+        assert encoding.decode_answer(packer.body(answer.answer, 3)) == (3, answer.answer)
 
 
 def test_what_has_not_changed_is_the_same_value() -> None:

@@ -10,12 +10,12 @@ import pytest
 import zmq
 
 import nep
-from nep import bodies
-from nep.masters import Master, is_running
-from nep.packing import pack
-from nep.records import NodeRecord, PublisherCount, PublisherRecord
-from nep.requests import Done, Join, Leave, Ping, Refused, Renew, Renewed
-from nep.views import GraphView
+from nep.masters.master import Master, is_running
+from nep.messages.packing import pack
+from nep.protocol import encoding
+from nep.protocol.graph_view import GraphView
+from nep.protocol.records import NodeRecord, PublisherCount, PublisherRecord
+from nep.protocol.requests import Done, Join, Leave, Ping, Refused, Renew, Renewed
 from tests.nep.programs import eventually, running
 
 ORIGINAL = NodeRecord("original-1", "old", "host", 1, "JavaScript", "A")
@@ -57,15 +57,15 @@ def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None
         [pack(None)],
         [pack({"do": "fly", "call": 3})],
         [pack({"do": "renew", "call": 3, "what": [1]})],
-        [bodies.encode_request(Leave(ORIGINAL.id), 3)],
-        [bodies.encode_request(Join(ORIGINAL, managed=True), 3)],
+        [encoding.encode_request(Leave(ORIGINAL.id), 3)],
+        [encoding.encode_request(Join(ORIGINAL, managed=True), 3)],
     ]
     master.submit(Join(ORIGINAL, managed=True))
     try:
         for parts in bad:
             socket.send_multipart(parts)
             assert socket.poll(2000)
-            _call, answer = bodies.decode_answer(socket.recv())
+            _call, answer = encoding.decode_answer(socket.recv())
             assert isinstance(answer, Refused)
             assert answer.reason
     finally:
@@ -76,9 +76,9 @@ def test_malformed_requests_get_an_error_and_do_not_kill(master: Master) -> None
 
 
 def test_nobody_takes_replies_that_are_for_the_masters_own_process(master: Master) -> None:
-    asked = bodies.decode_request(pack({"do": "ping", "call": -1}))
-    assert asked == bodies.Asked(0, Ping())
-    assert bodies.decode_request(pack({"do": "ping", "call": True})).call == 0
+    asked = encoding.decode_request(pack({"do": "ping", "call": -1}))
+    assert asked == encoding.Asked(0, Ping())
+    assert encoding.decode_request(pack({"do": "ping", "call": True})).call == 0
 
 
 def test_a_socket_of_another_kind_does_not_kill(master: Master) -> None:

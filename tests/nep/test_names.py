@@ -10,11 +10,11 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.native.context import SharedContext, join
-from nep.backends.native.link import MasterLink
-from nep.backends.native.names import MasterName
-from nep.masters import Master
-from nep.records import NodeRecord
+from nep.backends.zeromq.context import SharedContext, join
+from nep.backends.zeromq.master_name import MasterName
+from nep.backends.zeromq.master_session import MasterLink
+from nep.masters.master import Master
+from nep.protocol.records import NodeRecord
 from tests.nep.programs import eventually
 
 

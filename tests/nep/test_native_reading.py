@@ -11,12 +11,12 @@ import pytest
 import zmq
 
 import nep
-from nep import wire
 from nep.backends.base import SubscriberSpec
-from nep.backends.native.subsocket import SubSocket
-from nep.configuration import Hybrid
-from nep.masters import Master
-from nep.records import PublisherRecord, RemotePublisher
+from nep.backends.connection import Hybrid
+from nep.backends.zeromq.sub_socket import SubSocket
+from nep.masters.master import Master
+from nep.protocol import wire
+from nep.protocol.records import PublisherRecord, RemotePublisher
 from tests.nep.programs import GREETINGS_S, eventually, running
 
 

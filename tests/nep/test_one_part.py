@@ -9,8 +9,8 @@ import pytest
 import zmq
 
 import nep
-from nep import wire
-from nep.masters import Master
+from nep.masters.master import Master
+from nep.protocol import wire
 from tests.nep.programs import eventually
 
 Stranger = Callable[..., zmq.Socket[bytes]]

@@ -11,14 +11,14 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.native import link
-from nep.bodies import decode_answer, encode_request
+from nep.backends.zeromq import master_session
 from nep.errors import AddressInUseError, NepError, RequestRefusedError
-from nep.listening import check_hosts
-from nep.masters import Master
-from nep.network import ANY, OwnAddress, has_address, nearest, own_addresses
-from nep.requests import Listen, Refused
-from nep.starting import listen
+from nep.masters.listen_addresses import check_hosts
+from nep.masters.master import Master
+from nep.masters.process import listen
+from nep.protocol.encoding import decode_answer, encode_request
+from nep.protocol.requests import Listen, Refused
+from nep.system.interfaces import ANY, OwnAddress, has_address, nearest, own_addresses
 from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
@@ -80,12 +80,12 @@ def test_own_addresses_are_none_of_the_loopback():
 
 def test_a_master_serves_this_computer_only_until_it_is_told(master):
     far = f"{OTHER}:{master.address.rpartition(':')[2]}"
-    assert not nep.masters.is_running(far, 0.3)
+    assert not nep.masters.master.is_running(far, 0.3)
     listen([OTHER], master.address)
-    assert nep.masters.is_running(far, 5.0)
+    assert nep.masters.master.is_running(far, 5.0)
     assert master.view().listens == (OTHER,)
     listen([], master.address)
-    assert not nep.masters.is_running(far, 0.3)
+    assert not nep.masters.master.is_running(far, 0.3)
     assert master.view().listens == ()
 
 
@@ -148,7 +148,7 @@ def test_publishers_that_were_there_before_are_reached_when_the_master_begins_to
 
 def test_a_node_whose_computer_gets_another_address_is_reached_there(far, master, monkeypatch):
     address = ["127.0.0.3"]
-    monkeypatch.setattr(link, "host_towards", lambda _master: address[0])
+    monkeypatch.setattr(master_session, "host_towards", lambda _master: address[0])
     with nep.node("near") as near, nep.node("far", master=far) as away:
         sub = near.new_sub("t")
         pub = away.new_pub("t")
@@ -177,7 +177,7 @@ def test_the_loss_of_a_served_address_is_an_alert_until_it_is_back():
         def unbind(self, endpoint):
             bound.remove(endpoint)
 
-    listening = nep.listening.Listening(Router(), 7780, lambda: here[0])
+    listening = nep.masters.listen_addresses.Listening(Router(), 7780, lambda: here[0])
     listening.serve(["192.168.1.20"])
     assert bound == ["tcp://192.168.1.20:7780"]
     assert listening.follow() == ()
@@ -208,7 +208,7 @@ def test_when_one_address_can_not_be_bound_none_is():
         def unbind(self, endpoint):
             bound.remove(endpoint)
 
-    listening = nep.listening.Listening(Router(), 7780, lambda: HERE)
+    listening = nep.masters.listen_addresses.Listening(Router(), 7780, lambda: HERE)
     with pytest.raises(AddressInUseError):
         listening.serve([own.host for own in HERE])
     assert (bound, listening.hosts) == ([], ())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.nep.programs import Program, running
 
 SENDER = """

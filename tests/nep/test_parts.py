@@ -15,18 +15,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep import addresses
 from nep.backends.base import Backend
-from nep.backends.native.audience import MAX_SUBSCRIBERS, Audience
-from nep.backends.native.io import IoThread, Rest
-from nep.backends.native.sources import UNLISTED_MAX, Sources
+from nep.backends.zeromq.audience import MAX_SUBSCRIBERS, Audience
+from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.loss import UNLISTED_MAX, Sources
 from nep.errors import PluginsMissingError, did_you_mean
-from nep.inbox import Inbox
-from nep.message import Message
-from nep.plugins import discover
-from nep.records import PublisherRecord, RemotePublisher
-from nep.waker import Waker
-from nep.wire import hello_part
+from nep.messages.message import Message
+from nep.messages.queue import Inbox
+from nep.protocol.records import PublisherRecord, RemotePublisher
+from nep.protocol.wire import hello_part
+from nep.system import addresses
+from nep.system.plugins import discover
+from nep.system.wakeup import Waker
 
 
 def message(n: int, size: int = 1) -> Message:

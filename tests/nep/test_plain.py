@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nep import plain
 from nep.errors import WireError
-from nep.records import PublisherCount, SubscriberCount
-from nep.requests import Look, Renew
-from nep.views import NodeInfo, PublisherInfo, TopicInfo
+from nep.protocol import plain
+from nep.protocol.graph_view import NodeInfo, PublisherInfo, TopicInfo
+from nep.protocol.records import PublisherCount, SubscriberCount
+from nep.protocol.requests import Look, Renew
 
 PUBLISHER: dict[str, object] = {
     "id": 5,

@@ -13,7 +13,7 @@ from time import monotonic
 import pytest
 
 import nep
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.nep.programs import GREETINGS_S, MASTER, eventually, running
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="uses POSIX signals")

@@ -12,11 +12,17 @@ import pytest
 import zmq
 
 import nep
-from nep import bodies
-from nep.packing import pack, pack_surely
-from nep.records import NodeRecord, PublisherCount, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.registration import node_id_from
-from nep.requests import AddPublisher, Join, Leave, Look, RemovePublisher, Renew, Request
+from nep.messages.packing import pack, pack_surely
+from nep.protocol import encoding
+from nep.protocol.records import (
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    SubscriberCount,
+    SubscriberRecord,
+)
+from nep.protocol.registration import node_id_from
+from nep.protocol.requests import AddPublisher, Join, Leave, Look, RemovePublisher, Renew, Request
 from tests.nep.programs import MASTER, eventually, running
 
 NAMES = ("Arm", "Eye", "Leg")
@@ -78,7 +84,7 @@ def mallory(n: int) -> NodeRecord:
 
 def say(socket: zmq.Socket[bytes], *requests: Request) -> None:
     for request in requests:
-        socket.send(bodies.encode_request(request, 1))
+        socket.send(encoding.encode_request(request, 1))
 
 
 def answers(socket: zmq.Socket[bytes], count: int) -> None:

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.masters import is_running
-from nep.terminal import LineFormatter, Terminal
+from nep.masters.master import is_running
+from nep.system.terminal import LineFormatter, Terminal
 from tests.nep.programs import eventually, running
 
 if sys.platform == "linux":
@@ -184,7 +184,7 @@ def test_a_forked_child_writes_to_the_terminal_too() -> None:
     """Its parent's thread is not there: what it says would wait for ever."""
     code = """
     import os, sys
-    from nep.terminal import Terminal
+    from nep.system.terminal import Terminal
     terminal = Terminal(sys.stdout)
     terminal.write("parent\\n")
     assert terminal.drain(30.0)

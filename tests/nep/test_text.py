@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import nep
 from nep.errors import DecodeError, RequestRefusedError
+from nep.protocol.wire import check_node_name, check_topic
 from nep.text import control_in, escaped, harmless, shortened
-from nep.wire import check_node_name, check_topic
 
 CONTROLS = [
     *map(chr, range(0x20)),

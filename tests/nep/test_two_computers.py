@@ -17,7 +17,7 @@ from tests.nep.programs import Program, eventually, running
 
 MASTER = """
 import nep, sys
-from nep.masters import Master
+from nep.masters.master import Master
 with Master("127.0.0.1:7780", learn_s=0.0) as master:
     master.listen(["10.77.0.1"])
     print("ready")

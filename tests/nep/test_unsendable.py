@@ -7,9 +7,9 @@ import logging
 import pytest
 
 import nep
-from nep.codecs import CODECS
-from nep.rarely import is_told
-from nep.unsendable import Unsendable, place_of
+from nep.messages.codecs import CODECS
+from nep.nodes.unsendable import Unsendable, place_of
+from nep.system.log_rarely import is_told
 
 
 class Told:

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from nep.backends.native.window import STEP_BYTES, WINDOW_BYTES, WINDOW_LEAST_BYTES, Backlog, Window
+from nep.backends.zeromq.byte_window import STEP_BYTES, WINDOW_BYTES, WINDOW_LEAST_BYTES, Backlog, Window
 
 
 class Held:

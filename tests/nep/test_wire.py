@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep import wire
 from nep.errors import BadTopicError, WireError
-from nep.registration import id_from, node_id_from
+from nep.protocol import wire
+from nep.protocol.registration import id_from, node_id_from
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "wire" / "messages.json").read_text("utf-8"))
 

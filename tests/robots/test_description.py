@@ -12,7 +12,7 @@ from app.errors import DescriptionError
 from app.robots.description import Parameter, announced, parse, td_for, topic_of, validate
 from app.robots.inputs import check_input, from_words, parameter_of, to_words
 from nep.errors import NepError
-from nep.message import UNDECODED, Message
+from nep.messages.message import UNDECODED, Message
 from nep.text import control_in
 
 MODELS = sorted(resources.path("robots").glob("*.tm.jsonld"))

@@ -46,4 +46,6 @@ def test_a_drivers_own_records_and_what_breaks_off_are_on_the_bus(master):
     (broke,) = [record for record in records if "no legs" in record["text"]]
     assert broke["level"] == "warning"
     assert "Traceback" in broke["text"]
-    assert not any(isinstance(each, nep.logs.LogHandler) for each in logging.getLogger().handlers)
+    assert not any(
+        isinstance(each, nep.nodes.log_handler.LogHandler) for each in logging.getLogger().handlers
+    )

@@ -26,8 +26,8 @@ from app.robots.inputs import Choice, Parameter
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
 from app.robots.parts import Topics as RobotTopics
 from nep.doctor import Finding
-from nep.message import Message
-from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 
 @dataclass(eq=False)

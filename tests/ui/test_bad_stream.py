@@ -18,7 +18,7 @@ from app.core.settings import Settings
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
 from app.ui.panels.alerts import PANEL, AlertsPanel
-from nep.masters import Master
+from nep.masters.master import Master
 from tests.ui.shell_parts import PANELS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

@@ -22,8 +22,8 @@ from app.ui.panels.image import ImagePanel
 from app.ui.panels.inspector import InspectorPanel
 from app.ui.panels.robot import RobotPanel
 from app.ui.theme import Theme
-from nep.message import Message
-from nep.views import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 from tests.ui.shell_parts import PANELS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

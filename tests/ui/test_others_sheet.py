@@ -10,8 +10,8 @@ from app.core.reach import Reach, words_of
 from app.core.settings import Settings
 from app.ui.others_sheet import OthersSheet
 from app.ui.theme import Theme
-from nep.network import OwnAddress
-from nep.views import GraphView
+from nep.protocol.graph_view import GraphView
+from nep.system.interfaces import OwnAddress
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from app.core.console import Console
 from app.ui.console_list import MESSAGE, LineDelegate, first_line, tip_of
 from app.ui.panels.console import PANEL, ConsolePanel
 from app.ui.widgets import paint
-from nep.logs import LOG_TOPIC, LOG_TYPE
-from nep.message import Message
+from nep.messages.message import Message
+from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 

@@ -18,7 +18,7 @@ from app.ui.inspector_parts import LARGE_BYTES, image_summary, message_facts, pl
 from app.ui.panels.inspector import PANEL, InspectorPanel
 from app.ui.tree import Node
 from app.ui.tree_difference import OFF
-from nep.message import Message, kind_of
+from nep.messages.message import Message, kind_of
 from tests.ui.fakes import Session, blackboard
 from tests.ui.panel_case import Window, button, press, ticks
 

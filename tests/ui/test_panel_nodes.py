@@ -10,7 +10,7 @@ from app.core.nodes import NodeEntry, Nodes
 from app.ui.node_rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
 from app.ui.panels.nodes import PANEL, NodesPanel
 from app.ui.table import CELL_ROLE
-from nep.views import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
 

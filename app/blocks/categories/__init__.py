@@ -1,1 +1,1 @@
-"""The categories of blocks: one module each, binding ``CATEGORY``; `nep.plugins.discover` finds them."""
+"""The categories of blocks: one module each, binding ``CATEGORY``; found by `nep.system.plugins`."""

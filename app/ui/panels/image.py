@@ -24,7 +24,7 @@ from app.ui.widgets.menus import Menu, drop_below
 if TYPE_CHECKING:
     from app.core.images import ImageStream
     from app.core.watches import Look, Watch
-    from nep.message import Message
+    from nep.messages.message import Message
 
 CODEC = "image"
 ROOMY = 320

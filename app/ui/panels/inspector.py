@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from app.core.lazy_json import JsonIndex
     from app.core.topics import Topic
     from app.core.watches import Look, Watch
-    from nep.message import Message
+    from nep.messages.message import Message
 
 FIRST_ROWS = 24
 BEFORE, PINNED = "Message before", "Pinned message"

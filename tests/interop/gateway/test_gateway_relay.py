@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import zmq
 
-from nep.message import Message
+from nep.messages.message import Message
 
 pytestmark = [pytest.mark.ports]
 

@@ -9,7 +9,7 @@ import socket
 import pytest
 import zmq
 
-from nep.gateway.desk import Ports
+from nep.gateway.request_server import Ports
 
 pytestmark = [pytest.mark.ports]
 

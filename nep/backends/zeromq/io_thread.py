@@ -1,0 +1,235 @@
+"""IoThread: a thread that serves sockets: one for all nodes of a process, and one for the sinks of a node.
+
+A ZeroMQ socket may be used by any thread that holds its owner's lock, so this thread never polls sockets. It
+polls their raw descriptors, and an owner then takes its lock and works until its socket has nothing more. A
+descriptor tells of a change only once, and any use of the socket may swallow that; so whoever uses a socket
+in another thread either empties it or asks for `serve_soon`.
+
+Nothing ends this thread but `close`: an owner that fails is tried again each second, and when the system
+cannot poll (a descriptor was closed under it), it polls anew without those that are broken.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import logging
+import selectors
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from typing import NamedTuple, Protocol
+
+from nep.system.forks import watch
+from nep.system.wakeup import Waker
+
+__all__ = ["IoThread", "Rest", "Served"]
+
+_logger = logging.getLogger("nep.io")
+_RETRY_S = 1.0
+
+
+class Rest(NamedTuple):
+    """What an owner wants next: to be served at `due`; with `is_quiet` not to be polled until then."""
+
+    is_quiet: bool = False
+    due: float | None = None
+
+
+class Served(Protocol):
+    """An owner of a socket."""
+
+    @property
+    def fd(self) -> int:
+        """The socket's descriptor."""
+
+    def serve(self, now: float) -> Rest:
+        """Work until the socket has nothing more. Takes the owner's lock; does not wait."""
+
+
+class IoThread:
+    """See the module. `add` may be called before `start`. `new_selector` makes what polls."""
+
+    def __init__(
+        self, name: str, new_selector: Callable[[], selectors.BaseSelector] = selectors.DefaultSelector
+    ) -> None:
+        self._waker = Waker()
+        self._new_selector = new_selector
+        self._selector = new_selector()
+        self._selector.register(self._waker.fd, selectors.EVENT_READ)
+        self._orders: deque[tuple[str, Served, threading.Event | None]] = deque()
+        self._served: set[Served] = set()
+        self._polled: dict[Served, int] = {}
+        self._due: dict[Served, float] = {}
+        self._heap: list[tuple[float, int, Served]] = []
+        self._numbers = itertools.count()
+        self._turns = 0
+        self._stuck_in: int | None = None
+        self._is_closing = False
+        self._pause = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        watch(self)
+
+    # ---- from other threads
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def add(self, served: Served) -> None:
+        """Serve this one from now on, at once for the first time."""
+        self._order("add", served, None)
+
+    def serve_soon(self, served: Served) -> None:
+        """Serve it again, whatever its descriptor says."""
+        self._order("soon", served, None)
+
+    def remove(self, served: Served, timeout_s: float = 2.0) -> None:
+        """Let go of it; when this returns its descriptor is polled no more and its socket may be closed.
+
+        A thread that is held up (in a sink that does not return) is waited for only once.
+        """
+        if threading.current_thread() is self._thread or not self._thread.is_alive():
+            self._forget(served)
+            return
+        done = threading.Event()
+        self._order("remove", served, done)
+        if self._stuck_in != self._turns and not done.wait(timeout_s):
+            self._stuck_in = self._turns
+
+    def close(self, timeout_s: float = 5.0) -> None:
+        """End the thread; wait for that at most so long."""
+        self._is_closing = True
+        self._pause.set()
+        self._waker.wake()
+        if not self._thread.is_alive():
+            self._release()
+        elif threading.current_thread() is not self._thread:
+            self._thread.join(timeout_s)
+
+    def forked(self) -> None:
+        """In a child: the thread is not there; what polls belongs to the parent, too, and is not changed."""
+        self._is_closing = True
+        self._pause = threading.Event()
+        self._served.clear()
+        self._orders.clear()
+        self._selector.close()
+
+    def _order(self, what: str, served: Served, done: threading.Event | None) -> None:
+        self._orders.append((what, served, done))
+        self._waker.wake()
+
+    # ---- in the thread
+
+    def _run(self) -> None:
+        while not self._is_closing:
+            self._turns += 1
+            try:
+                self._turn()
+            except Exception:
+                if not self._is_closing:
+                    _logger.exception("the sockets of this program could not be polled; they are polled anew")
+                    self._begin_anew()
+        self._release()
+        for _what, _served, done in self._orders:
+            if done is not None:
+                done.set()
+
+    def _turn(self) -> None:
+        ready = self._selector.select(self._timeout())
+        self._waker.clear()
+        self._obey()
+        for key, _events in ready:
+            if isinstance(key.data, tuple) and key.data[0] in self._served:
+                self._serve(key.data[0])
+        self._serve_due()
+
+    def _begin_anew(self) -> None:
+        """Another poll for all that is served; whoever cannot be polled is served each second."""
+        while not self._is_closing:
+            with suppress(Exception):  # it may be what is broken
+                self._selector.close()
+            try:
+                self._selector = self._new_selector()
+                self._polled.clear()
+                self._selector.register(self._waker.fd, selectors.EVENT_READ)
+            except Exception:
+                _logger.exception("the sockets of this program cannot be polled; trying again")
+                self._pause.wait(_RETRY_S)
+                continue
+            for served in tuple(self._served):
+                self._serve(served)
+            return
+
+    def _obey(self) -> None:
+        while self._orders:
+            what, served, done = self._orders.popleft()
+            if what == "remove":
+                self._forget(served)
+            else:
+                if what == "add":
+                    self._served.add(served)
+                if served in self._served:
+                    self._serve(served)
+            if done is not None:
+                done.set()
+
+    def _serve(self, served: Served) -> None:
+        now = time.monotonic()
+        try:
+            rest = served.serve(now)
+        except Exception:  # one broken socket must not silence the others
+            _logger.exception("a socket could not be served")
+            rest = Rest(is_quiet=True, due=now + _RETRY_S)
+        if served not in self._served or self._is_closing:
+            return  # it was removed while it was served
+        try:
+            self._poll(served, not rest.is_quiet)
+        except (OSError, ValueError, KeyError) as error:
+            _logger.error("a socket cannot be polled, it is served each second: %s", error)  # noqa: TRY400
+            self._polled.pop(served, None)
+            rest = Rest(is_quiet=True, due=now + _RETRY_S)
+        if rest.due is None:
+            self._due.pop(served, None)
+        elif self._due.get(served) != rest.due:
+            self._due[served] = rest.due
+            heapq.heappush(self._heap, (rest.due, next(self._numbers), served))
+
+    def _serve_due(self) -> None:
+        now = time.monotonic()
+        late: list[Served] = []
+        while self._heap and self._heap[0][0] <= now:
+            due, _number, served = heapq.heappop(self._heap)
+            if self._due.get(served) == due:  # else it was put off since
+                del self._due[served]
+                late.append(served)
+        for served in late:
+            if served in self._served:
+                self._serve(served)
+
+    def _timeout(self) -> float | None:
+        while self._heap and self._due.get(self._heap[0][2]) != self._heap[0][0]:
+            heapq.heappop(self._heap)
+        return max(0.0, self._heap[0][0] - time.monotonic()) if self._heap else None
+
+    def _poll(self, served: Served, wanted: bool) -> None:
+        polled = self._polled.get(served)
+        if wanted and polled is None:
+            self._selector.register(served.fd, selectors.EVENT_READ, (served,))
+            self._polled[served] = served.fd
+        elif not wanted and polled is not None:
+            del self._polled[served]
+            self._selector.unregister(polled)
+
+    def _forget(self, served: Served) -> None:
+        self._served.discard(served)
+        self._due.pop(served, None)
+        if served in self._polled:
+            with suppress(OSError, ValueError, KeyError):  # the poll is closed, or was begun anew without it
+                self._poll(served, wanted=False)
+
+    def _release(self) -> None:
+        self._selector.close()
+        self._waker.close()

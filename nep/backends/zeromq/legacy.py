@@ -1,0 +1,247 @@
+"""Direct connections: no master, one address that one side binds; the frames of the original NEP."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+import zmq
+
+from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.connection import Direct
+from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, Backlog
+from nep.backends.zeromq.io_thread import Rest
+from nep.backends.zeromq.legacy_framing import from_frame, to_frame
+from nep.backends.zeromq.readable import Into
+from nep.backends.zeromq.refusals import Refusals
+from nep.backends.zeromq.sockets import (
+    Socket,
+    bind,
+    connect,
+    receive_mark,
+    wait_shortly,
+    wait_until,
+)
+from nep.backends.zeromq.subscriber import SocketInlet
+from nep.errors import ClosedError, WireError
+from nep.messages.codecs import codec_for
+from nep.messages.encoded import Encoded
+from nep.messages.message import Message
+
+__all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach"]
+
+_MARKS = {"image": 64, "bytes": 1000}
+_MARK = 10_000
+"""How many messages libzmq queues for each connection. For what is small these are fewer bytes than it may
+hold for all of them together, so that one subscriber that reads nothing takes nothing from the others."""
+_logger = logging.getLogger("nep")
+_TOLD_MS = 100
+"""How soon after its linger libzmq says that a socket is closed."""
+
+
+def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
+    """Bind or connect as the mode says; the endpoint. Raises `AddressInUseError`."""
+    if direct.mode == "many2many":
+        # Both connect, to the two ports of a proxy of the original NEP.
+        return connect(socket, f"{direct.ip}:{direct.port + (0 if is_publisher else 1)}")
+    binds = is_publisher == (direct.mode == "one2many")
+    address = f"{direct.ip}:{direct.port}"
+    return bind(socket, address) if binds else connect(socket, address)
+
+
+class OriginalOutlet:
+    """Owns `socket`, an XPUB that looks to the originals like their PUB."""
+
+    def __init__(
+        self,
+        socket: Socket,
+        spec: PublisherSpec,
+        direct: Direct,
+        on_close: Callable[[OriginalOutlet, float], None],
+    ) -> None:
+        self.spec = spec
+        self.count = 0
+        self._on_close = on_close
+        self.missing: tuple[str, ...] = ()
+        self._socket = socket
+        self._generation = direct.generation
+        self._filters = 0
+        self._is_closed = False
+        self._backlog = Backlog()
+        self._untracked_bytes = 0
+        socket.setsockopt(zmq.SNDHWM, _MARKS.get(spec.codec.name, _MARK))
+        self._deadline = 0.0
+        self._changed = threading.Condition(threading.Lock())
+        socket.setsockopt(zmq.XPUB_VERBOSER, 1)  # so that filters can be counted: one a subscriber
+        self.fd = int(socket.getsockopt(zmq.FD))
+        # libzmq tells there when it has sent everything and has let go of the socket.
+        place = f"inproc://ended-{spec.id:x}"
+        socket.monitor(place, zmq.EVENT_MONITOR_STOPPED)
+        self._end: Socket = socket.context.socket(zmq.PAIR)
+        self._end.setsockopt(zmq.LINGER, 0)
+        self._end.connect(place)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether there are any filters."""
+        return self._filters > 0
+
+    @property
+    def subscribers(self) -> int:
+        """How many filters there are now; a proxy in between counts as one."""
+        return self._filters
+
+    def wait_for_any(self, timeout_s: float) -> None:
+        """Wait until somebody listens."""
+        with self._changed:
+            wait_until(self._changed, lambda: self._filters > 0, timeout_s)
+
+    def report(self, problem: str) -> None:
+        """There is no graph that could show it."""
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._changed:
+            self.count += 1
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish one frame."""
+        frame = to_frame(
+            self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
+        )
+        with self._changed:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count += 1
+            if self._backlog.has_room(len(frame)):
+                self._send(frame)
+            self._read_filters()
+
+    def _send(self, frame: bytes) -> None:
+        self._untracked_bytes += len(frame)
+        if self._untracked_bytes < BACKLOG_STEP_BYTES:
+            self._socket.send(frame, zmq.DONTWAIT)
+            return
+        tracked = zmq.Frame(frame, track=True, copy=False, copy_threshold=0)
+        self._socket.send(tracked, zmq.DONTWAIT)
+        self._backlog.sent(tracked.tracker, self._untracked_bytes)
+        self._untracked_bytes = 0
+
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - it has nothing to do later
+        """Read filters."""
+        with self._changed:
+            self._read_filters()
+        return Rest()
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, deliver what is on its way, and close the socket. Once; called by its publisher."""
+        self._on_close(self, timeout_s)
+
+    def say_bye(self) -> None:
+        """Nothing is published any more."""
+        with self._changed:
+            self._is_closed = True
+
+    def finish(self, deadline: float) -> None:
+        """The original wire has no way to ask: closing lingers until `deadline`, see `release`."""
+        self._deadline = deadline
+
+    def flush(self, deadline: float) -> None:
+        """Close the socket; libzmq goes on sending until `deadline`. The node's thread has let go of it."""
+        with self._changed:
+            self._is_closed = True
+            self._deadline = deadline
+            self._socket.close(self._left_ms())
+
+    def release(self) -> None:
+        """Close the socket and wait until libzmq has sent everything; log it when it could not in time."""
+        if not self._socket.closed:
+            self.flush(self._deadline)
+        with self._changed:
+            if self._end.closed:
+                return
+            self._end.poll(self._left_ms() + _TOLD_MS)
+            if self.count and self._filters and not self._left_ms():
+                _logger.warning(
+                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    self.spec.topic,
+                    self._filters,
+                    self.count,
+                )
+            self._end.close(0)
+
+    def _left_ms(self) -> int:
+        return max(0, int((self._deadline - time.monotonic()) * 1000))
+
+    def _read_filters(self) -> None:
+        while not self._socket.closed and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
+            event = self._socket.recv_multipart(zmq.DONTWAIT)[0]
+            self._filters += {b"\x01": 1, b"\x00": -1}.get(event[:1], 0)
+            self._changed.notify_all()
+
+
+class OriginalSub:
+    """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
+
+    def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
+        self.fd = int(socket.getsockopt(zmq.FD))
+        self.refusals = Refusals()
+        self.received = 0
+        self.lost: int | None = None
+        self.problem = ""
+        self._socket = socket
+        self._spec = spec
+        self._codec = codec_for(spec.msg_type)
+        wait_shortly(socket)
+        socket.setsockopt(zmq.RCVHWM, receive_mark(self._codec.name))
+        socket.setsockopt(zmq.SUBSCRIBE, b"")
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read."""
+        return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message of this topic."""
+        while True:
+            try:
+                parts = self._socket.recv_multipart(0 if may_wait else zmq.DONTWAIT)
+            except zmq.Again:
+                return None
+            if len(parts) != 1:
+                self.refusals.add(f"a message of the original NEP has one part, this one has {len(parts)}")
+                continue
+            try:
+                data = from_frame(self._spec.topic, self._spec.msg_type, self._codec.name, parts[0])
+            except WireError as error:
+                self.refusals.add(error.reason)
+                continue
+            if data is not None:
+                self.received += 1
+                return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
+
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
+        count = 0
+        while count < most and room > 0:
+            message = self.read(may_wait=may_wait and not count)
+            if message is None:
+                break
+            into.append(message)
+            count += 1
+            room -= message.size_bytes
+        return count
+
+    def dropped(self, count: int) -> None:
+        """Dropped here for lack of room: the only losses that can be known."""
+        self.received -= count
+        self.lost = (self.lost or 0) + count
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close(0)
+
+
+OriginalInlet = SocketInlet[OriginalSub]

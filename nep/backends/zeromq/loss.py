@@ -1,0 +1,181 @@
+"""Sources: the publishers that a subscriber hears, and how many of their messages were lost. No sockets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nep.errors import WireError
+from nep.messages.message import Kind, kind_of
+from nep.protocol.records import RemotePublisher
+
+__all__ = ["UNLISTED_MAX", "Source", "Sources"]
+
+FAREWELL_S = 3.0
+"""So long after a publisher has unregistered its last messages may still come."""
+GAP_MAX = 2**32
+"""More messages than these nobody misses at once: an hour of a million a second."""
+UNLISTED_MAX = 1000
+"""So many publishers are remembered that no master lists: whoever sends on a topic may call itself any."""
+_UNKNOWN = kind_of("", "", "")
+
+
+@dataclass
+class Source:
+    """One publisher. `last` is the newest message heard of it, None before the first.
+
+    `form` is that of the header of its last message, and `kind` goes with it; 0 when there was none.
+    """
+
+    form: int = 0
+    kind: Kind = _UNKNOWN
+    remote: RemotePublisher | None = None
+    endpoint: str = ""
+    refused: str = ""
+    """The endpoint to which it could not be connected, and `problem` why."""
+    problem: str = ""
+    last: int | None = None
+    has_echoed: bool = False
+    is_lapsed: bool = False
+    ends_at: float | None = None
+    final: int = 0
+    promised: int = 0
+    written_off: int = 0
+    leapt_to: int = 0
+    """The number of a message that was refused because too many would be missing before it; else 0."""
+
+
+class Sources:
+    """Counts `received` and `lost`, from sequence numbers without gaps."""
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.lost = 0
+        self.by_id: dict[int, Source] = {}
+        """All of them. Only to be looked at."""
+        self._unlisted: dict[int, None] = {}
+        """Those that no master lists, the oldest first."""
+
+    def get(self, publisher: int) -> Source:
+        """The source of this id, made when it is new; the oldest that no master lists may go for it."""
+        source = self.by_id.get(publisher)
+        if source is None:
+            source = self.by_id[publisher] = Source()
+            self._unlisted[publisher] = None
+            if len(self._unlisted) > UNLISTED_MAX:
+                self.pop(next(iter(self._unlisted)))
+        return source
+
+    def listed(self, remote: RemotePublisher) -> Source:
+        """The source of a publisher that the master lists, made when it is new."""
+        source = self.get(remote.publisher.id)
+        source.remote = remote
+        self._unlisted.pop(remote.publisher.id, None)
+        return source
+
+    def find(self, publisher: int) -> Source | None:
+        """The source of this id, if there is one."""
+        return self.by_id.get(publisher)
+
+    def pop(self, publisher: int) -> Source | None:
+        """Forget a source."""
+        self._unlisted.pop(publisher, None)
+        return self.by_id.pop(publisher, None)
+
+    def items(self) -> list[tuple[int, Source]]:
+        """All of them, by id."""
+        return list(self.by_id.items())
+
+    @property
+    def echoing(self) -> int:
+        """How many publishers have said that they see this subscriber."""
+        return sum(source.has_echoed for source in self.by_id.values())
+
+    def arrived(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
+        """A message arrived; False when it was heard already: it came for this subscriber alone (latched).
+
+        Raises `WireError` when more than `GAP_MAX` would be missing before it. A publisher that goes on from
+        there counts anew: nobody knows then how many are missing.
+        """
+        source = self.get(publisher)
+        last = source.last
+        if last is not None and seq - last > GAP_MAX:
+            if not source.leapt_to or source.leapt_to != seq - 1:
+                source.leapt_to = seq
+                raise WireError(f"its number leaps from {last} to {seq}")
+            source.leapt_to, source.promised, source.last = 0, 0, seq
+            self.received += 1
+            return True
+        if last is None or seq > last:
+            if last is not None:
+                self.lost += seq - last - 1
+            source.last = seq
+        elif source.written_off:  # it was only late
+            source.written_off -= 1
+            self.lost -= 1
+        elif is_alone:
+            return False
+        self.received += 1
+        return True
+
+    def reached(self, publisher: int, seq: int) -> bool:
+        """An echo or a bye: messages up to `seq` were sent before it, on the same connection.
+
+        False when that cannot be, because more than `GAP_MAX` would be missing: nothing is counted then.
+        """
+        source = self.get(publisher)
+        if source.last is not None and seq - source.last > GAP_MAX:
+            return False
+        if source.last is not None and seq > source.last:
+            self.lost += seq - source.last
+        if source.last is None or seq > source.last:
+            source.last = seq
+        return True
+
+    def promised(self, publisher: int, seq: int) -> None:
+        """The master says that `seq` was sent. Nothing waits in the socket.
+
+        What was promised one renewal ago and has not come since is lost. Should it come after all, it is
+        taken off again.
+        """
+        source = self.by_id.get(publisher)
+        if source is None or source.last is None or not source.has_echoed or seq - source.last > GAP_MAX:
+            return
+        if source.promised > source.last:
+            missing = source.promised - source.last
+            self.lost += missing
+            source.written_off += missing
+            source.last = source.promised
+        source.promised = seq
+
+    def dropped(self, count: int) -> None:
+        """So many messages that had been received were dropped for lack of room."""
+        self.received -= count
+        self.lost += count
+
+    def closing(self, publisher: int, final: int, now: float) -> None:
+        """A publisher has unregistered; its last message was `final`."""
+        source = self.by_id.get(publisher)
+        if source is not None and source.ends_at is None:
+            source.ends_at = now + FAREWELL_S
+            source.final = final
+
+    def ended(self, now: float) -> list[int]:
+        """Publishers to leave: they unregistered long ago and their bye has not come.
+
+        Beside them the oldest of more than `UNLISTED_MAX` that fell silent and were not replaced.
+        """
+        all_ = self.by_id.items()
+        silent = [each for each, source in all_ if source.is_lapsed and source.ends_at is None]
+        over = [each for each, source in all_ if source.ends_at is not None and now >= source.ends_at]
+        return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
+
+    def replaced_by(self, remote: RemotePublisher) -> list[int]:
+        """Silent publishers whose program has been started again, as `remote`."""
+        return [
+            each
+            for each, source in self.by_id.items()
+            if source.is_lapsed
+            and source.remote is not None
+            and each != remote.publisher.id
+            and source.remote.node_name == remote.node_name
+        ]

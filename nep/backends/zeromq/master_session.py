@@ -1,0 +1,356 @@
+"""MasterLink: what a node has registered with one master: renews it when due, hears of publishers.
+
+It keeps everything that is registered, so that a master that was started again learns all of it at once.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+from nep.backends.zeromq.inlet import NativeInlet
+from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.local import in_reach, may_stay
+from nep.backends.zeromq.master_name import MasterName, look_up
+from nep.backends.zeromq.pace import Pace
+from nep.backends.zeromq.publisher import NativeOutlet
+from nep.backends.zeromq.rpc import Asking, Calls
+from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
+from nep.errors import (
+    AddressInUseError,
+    ClosedError,
+    MasterUnreachable,
+    RequestRefusedError,
+    TooManyFilesError,
+)
+from nep.protocol.graph_view import GraphView
+from nep.protocol.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
+from nep.protocol.requests import (
+    RENEW_S,
+    Added,
+    AddPublisher,
+    AddSubscriber,
+    Found,
+    Join,
+    Leave,
+    Look,
+    PublisherCame,
+    PublisherGone,
+    Push,
+    RemovePublisher,
+    RemoveSubscriber,
+    Renew,
+    Renewed,
+    Reply,
+    ReportMissing,
+    Seen,
+)
+from nep.system.addresses import is_loopback
+from nep.system.cpu import CpuLoad
+
+__all__ = ["MasterLink"]
+
+_logger = logging.getLogger("nep")
+
+_FOLLOW_S = 1.0
+"""How often a node looks whether its publishers have to move."""
+_JOIN_AGAIN_S = 0.5
+
+
+class MasterLink:
+    """The link of `node` to the master at `address`, over `socket` (a DEALER). `io` serves it.
+
+    `look_up` tells the address behind a name.
+    """
+
+    def __init__(
+        self,
+        socket: Socket,
+        io: IoThread,
+        node: NodeRecord,
+        address: str,
+        look_up: Callable[[str], str] = look_up,
+    ) -> None:
+        self.address = address
+        self._node = node
+        self._io = io
+        self._calls = Calls(socket, address, after_use=lambda: io.serve_soon(self))
+        self._lock = threading.Lock()
+        self._publishers: dict[int, tuple[PublisherRecord, NativeOutlet]] = {}
+        self._subscribers: dict[int, tuple[SubscriberRecord, NativeInlet]] = {}
+        self._confirmed: set[int] = set()
+        self._epoch, self._revision = 0, 0
+        self._join_again_at = 0.0
+        self._pace = Pace()
+        self._follow_at = 0.0
+        self._was_connected = False
+        self._is_closed = False
+        self._leaving: Asking | None = None
+        self._left_at = 0.0
+        self._is_near = is_loopback(address)
+        self._served: tuple[str, ...] = ()
+        self._own_host = LOOPBACK
+        self._name = MasterName(address, self._found, look_up)
+        if self._name.known:
+            self._found(self._name.known)
+        self._name.look(time.monotonic())
+        self._moved_to = self.hosts
+        self._load = CpuLoad()
+        self.fd = self._calls.fd
+
+    @property
+    def endpoint(self) -> str:
+        """Where it is connected."""
+        return self._calls.endpoint
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """The addresses of this computer at which publishers are to be reached.
+
+        On the master's computer these are the loopback address and those at which the master serves others;
+        elsewhere it is the one from which the way to the master begins.
+        """
+        return (LOOPBACK, *self._served) if self._is_near else (self._own_host,)
+
+    # ---- for the carrier, in any thread
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing is registered by it, and nobody waits for an answer."""
+        with self._lock:
+            return not self._publishers and not self._subscribers and not self._calls.is_asked
+
+    def wait_for_name(self, wait_s: float | None) -> None:
+        """Wait until the master's address is known. Raises `MasterUnreachable`, None waits for ever."""
+        if not self._name.wait(wait_s) and wait_s is not None:
+            raise MasterUnreachable(self.address, wait_s, is_known=False)
+
+    def _found(self, known: str) -> None:
+        """The master's address is another one than before."""
+        if not self._is_near:
+            self._own_host = host_towards(known) or self._own_host
+        self._calls.lead_to(known)
+
+    def add_publisher(self, record: PublisherRecord, outlet: NativeOutlet, wait_s: float | None) -> Added:
+        """Register; the subscribers to expect. Raises as `Calls.ask` does."""
+        with self._lock:
+            self._publishers[record.id] = (record, outlet)
+        try:
+            reply = self._calls.ask(AddPublisher(self._node, record), wait_s)
+        except BaseException:
+            self.remove_publisher(record.id, 0)
+            raise
+        with self._lock:
+            self._confirmed.add(record.id)
+        added = reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
+        self._served = added.hosts  # a node's first publisher tells it whom the master serves
+        endpoints = outlet.move(self.hosts)
+        if endpoints == record.endpoints or not endpoints:
+            return added
+        moved = replace(record, endpoints=endpoints, local=outlet.is_local)
+        return self.add_publisher(moved, outlet, wait_s)
+
+    def add_subscriber(self, record: SubscriberRecord, inlet: NativeInlet, wait_s: float | None) -> Found:
+        """Register; the publishers to connect to. Raises as `Calls.ask` does."""
+        with self._lock:
+            self._subscribers[record.id] = (record, inlet)
+        try:
+            reply = self._calls.ask(AddSubscriber(self._node, record), wait_s)
+        except BaseException:
+            self.remove_subscriber(record.id)
+            raise
+        with self._lock:
+            self._confirmed.add(record.id)
+        if not isinstance(reply, Found):
+            return Found(reply.epoch, reply.revision)
+        return replace(reply, publishers=self._in_reach(reply.publishers))
+
+    def remove_publisher(self, publisher: int, last_seq: int) -> None:
+        """Unregister; does not wait."""
+        with self._lock:
+            known = self._publishers.pop(publisher, None)
+            self._confirmed.discard(publisher)
+        if known is not None:
+            self._calls.tell(RemovePublisher(self._node.id, publisher, last_seq))
+
+    def remove_subscriber(self, subscriber: int) -> None:
+        """Unregister; does not wait."""
+        with self._lock:
+            known = self._subscribers.pop(subscriber, None)
+            self._confirmed.discard(subscriber)
+        if known is not None:
+            self._calls.tell(RemoveSubscriber(self._node.id, subscriber))
+
+    def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
+        """Tell the master who did not answer."""
+        self._calls.tell(ReportMissing(self._node.id, publisher, tuple(subscribers)))
+
+    def look(self, timeout_s: float) -> GraphView:
+        """The graph. Raises as `Calls.ask` does."""
+        self.wait_for_name(timeout_s)
+        reply = self._calls.ask(Look(), timeout_s)
+        if not isinstance(reply, Seen):
+            raise RequestRefusedError(f"the master at '{self.address}' shows no graph")
+        return reply.view
+
+    def begin_leave(self) -> None:
+        """Unregister the node with all that it has, if there is a master. Does not wait."""
+        with self._lock:
+            if self._is_closed:
+                return
+            self._publishers.clear()
+            self._subscribers.clear()
+            self._confirmed.clear()
+            self._is_closed = True
+        if self._epoch != 0 and self._calls.is_connected:
+            self._leaving = self._calls.begin(Leave(self._node.id))
+            self._left_at = time.monotonic()
+
+    def leave(self, timeout_s: float) -> None:
+        """Wait until the master has heard it: `timeout_s` at most since the node began to leave."""
+        if self._leaving is None:
+            return
+        left = timeout_s + self._left_at - time.monotonic()
+        try:
+            self._calls.wait(self._leaving, max(0.0, left))
+        except (MasterUnreachable, RequestRefusedError, ClosedError):
+            _logger.debug("the master at '%s' did not hear that a node leaves", self.address)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._calls.stop()
+        self._io.remove(self)
+        self._calls.release()
+
+    # ---- in the node's thread
+
+    def serve(self, now: float) -> Rest:
+        """Read answers; renew when it is time, and at once when a master has come back."""
+        for answer in self._calls.read():
+            self._obey(answer.what, now)
+            if answer.then is not None and not isinstance(answer.what, Push):
+                answer.then(answer.what)
+        if self._is_closed:
+            return Rest()
+        is_connected = self._calls.is_connected
+        if is_connected and not self._was_connected:
+            self._pace.due_at = now
+        self._was_connected = is_connected
+        if not is_connected:
+            self._name.look(now)
+        is_due = now >= self._pace.due_at
+        if is_due or now >= self._follow_at:
+            self._follow_at = now + _FOLLOW_S
+            self._follow_addresses()
+        if is_due:
+            self._pace.renews(now)
+            self._renew()
+        due = min(self._pace.due_at, self._follow_at)
+        return Rest(due=now if self._calls.has_more else due)
+
+    def _follow_addresses(self) -> None:
+        """Move publishers when this computer or the master has another address, or files are short."""
+        if not self._is_near and self._name.known:
+            self._own_host = host_towards(self._name.known) or self._own_host
+        is_cramped = not may_stay()
+        if self.hosts == self._moved_to and not is_cramped:
+            return
+        self._moved_to = self.hosts
+        with self._lock:
+            for id, (record, outlet) in self._publishers.items():
+                if is_cramped:
+                    outlet.leave_local()
+                try:
+                    moved = replace(record, endpoints=outlet.move(self.hosts), local=outlet.is_local)
+                except (AddressInUseError, TooManyFilesError):
+                    self._moved_to = ()  # tried again with the next renewal
+                    continue
+                if moved != record and moved.endpoints:
+                    self._publishers[id] = (moved, outlet)
+                    if id in self._confirmed:
+                        self._calls.tell(AddPublisher(self._node, moved))
+
+    def _in_reach(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
+        """Publishers, each with the one endpoint that this node can reach."""
+        return tuple(in_reach(remote, self._name.known or self.address) for remote in remotes)
+
+    def _obey(self, answer: Reply | Push, now: float) -> None:
+        if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served:
+            self._served = answer.hosts
+            self._pace.due_at = now
+        if isinstance(answer, PublisherCame):
+            for inlet in self._inlets(answer.publisher.publisher.topic):
+                inlet.connect(self._in_reach((answer.publisher,)))
+        elif isinstance(answer, PublisherGone):
+            for inlet in self._inlets(answer.topic):
+                inlet.gone(answer.id, answer.last_seq, is_closed=answer.is_closed)
+        elif isinstance(answer, Renewed):
+            self._renewed(answer, now)
+        elif isinstance(answer, Added | Found) and self._epoch == 0:
+            self._epoch = answer.epoch
+        if self._epoch not in {0, answer.epoch}:
+            self._join(now)
+
+    def _renew(self) -> None:
+        if self._epoch == 0:
+            return
+        with self._lock:
+            outlets = [outlet for each, (_, outlet) in self._publishers.items() if each in self._confirmed]
+            inlets = [inlet for each, (_, inlet) in self._subscribers.items() if each in self._confirmed]
+            request = Renew(
+                self._node.id,
+                self._epoch,
+                self._revision,
+                tuple(outlet.counts() for outlet in outlets),
+                tuple(inlet.counts() for inlet in inlets),
+                self._load.ratio(),
+            )
+            self._calls.tell(request)
+
+    def _renewed(self, answer: Renewed, now: float) -> None:
+        if answer.again:
+            self._join(now)
+            return
+        self._revision = answer.revision
+        self._pace.told(answer.next_s, now)
+        for topic in answer.topics:
+            for inlet in self._inlets(topic.topic):
+                inlet.reconcile(self._in_reach(topic.publishers))
+        for _record, inlet in self._all_inlets():
+            inlet.tick(now, answer.last_seqs.items())
+
+    def _join(self, now: float) -> None:
+        """Register everything again, once at a time."""
+        self._pace.told(RENEW_S, now)  # this master has not said anything else yet
+        if now < self._join_again_at or self._is_closed:
+            return
+        self._join_again_at = now + _JOIN_AGAIN_S
+        with self._lock:
+            publishers = tuple(record for record, _ in self._publishers.values())
+            subscribers = tuple(record for record, _ in self._subscribers.values())
+            request = Join(self._node, self._epoch, publishers, subscribers)
+            items = {record.id for record in publishers} | {record.id for record in subscribers}
+            self._calls.tell(request, then=lambda reply: self._joined(reply, items))
+
+    def _joined(self, reply: Reply, items: set[int]) -> None:
+        if not isinstance(reply, Found):
+            return
+        self._epoch, self._revision = reply.epoch, reply.revision
+        self._join_again_at = 0.0
+        with self._lock:
+            self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())
+        by_topic: dict[str, list[RemotePublisher]] = {}
+        for remote in self._in_reach(reply.publishers):
+            by_topic.setdefault(remote.publisher.topic, []).append(remote)
+        for record, inlet in self._all_inlets():
+            inlet.reconcile(by_topic.get(record.topic, ()))
+
+    def _inlets(self, topic: str) -> list[NativeInlet]:
+        return [inlet for record, inlet in self._all_inlets() if record.topic == topic]
+
+    def _all_inlets(self) -> list[tuple[SubscriberRecord, NativeInlet]]:
+        with self._lock:
+            return list(self._subscribers.values())

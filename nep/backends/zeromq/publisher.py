@@ -1,0 +1,367 @@
+"""NativeOutlet: a publisher's XPUB socket.
+
+Sends happen in the publisher's thread; subscriptions are read by whoever uses the socket next, the publisher
+or the node's thread. A subscriber counts as connected when its hello has been read: see `docs/wire.md`.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+
+import zmq
+
+from nep.backends.base import PublisherSpec
+from nep.backends.zeromq.audience import Audience
+from nep.backends.zeromq.bindings import Places
+from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
+from nep.backends.zeromq.io_thread import Rest, Served
+from nep.backends.zeromq.local import SMALL
+from nep.backends.zeromq.refusals import Refusals
+from nep.backends.zeromq.sockets import Part, Socket, send_mark, sendable, wait_until
+from nep.errors import ClosedError
+from nep.messages.encoded import Encoded
+from nep.protocol.records import Expected, PublisherCount
+from nep.protocol.wire import (
+    BYE,
+    LATCHED,
+    SIZE_MAX,
+    extension_part,
+    form_of,
+    pack_quickly,
+    parse_hello,
+    topic_part,
+)
+from nep.protocol.wire import EXTENSION as EXTENSION_FLAG
+
+__all__ = ["NativeOutlet"]
+
+_logger = logging.getLogger("nep")
+
+_SNDMORE = int(zmq.SNDMORE)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
+_EVENTS = int(zmq.EVENTS)
+_POLLIN = int(zmq.POLLIN)
+_time_ns = time.time_ns
+
+_NO_COPY_BYTES = 65_536
+_ONE_PART_BYTES = 16_384
+"""Smaller messages go out in one part where all who subscribe read that: see docs/adr/0009-one-part.md."""
+_LOOK_NS = 500_000
+"""Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
+after it, because sending may have swallowed the descriptor's signal."""
+_SERVE_S = 0.02
+_BYE_AGAIN_S = 0.05
+
+
+class NativeOutlet:
+    """Owns `socket`, an XPUB that is bound or connected already."""
+
+    def __init__(
+        self,
+        socket: Socket,
+        spec: PublisherSpec,
+        on_close: Callable[[NativeOutlet, float], None],
+        serve_soon: Callable[[Served], None],
+    ) -> None:
+        self.spec = spec
+        self.count = 0
+        self.subscribers = 0
+        """How many said hello and have not gone."""
+        self.is_heard = False
+        """Whether anybody reads, with or without a hello."""
+        self._on_close = on_close
+        self._serve_soon = serve_soon
+        self._socket = socket
+        send_mark(socket)
+        self._places = Places(socket, may_be_local=spec.codec.name in SMALL)
+        # Without pyzmq's layer for routing ids and groups, which takes half of the time.
+        self._send: Callable[..., object] = super(zmq.Socket, socket).send
+        self._bytes = 0
+        self._settled_bytes = 0
+        """So many of them are counted in the windows of those who read."""
+        self._settle_at = 0
+        """From so many on a message is not simply sent to all."""
+        self._backlog = Backlog()
+        self._last_stamp_ns: int | None = None
+        self._problem = ""
+        self._audience = Audience(spec.topic, spec.id)
+        self._seen, self._apart = self._audience.seen, self._audience.apart
+        self._names: dict[int, str] = {}
+        self._waited: set[int] = set()
+        self._latched: tuple[Part, ...] | None = None
+        self._looked_ns = 0
+        self._io_comes = False
+        self._served = 0
+        self._id = spec.id
+        self._topic = topic_part(spec.topic)
+        self._codec = spec.codec.number
+        self._flags = LATCHED if spec.is_latched else 0
+        self._form = form_of(self._codec, self._flags)
+        # `with` is three times faster on the lock itself than on the condition over it.
+        self._lock = threading.Lock()
+        self._changed = threading.Condition(self._lock)
+        self._is_closed = False
+        self.fd = int(socket.getsockopt(zmq.FD))
+
+    # ---- who listens
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes that were expected and have not said hello."""
+        with self._changed:
+            return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
+
+    def expect(self, expected: Iterable[Expected]) -> None:
+        """These subscribers are registered and will connect."""
+        with self._changed:
+            for each in expected:
+                self._waited.add(each.id)
+                self._names[each.id] = each.node_name
+
+    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
+        """Wait until these have said hello; the ids of those that did not in time."""
+        wanted = {each.id for each in expected}
+        with self._changed:
+            wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
+            return tuple(wanted - self._seen.keys())
+
+    def wait_for_any(self, timeout_s: float) -> None:
+        """Wait until somebody has said hello."""
+        with self._changed:
+            wait_until(self._changed, lambda: bool(self._seen), timeout_s)
+
+    def counts(self) -> PublisherCount:
+        """The statistics for a renewal."""
+        with self._changed:
+            return PublisherCount(
+                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
+            )
+
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
+        """Be reached at these addresses of this computer from now on; the endpoints. See `Places.move`."""
+        with self._lock:
+            endpoints = () if self._socket.closed else self._places.move(hosts)
+            self._read_subscriptions()  # binding may have swallowed the descriptor's signal
+            return endpoints
+
+    def leave_local(self) -> None:
+        """Be reached by TCP only from now on."""
+        with self._lock:
+            if not self._socket.closed and self._places.is_local:
+                self._places.leave_local()
+                self._read_subscriptions()
+
+    @property
+    def refusals(self) -> Refusals:
+        """What was sent to it and is no subscription."""
+        return self._audience.refusals
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """All that its socket is bound to by `move`."""
+        return self._places.endpoints
+
+    @property
+    def is_local(self) -> bool:
+        """Whether programs of this computer reach it without TCP: see `local`."""
+        return self._places.is_local
+
+    # ---- sending
+
+    def report(self, problem: str) -> None:
+        """The publisher's trouble with a payload, for the next renewal."""
+        self._problem = problem
+
+    def skip(self) -> None:
+        """Count a message that nobody wants."""
+        with self._lock:
+            self.count += 1
+            self._last_stamp_ns = time.time_ns()
+
+    def send(self, encoded: Encoded) -> None:
+        """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed.
+
+        Raises `WireError` for an extension that has no form on the wire.
+        """
+        data: Part
+        data, beside = encoded
+        extension = None
+        if beside or type(data) is not bytes:
+            data = sendable(data) if len(data) >= _ONE_PART_BYTES else bytes(data)
+            extension = extension_part(beside) if beside else None
+        size = len(data)
+        with self._lock:
+            if self._is_closed:
+                raise ClosedError(f"publisher '{self.spec.topic}'")
+            self.count = seq = self.count + 1
+            self._bytes = total = self._bytes + size
+            self._last_stamp_ns = stamp_ns = _time_ns()
+            if total >= self._settle_at or extension or self._flags:
+                self._send_all(data, extension)
+            elif size < _ONE_PART_BYTES and not self._apart and type(data) is bytes:
+                head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
+                self._send(b"".join((self._topic, head, data)))
+            else:
+                send = self._send
+                send(self._topic, _SNDMORE)
+                send(
+                    pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id),
+                    _SNDMORE,
+                )
+                send(data, 0, size < _NO_COPY_BYTES)
+            if not 0 <= stamp_ns - self._looked_ns < _LOOK_NS:
+                self._looked_ns = stamp_ns
+                self._read_subscriptions()
+            elif not self._io_comes:
+                self._io_comes = True
+                self._serve_soon(self)
+
+    def _send_all(self, data: Part, extension: bytes | None) -> None:
+        """Send what has flags, or when it is time to see what was read, with the lock held."""
+        form = self._form if extension is None else self._form | EXTENSION_FLAG << 16
+        stamp_ns = self._last_stamp_ns or 0
+        size = len(data)
+        header = pack_quickly(form, size if size <= SIZE_MAX else 0, self.count, stamp_ns, self._id)
+        tail = (header, data) if extension is None else (header, data, extension)
+        if self.spec.is_latched:
+            self._latched = tail
+        if self._bytes < self._settle_at:
+            self._send_parts(self._topic, tail)
+        else:
+            self._read_subscriptions()
+            self._send_to_those_with_room(tail, size)
+
+    def _send_to_those_with_room(self, tail: tuple[Part, ...], size: int) -> None:
+        """To all at once; while somebody has no room, to everybody else alone. With the lock held."""
+        windows = self._audience.windows
+        since = self._bytes - size - self._settled_bytes  # sent to all
+        if since:
+            for window in windows.values():
+                window.sent(self.count - 1, since)
+        self._settled_bytes = self._bytes
+        is_told = self._audience.tells_all
+        has_room = {each: window.has_room(size) for each, window in windows.items()}
+        if all(has_room.values()) and (is_told or self._backlog.has_room(size)):
+            if is_told:
+                self._send_parts(self._topic, tail)
+            else:
+                self._send_tracked(tail, size + since)
+            self._settle_at = self._bytes + (STEP_BYTES if is_told else BACKLOG_STEP_BYTES)
+            taking = windows
+        else:
+            self._settle_at = 0  # each message is looked at until all have room again
+            taking = {each: window for each, window in windows.items() if has_room[each]}
+            for each, window in windows.items():
+                if each in taking:
+                    self._send_parts(self._audience.hellos[each], tail)
+                else:
+                    window.missed()
+        for window in taking.values():
+            window.sent(self.count, size)
+        now = time.monotonic()
+        for each, window in windows.items():
+            if window.is_to_ask(now, has_room=has_room[each]):
+                self._send_parts(self._audience.hellos[each], (self._notice(0),))
+
+    def _send_tracked(self, tail: tuple[Part, ...], size: int) -> None:
+        """Send to all, and note until when libzmq holds it, with all of `size` bytes since the last one."""
+        data = tail[1].buffer if isinstance(tail[1], zmq.Frame) else tail[1]
+        frame = zmq.Frame(data, track=True, copy=False, copy_threshold=0)
+        self._send_parts(self._topic, (tail[0], frame, *tail[2:]))
+        self._backlog.sent(frame.tracker, size)
+
+    def _send_parts(self, first: bytes, tail: tuple[Part, ...]) -> None:
+        """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
+        send = self._send
+        send(first, _SNDMORE)
+        for part in tail[:-1]:
+            send(part, _SNDMORE, len(part) < _NO_COPY_BYTES)
+        send(tail[-1], 0, len(tail[-1]) < _NO_COPY_BYTES)
+
+    # ---- subscriptions
+
+    def serve(self, now: float) -> Rest:
+        """Read subscriptions."""
+        with self._lock:
+            if not self._is_closed or self._seen:
+                self._read_subscriptions()
+            count, self._served = self._served, self.count
+            # As long as somebody publishes without looking, this thread looks again and again.
+            self._io_comes = self._io_comes and count != self.count and not self._is_closed
+            return Rest(due=now + _SERVE_S) if self._io_comes else Rest()
+
+    def _read_subscriptions(self) -> None:
+        """With the lock held: until the socket has nothing more."""
+        while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
+            own = self._audience.note(self._socket.recv(zmq.DONTWAIT), self.count)
+            # First: whoever gets the echo may rely on being counted.
+            self.subscribers = len(self._seen)
+            self.is_heard = self._audience.is_there
+            if own is not None:
+                self._greet(own)
+            self._changed.notify_all()
+            if self._settle_at == 0:
+                self._tell_what_was_missed()
+
+    def _tell_what_was_missed(self) -> None:
+        for each, window in self._audience.windows.items():
+            if window.is_to_tell():
+                self._send_parts(self._audience.hellos[each], (self._notice(0),))
+
+    def _greet(self, own: bytes) -> None:
+        """What was latched, then the echo: from here on the subscriber counts."""
+        if self._latched is not None:
+            self._send_parts(own, self._latched)
+            hello = parse_hello(own)
+            window = self._audience.windows.get(hello.subscriber) if hello is not None else None
+            if window is not None:
+                window.sent(self.count, len(self._latched[1]))
+        self._send_parts(own, (self._notice(0),))
+
+    def _notice(self, flags: int) -> bytes:
+        return pack_quickly(form_of(self._codec, flags), 0, self.count, time.time_ns(), self._id)
+
+    # ---- closing
+
+    def close(self, timeout_s: float) -> None:
+        """Unregister, deliver what is on its way, and close the socket. Once; called by its publisher."""
+        self._on_close(self, timeout_s)
+
+    def say_bye(self) -> None:
+        """Nothing is published any more; every subscriber disconnects when it has read everything."""
+        with self._changed:
+            self._is_closed = True
+            self._bye()
+
+    def finish(self, deadline: float) -> None:
+        """Wait until all have disconnected; log what was not delivered at `deadline`, and to how many."""
+        with self._changed:
+            while self._seen and (left := deadline - time.monotonic()) > 0.0:
+                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
+                    self._bye()  # a full queue drops it like anything else
+            if self._seen:
+                owed = [max(self.count - seen, self._latched is not None) for seen in self._seen.values()]
+                if any(owed):  # else only the bye was not taken
+                    _logger.warning(
+                        "'%s' is closed before %d subscriber(s) took everything: "
+                        "up to %d messages not delivered",
+                        self.spec.topic,
+                        sum(map(bool, owed)),
+                        max(owed),
+                    )
+                self._audience.forget()
+                self.subscribers = 0
+
+    def release(self) -> None:
+        """Close the socket; the node's thread has let go of it."""
+        with self._changed:
+            self._is_closed = True
+            self._socket.close(0)
+
+    def _bye(self) -> None:
+        if not self._socket.closed:
+            for own in self._audience.hellos.values():
+                self._send_parts(own, (self._notice(BYE),))
+            self._read_subscriptions()

@@ -1,0 +1,255 @@
+"""Calls: requests to a master and its answers, over one DEALER socket that any thread may use."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import zmq
+
+from nep.backends.zeromq.refusals import Refusals
+from nep.backends.zeromq.sockets import Socket, wait_until
+from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
+from nep.protocol.encoding import call_of_view, decode_answer, encode_request
+from nep.protocol.requests import Push, Refused, Reply, Request
+from nep.system.addresses import endpoint_of, is_loopback
+
+__all__ = ["Answer", "Asking", "Calls", "Then"]
+
+_logger = logging.getLogger("nep")
+
+_READ_MAX = 50
+"""So many answers are read in one go, then the node's other sockets have their turn."""
+_AGAIN_S = 0.5
+"""A request without an answer is sent again after this: it may have gone to a master that ended just then."""
+_MOST_CALLS = 256
+
+Then = Callable[[Reply], None]
+
+
+@dataclass
+class Asking:
+    """A request that is under way."""
+
+    body: bytes
+    is_waited: bool
+    then: Then | None = None
+    reply: Reply | None = None
+    is_sent: bool = False
+    view: bytes | None = None
+    """The body of its answer, when that is a graph: who waits for it decodes it."""
+
+
+class Answer(NamedTuple):
+    """What came from the master, and what to do with it if it answers a request that said so."""
+
+    what: Reply | Push
+    then: Then | None
+
+
+class Calls:
+    """`after_use` is called when the socket may have input that its descriptor no longer tells of."""
+
+    def __init__(self, socket: Socket, address: str, after_use: Callable[[], None]) -> None:
+        self.address = address
+        self._socket = socket
+        self._after_use = after_use
+        self._calls: dict[int, Asking] = {}
+        self._numbers = itertools.count(1)
+        self._is_closed = False
+        self.refusals = Refusals()
+        self.has_more = False
+        """Whether there was more than `read` returned."""
+        self.is_connected = False
+        """Whether a master was there when the socket was read last."""
+        self._changed = threading.Condition(threading.Lock())
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.setsockopt(zmq.IMMEDIATE, 1)  # nothing is queued for a master that is not there
+        socket.setsockopt(zmq.RECONNECT_IVL, 50)
+        socket.setsockopt(zmq.RECONNECT_IVL_MAX, 400)
+        if not is_loopback(address):  # a computer that vanishes does not close its connections
+            socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
+            socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
+        self.endpoint = ""
+        """Where it is connected; "" before `lead_to`."""
+        self.fd = int(socket.getsockopt(zmq.FD))
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether somebody waits for an answer."""
+        with self._changed:
+            return any(call.is_waited for call in self._calls.values())
+
+    def lead_to(self, address: str) -> None:
+        """Connect there, and no more to where the master was before. From any thread."""
+        with self._changed:
+            if self._is_closed or self.endpoint == endpoint_of(address):
+                return
+            if self.endpoint:
+                self._socket.disconnect(self.endpoint)
+            self.endpoint = endpoint_of(address)
+            self._socket.connect(self.endpoint)
+        self._after_use()
+
+    def ask(self, request: Request, timeout_s: float | None) -> Reply:
+        """The reply; `timeout_s` None waits for ever.
+
+        Raises `MasterUnreachable` in the end, `RequestRefusedError`, and `ClosedError` when closed meanwhile.
+        """
+        return self.wait(self.begin(request), timeout_s)
+
+    def begin(self, request: Request) -> Asking:
+        """Send a request whose answer will be waited for."""
+        return self._send(request, is_waited=True, then=None)
+
+    def wait(self, call: Asking, timeout_s: float | None) -> Reply:
+        """The reply. Raises as `ask` does."""
+        started = time.monotonic()
+        with self._changed:
+            while not wait_until(
+                self._changed,
+                lambda: call.reply is not None or call.view is not None or self._is_closed,
+                _left(started, timeout_s),
+            ):
+                if timeout_s is not None and time.monotonic() - started >= timeout_s:
+                    self._calls = {number: each for number, each in self._calls.items() if each is not call}
+                    raise MasterUnreachable(self.address, timeout_s)
+                call.is_sent = False  # asking twice does no harm
+                self._flush()
+                self._after_use()
+        if call.view is not None:
+            return self._decoded(call.view)
+        if call.reply is None:
+            raise ClosedError("the node")
+        if isinstance(call.reply, Refused):
+            raise RequestRefusedError(call.reply.reason)
+        return call.reply
+
+    def _decoded(self, view: bytes) -> Reply:
+        """The reply in a body, in the thread of who asked: a graph of thousands of topics takes its time."""
+        try:
+            reply = decode_answer(view)[1]
+        except WireError as error:
+            self._refuse(error)
+            raise RequestRefusedError(f"the master's answer cannot be read: {error.reason}") from error
+        if isinstance(reply, Push):
+            raise RequestRefusedError("the master's answer is none")
+        return reply
+
+    def tell(self, request: Request, then: Then | None = None) -> None:
+        """Send and do not wait; `then` gets the reply, in the node's thread. Lost when there is no master."""
+        self._send(request, is_waited=False, then=then)
+
+    def read(self) -> list[Answer]:
+        """What came, `_READ_MAX` at most; also sends what is still to be sent. For the node's thread."""
+        answers: list[Answer] = []
+        events = 0
+        with self._changed:
+            while not (many := len(answers) >= _READ_MAX):
+                events = self._events()
+                if events & zmq.POLLIN:
+                    answer = self._read_one()
+                    if answer is not None:
+                        answers.append(answer)
+                elif not self._flush():  # sending may take in what came meanwhile
+                    break
+            self.has_more = many
+            self.is_connected = bool(events & zmq.POLLOUT)
+        return answers
+
+    def stop(self) -> None:
+        """Whoever waits gets `ClosedError`; nothing is sent any more."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+
+    def release(self) -> None:
+        """Close the socket; nobody polls it any more."""
+        with self._changed:
+            self._is_closed = True
+            self._socket.close(0)
+
+    def _send(self, request: Request, *, is_waited: bool, then: Then | None) -> Asking:
+        with self._changed:
+            number = next(self._numbers)
+            call = Asking(encode_request(request, number), is_waited, then)
+            if self._is_closed:
+                return call
+            self._calls[number] = call
+            if len(self._calls) > _MOST_CALLS:
+                self._drop_oldest()
+            self._flush()
+            events = self._events()
+            if events & zmq.POLLOUT and not call.is_sent:
+                self._flush()  # it was connected just now, and that was the only signal of it
+                events = self._events()
+        if events & zmq.POLLIN:
+            self._after_use()
+        return call
+
+    def _drop_oldest(self) -> None:
+        """With the lock held: a master that hangs answers nothing, and nobody waits for most of it."""
+        oldest = next((number for number, call in self._calls.items() if not call.is_waited), None)
+        if oldest is not None:
+            del self._calls[oldest]
+
+    def _flush(self) -> bool:
+        """With the lock held: send what is not sent; what nobody waits for is not kept for later.
+
+        Whether anything was sent.
+        """
+        has_sent = False
+        for number, call in list(self._calls.items()):
+            if call.is_sent or self._is_closed:
+                continue
+            try:
+                self._socket.send(call.body, zmq.DONTWAIT)
+                call.is_sent = has_sent = True
+            except zmq.Again:
+                if not call.is_waited:
+                    del self._calls[number]
+        return has_sent
+
+    def _read_one(self) -> Answer | None:
+        body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
+        asked = call_of_view(body)
+        if asked is not None:
+            looking = self._calls.pop(asked, None)
+            if looking is not None:  # else nobody waits for it any more
+                looking.view = body
+                self._changed.notify_all()
+            return None
+        try:
+            number, answer = decode_answer(body)
+        except WireError as error:
+            self._refuse(error)
+            return None
+        call = self._calls.pop(number, None)
+        if call is None or isinstance(answer, Push):
+            return Answer(answer, None)
+        call.reply = answer
+        self._changed.notify_all()
+        return Answer(answer, call.then)
+
+    def _refuse(self, error: WireError) -> None:
+        if self.refusals.add(error.reason):
+            _logger.warning(
+                "the master at '%s' says what nobody understands (%d times so far): %s",
+                self.address,
+                self.refusals.count,
+                error,
+            )
+
+    def _events(self) -> int:
+        return 0 if self._socket.closed else int(self._socket.getsockopt(zmq.EVENTS))
+
+
+def _left(started: float, timeout_s: float | None) -> float:
+    if timeout_s is None:
+        return _AGAIN_S
+    return max(0.0, min(_AGAIN_S, started + timeout_s - time.monotonic()))

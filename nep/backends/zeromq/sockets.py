@@ -1,0 +1,145 @@
+"""What all native sockets need: bounds in bytes, free ports, waits in slices."""
+
+from __future__ import annotations
+
+import errno
+import socket
+import threading
+import time
+from collections.abc import Callable
+
+import zmq
+
+from nep.backends.zeromq.master_name import in_numbers
+from nep.errors import AddressInUseError, NepError
+from nep.system.addresses import endpoint_of, host_of, is_endpoint, is_loopback
+from nep.system.descriptors import check_room
+
+__all__ = [
+    "LOOPBACK",
+    "SHORT_WAIT_S",
+    "Part",
+    "bind",
+    "bind_free_port",
+    "connect",
+    "host_towards",
+    "keep_alive",
+    "receive_mark",
+    "send_mark",
+    "sendable",
+    "wait_shortly",
+    "wait_until",
+]
+
+Socket = zmq.Socket[bytes]
+Part = bytes | memoryview | zmq.Frame
+
+LOOPBACK = "127.0.0.1"
+SHORT_WAIT_S = 0.005
+"""How long a reader may wait in a subscriber's socket, holding its lock. A shorter time is not quicker: a
+timer that ends before the kernel's next tick costs more than the wait."""
+_SLICE_S = 0.1
+_HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
+"""What binding an own address may fail with."""
+_MOST = 50_000
+_LEAST = 32
+_PORT_FILES = 2
+_ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
+"""Ports that programs of the original NEP expect to find something else on."""
+
+
+def send_mark(owner: Socket) -> None:
+    """Let libzmq queue so many messages for each connection. Their bytes are bounded elsewhere: see `window`.
+
+    Before it is bound: libzmq does not stand another mark while there are connections.
+    """
+    owner.setsockopt(zmq.SNDHWM, _MOST)
+
+
+def receive_mark(codec: str) -> int:
+    """The high-water mark of a subscriber. The node's thread empties its socket, so a small one will do."""
+    return _LEAST if codec == "image" else 1000
+
+
+def wait_shortly(owner: Socket) -> None:
+    """Let receiving without DONTWAIT wait for `SHORT_WAIT_S` seconds."""
+    owner.setsockopt(zmq.RCVTIMEO, round(SHORT_WAIT_S * 1000))
+
+
+def bind_free_port(owner: Socket, host: str) -> str:
+    """Bind to a free port of `host`, none of the original NEP's; the endpoint. Raises `AddressInUseError`."""
+    for _ in range(100):
+        endpoint = bind(owner, f"{host}:*")
+        if int(endpoint.rpartition(":")[2]) not in _ORIGINAL_PORTS:
+            return endpoint
+        owner.unbind(endpoint)
+    raise AddressInUseError(f"{host}:*")
+
+
+def bind(owner: Socket, address: str) -> str:
+    """Bind to an address; the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+    check_room(_PORT_FILES, f"a port of '{host_of(address)}'")
+    try:
+        owner.bind(endpoint_of(address))
+    except zmq.ZMQError as error:
+        raise AddressInUseError(address, is_own=error.errno in _HELD) from error
+    return owner.getsockopt_string(zmq.LAST_ENDPOINT)
+
+
+def connect(owner: Socket, address: str) -> str:
+    """Connect to an address, whether something is there yet or not; the endpoint. Raises `NepError`."""
+    endpoint = endpoint_of(address)
+    if not is_endpoint(endpoint):
+        raise NepError(f"'{address}' cannot be connected to; use a computer's address and a port up to 65535")
+    endpoint = endpoint_of(in_numbers(address))
+    owner.connect(endpoint)
+    return endpoint
+
+
+def host_towards(address: str) -> str | None:
+    """The address of this computer under which a master at `address` sees it; None without a way to it."""
+    if is_loopback(address):
+        return LOOPBACK
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect((host_of(address), 9))  # sends nothing: it only chooses the way
+            return str(probe.getsockname()[0])
+    except OSError:
+        return None
+
+
+def keep_alive(owner: Socket, endpoint: str) -> None:
+    """Notice within a dozen seconds when the computer behind the next connection has vanished.
+
+    The kernel answers for a program that a debugger holds; a heartbeat of ZeroMQ would cut it off. Only for
+    other computers: on this one the kernel tells of every end.
+    """
+    is_far = endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
+    owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if is_far else -1)
+    if is_far:
+        owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
+        owner.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
+        owner.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
+
+
+def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout_s: float) -> bool:
+    """Wait, holding `changed`, until `is_met()`; whether it is. In slices, for Ctrl+C on Windows."""
+    deadline = time.monotonic() + timeout_s
+    while not is_met():
+        left = deadline - time.monotonic()
+        if left <= 0.0:
+            return False
+        changed.wait(min(left, _SLICE_S))
+    return True
+
+
+def sendable(data: bytes | memoryview) -> Part:
+    """What can be sent as it lies: a received message itself; of what can still change a copy."""
+    if isinstance(data, bytes):
+        return data
+    if not (data.readonly and data.c_contiguous):
+        return bytes(data)
+    origin: object = data.obj
+    if isinstance(origin, zmq.Frame) and data.nbytes == len(origin):
+        return origin
+    return data if data.itemsize == data.ndim == 1 else data.cast("B")

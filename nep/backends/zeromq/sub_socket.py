@@ -1,0 +1,300 @@
+"""SubSocket: a SUB socket with its publishers: reads parts, tells messages from notices, counts losses.
+
+It has no lock: it lives under its inlet's.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import zmq
+
+from nep.backends.base import SubscriberSpec
+from nep.backends.zeromq.byte_window import WINDOW_BYTES
+from nep.backends.zeromq.loss import Source, Sources
+from nep.backends.zeromq.meaning import NO_COPY_BYTES, Meaning
+from nep.backends.zeromq.readable import Into
+from nep.backends.zeromq.refusals import Refusals
+from nep.backends.zeromq.sockets import Socket, keep_alive, receive_mark, wait_shortly
+from nep.errors import WireError
+from nep.messages.codecs import codec_for
+from nep.messages.message import NOTHING, UNDECODED, Message, arrived, new_message
+from nep.protocol.records import RemotePublisher
+from nep.protocol.wire import HEADER_BYTES, Read, hello_part, read_part, topic_part, unpack_at, unpack_quickly
+from nep.system.addresses import is_endpoint
+
+__all__ = ["SubSocket"]
+
+_logger = logging.getLogger("nep")
+
+_NO_COPY_BYTES = NO_COPY_BYTES
+_DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
+_EVENTS = int(zmq.EVENTS)
+_RCVMORE = int(zmq.RCVMORE)
+_POLLIN = int(zmq.POLLIN)
+
+_TOO_SHORT = "a message has 3 or 4 parts, this one ends earlier"
+_Part = bytes | memoryview
+
+
+class SubSocket:
+    """Sets the filters at once, before anything is connected or bound: the hello must follow the topic."""
+
+    def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
+        self.sources = Sources()
+        self.refusals = Refusals()
+        self.fd = int(socket.getsockopt(zmq.FD))
+        self._socket = socket
+        self._recv: Callable[..., Any] = socket.recv
+        self._name = spec.topic
+        self._topic = topic_part(spec.topic)
+        self._hello = hello_part(spec.id, spec.topic, tells=True)
+        self._id = spec.id
+        self._meaning = Meaning(spec, self._hello, self.sources, self.leave, self._tell)
+        self._cut = len(self._topic)
+        self._body = self._cut + HEADER_BYTES
+        """Where header and payload of a message in one part begin."""
+        # Nothing is told of the size, or what is as long may be the first part of the next message.
+        self._doubtful = frozenset({0, len(self._topic), len(self._hello)})
+        wait_shortly(socket)
+        socket.setsockopt(zmq.RCVHWM, receive_mark(codec_for(spec.msg_type).name))
+        socket.setsockopt(zmq.SNDHWM, 0)  # libzmq silently drops filters beyond 1000 otherwise
+        socket.setsockopt(zmq.SUBSCRIBE, self._topic)
+        socket.setsockopt(zmq.SUBSCRIBE, self._hello)
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self.sources.received
+
+    @property
+    def lost(self) -> int:
+        """Messages that did not."""
+        return self.sources.lost
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read. Also takes note of connections that came and went."""
+        return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
+
+    def connect(self, remote: RemotePublisher) -> None:
+        """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
+        for old in self.sources.replaced_by(remote):
+            self.leave(old)
+        source = self.sources.listed(remote)
+        source.form = 0  # its next message is looked at: the type may be another one
+        source.is_lapsed = False
+        source.ends_at = None
+        endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
+        if endpoint and endpoint not in (source.endpoint, source.refused):
+            source.refused = source.problem = ""
+            if is_endpoint(endpoint):
+                self._connect(source, endpoint)
+            else:
+                self._refuse(source, endpoint, "it is none")
+
+    def _connect(self, source: Source, endpoint: str) -> None:
+        if source.endpoint:  # its computer has another address now, or its master listens anew
+            self._disconnect(source.endpoint)
+            source.has_echoed = False
+            source.endpoint = ""
+        try:
+            keep_alive(self._socket, endpoint)
+            self._socket.connect(endpoint)
+        except zmq.ZMQError as error:
+            self._refuse(source, endpoint, str(error))
+        else:
+            source.endpoint = endpoint
+
+    def _refuse(self, source: Source, endpoint: str, why: str) -> None:
+        """Whoever tells the master nonsense keeps nobody from hearing the others: it is named, not raised."""
+        name = source.remote.node_name if source.remote is not None else ""
+        shown = ascii(endpoint[:100])[1:-1]
+        source.refused = endpoint
+        source.problem = f"the endpoint '{shown}' of '{name}' cannot be connected to: {why}"
+        if self.refusals.add(source.problem):
+            _logger.warning("subscribing to '%s': %s", self._name, source.problem)
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with a publisher that the master lists; empty when nothing is."""
+        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_lapsed)
+        return next((each.problem for each in listed), "")
+
+    def leave(self, publisher: int) -> None:
+        """Disconnect from a publisher and forget it."""
+        source = self.sources.pop(publisher)
+        if source is not None and source.endpoint:
+            self._disconnect(source.endpoint)
+
+    def _tell(self, publisher: int, seq: int) -> None:
+        """Tell a publisher that everything up to `seq` was read, and what share of the room is for it."""
+        bound = WINDOW_BYTES // max(1, self.sources.echoing)
+        said = read_part(Read(self._id, publisher, seq, bound))
+        self._socket.setsockopt(zmq.SUBSCRIBE, said)
+        self._socket.setsockopt(zmq.UNSUBSCRIBE, said)
+
+    def _disconnect(self, endpoint: str) -> None:
+        try:
+            self._socket.disconnect(endpoint)
+        except zmq.ZMQError as error:
+            if error.errno != errno.ENOENT:  # it was not connected any more
+                raise
+
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
+
+        With `may_wait` the first is waited for. Notices are dealt with on the way. Nearly every message is
+        just the next one of its publisher, has the form of the one before and comes in one part: that is read
+        here.
+        """
+        recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
+        cut, body = self._cut, self._body
+        count, others, flags, first = 0, 0, 0 if may_wait else _DONTWAIT, None
+        try:
+            while count < most and room > 0:
+                if first is None:
+                    first = recv(flags)
+                    flags = _DONTWAIT  # all parts of a message are there when its first is
+                if len(first) >= body and first.startswith(topic):
+                    form, size, seq, stamp_ns, publisher = unpack_at(first, cut)
+                    source = find(publisher)
+                    if (
+                        source
+                        and source.form == form
+                        and source.last == seq - 1
+                        and len(first) == body + size
+                    ):
+                        message = new_message(Message)
+                        message.kind, message.raw = source.kind, first[body:]
+                        message.stamp_ns = stamp_ns
+                        message.seq = source.last = seq
+                        message.publisher, message.extension = publisher, NOTHING
+                        message.decoded = UNDECODED
+                        append(message)
+                        count += 1
+                        room -= size
+                        first = None
+                        continue
+                first, other = self._in_parts(first)
+                if other is not None:
+                    append(other)
+                    count += 1
+                    others += 1
+                    room -= other.size_bytes
+        except zmq.Again:
+            pass  # nothing more
+        self.sources.received += count - others
+        return count
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message, waited for with `may_wait`; None when there is nothing more.
+
+        As `read_into` does it; a reader that waited has nothing of this in its processor's caches, so each
+        line counts.
+        """
+        recv, find = self._recv, self.sources.by_id.get
+        first: bytes | None = None
+        data: Any
+        try:
+            first = recv(0 if may_wait else _DONTWAIT)
+            if first == self._topic:
+                head = recv(_DONTWAIT)
+                if len(head) != HEADER_BYTES:
+                    return self._read_on(first, head)
+                form, size, seq, stamp_ns, publisher = unpack_quickly(head)
+                source = find(publisher)
+                if not source or source.form != form or source.last != seq - 1 or size in self._doubtful:
+                    return self._read_on(first, head)
+                data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
+                if len(data) != size:
+                    return self._read_on(first, head, data)
+                raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
+            else:
+                if len(first) < self._body or not first.startswith(self._topic):
+                    return self._read_on(first)
+                form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
+                source = find(publisher)
+                raw = first[self._body :]
+                if not source or source.form != form or source.last != seq - 1 or len(raw) != size:
+                    return self._read_on(first)
+        except zmq.Again:
+            if first is not None:
+                self.refusals.add(_TOO_SHORT)
+            return None
+        self.sources.received += 1
+        message = new_message(Message)
+        message.kind, message.raw = source.kind, raw
+        message.stamp_ns = stamp_ns
+        message.seq = source.last = seq
+        message.publisher, message.extension = publisher, NOTHING
+        message.decoded = UNDECODED
+        return message
+
+    def _read_on(self, first: bytes, *got: bytes | zmq.Frame | None) -> Message | None:
+        """The next message that can be understood, beginning with these parts."""
+        following, message = self._carefully(first, *got)
+        while message is None and following is not None:
+            following, message = self._in_parts(following)
+        one: list[Message] = []
+        return message or (one[0] if self.read_into(one, 1, 1) else None)
+
+    def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
+        """A message that begins with `first`: what comes behind it, if that was read too, and the message.
+
+        Telling whether a part is the last takes pyzmq longer than receiving it, so nobody asks: see
+        `_carefully`.
+        """
+        if first != self._topic:
+            return self._carefully(first)
+        recv, data = self._recv, None
+        try:
+            head = recv(_DONTWAIT)
+            if len(head) == HEADER_BYTES:
+                form, size, seq, stamp_ns, publisher = unpack_quickly(head)
+                source = self.sources.by_id.get(publisher)
+                if source and source.form == form and source.last == seq - 1 and size not in self._doubtful:
+                    data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
+                    if len(data) == size:
+                        self.sources.received += 1
+                        source.last = seq
+                        raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
+                        return None, arrived(source.kind, raw, stamp_ns, seq, publisher)
+        except zmq.Again:
+            self.refusals.add(_TOO_SHORT)
+            return None, None
+        return self._carefully(first, head, data)
+
+    def _carefully(self, first: bytes, *got: bytes | zmq.Frame | None) -> tuple[bytes | None, Message | None]:
+        """What the parts mean that begin with `first` and go on with `got`, and perhaps with more.
+
+        What was taken for the second or third part may be the next message's first, when somebody sends
+        less than three: it then begins as no header does, with the topic or the hello. That is returned.
+        """
+        read = [each for each in got if each is not None]
+        rest: list[_Part] = [each.buffer if isinstance(each, zmq.Frame) else each for each in read]
+        if rest and bytes(rest[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
+            following = bytes(rest.pop())
+            self.refusals.add(f"a message has 3 or 4 parts, this one has {len(rest) + 1}")
+            return following, None
+        more = bool(self._socket.getsockopt(_RCVMORE))
+        while more:
+            frame = self._recv(_DONTWAIT, False)
+            rest.append(frame.buffer)
+            more = frame.more
+        try:
+            return None, self._meaning.of(first, rest)
+        except WireError as error:
+            self.refusals.add(error.reason)
+            return None, None
+
+    def dropped(self, count: int) -> None:
+        """So many messages that had been received were dropped for lack of room."""
+        self.sources.dropped(count)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close(0)

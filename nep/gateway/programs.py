@@ -1,0 +1,204 @@
+"""Which original programs are there, and what what each does: from its traffic, not from what it said."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.processes import Processes
+from nep.gateway.proxy_pair import End, Pair
+from nep.gateway.requests import Member, Role
+
+_SAME_PROCESS_S = 5.0
+_COMING_S = 10.0
+"""So long after it asked a program may still be about to come: who comes and goes may be somebody else."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """An original program publishes or subscribes a topic."""
+
+    topic: str
+    msg_type: str
+    codec: str
+    role: Role
+
+
+@dataclass(frozen=True)
+class Program:
+    """One original node, as the graph shows it.
+
+    `generation` is "A" or "B", or the version of a program that can't be served ("0.5.4.6", "0.5.4.7").
+    """
+
+    node_id: str
+    name: str
+    pid: int | None
+    generation: str
+    language: str | None
+    links: tuple[Link, ...]
+
+
+class Census:
+    """Follows the registrations of a port map. Belongs to the gateway's thread."""
+
+    def __init__(
+        self,
+        known: PortMap,
+        processes: Processes,
+        pair_of: Callable[[Line], Pair | None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock = clock
+        self._known = known
+        self._processes = processes
+        self._pair_of = pair_of
+        self._roles: dict[Registration, frozenset[Role]] = {}
+        self._was_joined: set[Registration] = set()
+        self._openings: dict[Registration, tuple[int, float]] = {}
+
+    def look(self, lines: Iterable[Line] | None = None) -> None:
+        """Find out who is joined to these lines (all, when none are named)."""
+        chosen = None if lines is None else set(lines)
+        for registration in self._known.registrations:
+            if chosen is None or registration.line in chosen:
+                roles = frozenset(self._roles_of(registration))
+                self._roles[registration] = roles
+                if roles or self._was_briefly_joined(registration):
+                    self._was_joined.add(registration)
+
+    def expect(self, registration: Registration) -> None:
+        """A program has asked: it may have left this line a moment ago, and is about to come to it."""
+        self._was_joined.discard(registration)
+        self._openings.pop(registration, None)
+
+    def forget_the_gone(self) -> bool:
+        """Take out who is no more: its process ended, or it was joined and closed its connections."""
+        gone = {registration for registration in self._known.registrations if self._is_gone(registration)}
+        self._forget(gone)
+        return bool(gone)
+
+    def _forget(self, gone: set[Registration]) -> None:
+        if gone:
+            self._known.remove(gone)
+            self._was_joined -= gone
+            for registration in gone:
+                self._roles.pop(registration, None)
+                self._openings.pop(registration, None)
+
+    def make_room(self) -> bool:
+        """Forget the oldest program that asked and never came; whether there was one."""
+        for registration in self._known.registrations:
+            if not self._roles.get(registration):
+                self._forget({registration})
+                return True
+        return False
+
+    def programs(self) -> tuple[Program, ...]:
+        """The original nodes that are there, each with what it does."""
+        grouped: dict[str, list[Registration]] = {}
+        for registration in self._known.registrations:
+            grouped.setdefault(registration.node_id, []).append(registration)
+        return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
+
+    def names(self, line: Line, role: Role) -> tuple[str, ...]:
+        """The names of the nodes that publish or subscribe on this line."""
+        return tuple(
+            dict.fromkeys(
+                registration.node
+                for registration in self._known.registrations
+                if registration.line == line and role in self._roles.get(registration, ())
+            )
+        )
+
+    def languages(self) -> dict[Line, frozenset[str]]:
+        """In which languages the programs on each line are written, as far as it is known."""
+        told: dict[Line, frozenset[str]] = {}
+        for registration in self._known.registrations:
+            if registration.language is not None:
+                known = told.get(registration.line, frozenset())
+                told[registration.line] = known | {registration.language}
+        return told
+
+    def members(self) -> list[Member]:
+        """What the originals' own broadcast tells: who asked for what."""
+        told: list[Member] = []
+        for registration in self._known.registrations:
+            line = registration.line
+            port = self._known.port_of(line)
+            if port is not None:
+                mode = None if line.is_service else line.mode
+                told.append(
+                    Member(
+                        line.topic,
+                        registration.node,
+                        port,
+                        registration.socket,
+                        mode,
+                        registration.msg_type,
+                        registration.pid,
+                    )
+                )
+        return told
+
+    def is_used(self, line: Line) -> bool:
+        """Whether a program that is there asked for this line, or is still joined to it."""
+        pair = self._pair_of(line)
+        if pair is not None and any(pair.connections.values()):
+            return True
+        return any(registration.line == line for registration in self._known.registrations)
+
+    def _program(self, node_id: str, asked: list[Registration]) -> Program:
+        links = {
+            Link(registration.line.topic, registration.msg_type, registration.line.codec, role): None
+            for registration in asked
+            for role in sorted(self._roles.get(registration, ()))
+        }
+        first = asked[0]
+        generation = self._unserved(asked) or first.generation
+        return Program(node_id, first.node, first.pid, generation, first.language, tuple(links))
+
+    def _unserved(self, asked: list[Registration]) -> str | None:
+        """The version of a program that can't be served, where no other program on the line can be meant."""
+        for registration in asked:
+            pair = self._pair_of(registration.line)
+            for role in self._roles.get(registration, ()):
+                version = pair.unserved.get(role) if pair is not None else None
+                if version is not None and len(self.names(registration.line, role)) == 1:
+                    return version
+        return None
+
+    def _roles_of(self, registration: Registration) -> Iterable[Role]:
+        pair = self._pair_of(registration.line)
+        if pair is None:
+            return
+        for end in pair.ends:
+            if pair.connections[end.role] and self._is_joined(registration, end):
+                yield end.role
+
+    def _is_joined(self, registration: Registration, end: End) -> bool:
+        """By the system's list of connections; where that cannot be had, by what the program said."""
+        if registration.pid is not None and registration.started is not None:
+            known = self._processes.is_joined(registration.pid, end.port, binds=end.bound_by_program)
+            if known is not None:
+                return known
+        return registration.socket == end.role
+
+    def _was_briefly_joined(self, registration: Registration) -> bool:
+        """Whether somebody came to the line since this was asked, and left before we looked."""
+        pair = self._pair_of(registration.line)
+        if pair is None:
+            return False
+        now = self._clock()
+        before, asked_at = self._openings.setdefault(registration, (pair.openings, now))
+        came = pair.openings > before and not any(pair.connections.values())
+        return came and now - asked_at >= _COMING_S
+
+    def _is_gone(self, registration: Registration) -> bool:
+        if registration.pid is not None and registration.started is not None:
+            started = self._processes.started(registration.pid)
+            if started is None or abs(started - registration.started) > _SAME_PROCESS_S:
+                return True
+        return registration in self._was_joined and not self._roles.get(registration)

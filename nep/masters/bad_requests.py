@@ -1,0 +1,95 @@
+"""BadRequests: what came to the master and is no request, by sender: counted, logged rarely, an alert."""
+
+from __future__ import annotations
+
+import logging
+from collections import OrderedDict
+from dataclasses import dataclass
+
+from nep.protocol.graph_view import Alert
+from nep.system.log_rarely import is_told
+from nep.text import escaped, shortened
+
+__all__ = ["BadRequests", "who_sends"]
+
+_logger = logging.getLogger("nep.master")
+_LINES, _LINES_A_S = 10.0, 0.2
+"""So many lines of log at once, and so many a second after them: each connection may be another sender."""
+_SENDERS = 100
+"""So many senders are remembered; beyond that the one that was quiet for longest is forgotten."""
+_SHOWN = 5
+"""So many senders have an alert of their own."""
+_SHOWN_S = 10.0
+"""An alert is there for so long after the newest bad request of its sender."""
+_SAME_S = 1.0
+"""Alerts change no sooner: everybody who looks hears of each change."""
+_LONGEST = 200
+"""Letters of a reason: it may repeat what a stranger wrote."""
+_HINT = "It may be of another version of nep, or no nep program; see what connects to the master's port."
+
+
+@dataclass
+class _Sender:
+    name: str
+    count: int = 0
+    reason: str = ""
+    newest_at: float = 0.0
+
+
+class BadRequests:
+    """For the master's thread only. `now` is in seconds, of a clock that does not jump."""
+
+    def __init__(self) -> None:
+        self._senders: OrderedDict[str, _Sender] = OrderedDict()
+        self._alerts: tuple[Alert, ...] = ()
+        self._told_at = 0.0
+        self._may_log, self._counted_at = _LINES, 0.0
+
+    def add(self, sender: str, name: str, reason: str, now: float) -> None:
+        """One more of `sender`, in words `name`. Logged: the first, the tenth, ... of each."""
+        known = self._senders.pop(sender, None) or _Sender(name)
+        self._senders[sender] = known
+        known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _LONGEST)), now
+        known.count += 1
+        self._may_log = min(_LINES, self._may_log + (now - self._counted_at) * _LINES_A_S)
+        self._counted_at = now
+        if is_told(known.count) and self._may_log >= 1.0:
+            self._may_log -= 1.0
+            _logger.warning("%s", _sentence(known))
+        while len(self._senders) > _SENDERS:
+            self._senders.popitem(last=False)
+
+    def alerts(self, now: float) -> tuple[Alert, ...]:
+        """One for each of the newest senders, and one for all others. The same for a second."""
+        if (self._senders or self._alerts) and now >= self._told_at + _SAME_S:
+            self._told_at = now
+            self._alerts = self._tell(now)
+        return self._alerts
+
+    def _tell(self, now: float) -> tuple[Alert, ...]:
+        shown = [
+            (sender, known)
+            for sender, known in reversed(self._senders.items())
+            if now - known.newest_at < _SHOWN_S
+        ]
+        told = [Alert(f"request:{sender}", _sentence(known), _HINT) for sender, known in shown[:_SHOWN]]
+        if len(shown) > _SHOWN:
+            sentence = f"{len(shown) - _SHOWN} more programs send what the master does not understand"
+            told.append(Alert("request:", sentence, _HINT))
+        return tuple(sorted(told, key=lambda each: each.id))
+
+
+def who_sends(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
+    """Under what name to count what came from there, and how to say it.
+
+    Only connections that speak for a node (`node_id` is not empty) count by node: strangers are another one
+    with each connection, so they count by their computer, `peer`.
+    """
+    if node_id:
+        return node_id, f"“{node_name}”"
+    return peer, f"A program on {peer or 'a computer that is not known'}"
+
+
+def _sentence(sender: _Sender) -> str:
+    times = "once" if sender.count == 1 else f"{sender.count} times so far"
+    return f"{sender.name} sends what the master does not understand ({times}): {sender.reason}"

@@ -1,0 +1,396 @@
+"""Graph: the master's brain. It knows who is there; it has no sockets and no clock.
+
+    apply(request, call, now, sender) -> what to send, in this order (pushes first, then the reply)
+    tick(now)                         -> what to send because time has passed (leases, the end of learning)
+    drop(node ids)                    -> what to send because these nodes' connections are gone
+    view()                            -> GraphView
+
+A master that has just started is *learning*: for `learn_s` seconds it lets nodes that another master knew
+come back, and keeps new publishers and subscribers waiting, so that these learn of everybody. `now` is in
+seconds of any clock that does not jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from nep.errors import WireError
+from nep.masters.leases import LEASE_S, Leases
+from nep.masters.outgoing import Outgoing
+from nep.masters.registry import Census, Member
+from nep.masters.renewals import RenewalSaid, same_ids, take_over
+from nep.masters.snapshot import Viewer
+from nep.protocol.graph_view import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.records import Expected, NodeRecord, PublisherRecord, SubscriberRecord
+from nep.protocol.registration import (
+    ALL_RECORDS_MAX,
+    ALWAYS_ROOM,
+    RECORDS_MAX,
+    check_record,
+    check_request,
+    is_proven,
+    records_of,
+)
+from nep.protocol.requests import (
+    Added,
+    AddPublisher,
+    AddSubscriber,
+    Done,
+    Found,
+    Join,
+    Leave,
+    Listen,
+    Look,
+    Ping,
+    Probe,
+    PublisherCame,
+    PublisherGone,
+    Push,
+    Refused,
+    RemovePublisher,
+    RemoveSubscriber,
+    Renew,
+    Renewed,
+    Reply,
+    ReportAlerts,
+    ReportMissing,
+    Request,
+    Seen,
+    TopicPublishers,
+    node_of,
+)
+
+__all__ = [
+    "LEASE_S",
+    "Alert",
+    "Graph",
+    "GraphView",
+    "NodeInfo",
+    "Outgoing",
+    "PublisherInfo",
+    "SubscriberInfo",
+    "TopicInfo",
+]
+
+
+_WAITING_MAX = 10_000
+"""So many wait while the master learns who is there."""
+
+
+class Graph:
+    """See the module. Not thread-safe: it belongs to the master's thread."""
+
+    def __init__(self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S) -> None:
+        self.epoch = epoch
+        self._census = Census()
+        self._viewer = Viewer(self._census)
+        self._leases = Leases(self._census, lease_s)
+        self._learnt_at = now + learn_s
+        self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
+
+    # ---- what the master calls
+
+    @property
+    def revision(self) -> int:
+        """Grows with every change of who is there."""
+        return self._census.revision
+
+    @property
+    def members(self) -> Mapping[str, Member]:
+        """All nodes that are registered now, by their ids."""
+        return self._census.members
+
+    @property
+    def nodes(self) -> tuple[NodeRecord, ...]:
+        """All nodes that are registered now."""
+        return tuple(member.node for member in self._census.members.values())
+
+    def apply(
+        self, request: Request, call: int, now: float, sender: str, *, is_foreign: bool = False
+    ) -> tuple[Outgoing, ...]:
+        """Carry out a request of `sender`. What is wrong with it becomes a `Refused`, never an exception.
+
+        `is_foreign`: it came from another program over the connection `sender`, which speaks for its own node
+        only; see `nep.protocol.registration`.
+        """
+        out: list[Outgoing] = []
+        try:
+            if is_foreign:
+                self._admit(request, sender, out)
+            if isinstance(request, AddPublisher | AddSubscriber) and now < self._learnt_at:
+                if len(self._waiting) >= _WAITING_MAX:
+                    raise WireError("too many programs register while the master is starting; ask again")
+                self._waiting.append((request, call, sender, is_foreign))
+                return tuple(out)
+            reply = self._carry_out(request, now, sender, out)
+        except WireError as error:
+            reply = Refused(self.epoch, self.revision, error.reason)
+        out.append(Outgoing(sender, reply, call))
+        return tuple(out)
+
+    def tick(self, now: float) -> tuple[Outgoing, ...]:
+        """End learning and lapsed leases; see how often nodes shall renew."""
+        out: list[Outgoing] = []
+        if self._waiting and now >= self._learnt_at:
+            waiting, self._waiting = self._waiting, []
+            for request, call, sender, is_foreign in waiting:
+                out.extend(self.apply(request, call, now, sender, is_foreign=is_foreign))
+        out.extend(self.drop(self._leases.lapsed(now)))
+        self._leases.set_pace(now)
+        return tuple(out)
+
+    @property
+    def learning_end(self) -> float | None:
+        """When `tick` has to be called for those who wait, None when nobody waits."""
+        return self._learnt_at if self._waiting else None
+
+    def silent(self, now: float) -> tuple[Outgoing, ...]:
+        """Probes for nodes that missed a renewal: one that cannot be sent proves that its node is dead."""
+        return self.probes(self._leases.late(now))
+
+    def probes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
+        """Probes for those of these nodes that are registered."""
+        probe = Probe(self.epoch, self.revision)
+        return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._census.members)
+
+    def drop(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
+        """Unlist nodes that are dead or silent."""
+        out: list[Outgoing] = []
+        for node_id in node_ids:
+            member = self._census.members.get(node_id)
+            if member is not None:
+                self._forget(member, out, is_closed=False)
+        return tuple(out)
+
+    def view(self) -> GraphView:
+        """The whole graph as a value."""
+        return self._viewer.view(self.epoch)
+
+    def renew_quickly(self, said: RenewalSaid, now: float, sender: str) -> dict[int, int] | None:
+        """Take over a usual renewal of `sender`; the newest messages of those that the node hears.
+
+        None when it has to be applied as a request; it may have been taken over in part.
+        """
+        member = self._census.members.get(said.node_id)
+        if member is None or member.route != sender or said.epoch != self.epoch:
+            return None
+        if said.revision < self._census.publishers_revision:
+            return None
+        if not take_over(self._census, member, said, now):
+            return None
+        self._leases.renew(member, now)
+        return self._census.last_seqs(member)
+
+    def node_at(self, route: str) -> Member | None:
+        """The node that this connection speaks for."""
+        return self._census.speaking.get(route)
+
+    # ---- who may ask
+
+    def _admit(self, request: Request, sender: str, out: list[Outgoing]) -> None:
+        """Raises `WireError` unless `sender` may ask for this. Who has proven an id replaces who has not."""
+        check_request(request)
+        if isinstance(request, Join | AddPublisher | AddSubscriber):
+            self._admit_node(request.node, sender, out)
+            records = records_of(request)
+            for record in records:
+                self._admit_record(request.node, record, out)
+            self._admit_more(request, len(records))
+            return
+        node_id = node_of(request)
+        member = None if node_id is None else self._census.members.get(node_id)
+        if member is not None and member.route != sender and not isinstance(request, Renew):
+            raise WireError("a node speaks for itself only")
+
+    def _admit_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
+        if node.key and not is_proven(node):
+            raise WireError(f"the node's id '{node.id}' does not come from its key")
+        if not node.key and sender != node.id:
+            raise WireError("a node needs a key that proves its id, or its id as its routing id; update nep")
+        other = self._census.speaking.get(sender)
+        if other is not None and other.node.id != node.id:
+            raise WireError(f"this connection speaks for the node '{other.node.id}' already")
+        known = self._census.members.get(node.id)
+        if known is None or known.route == sender:
+            return
+        if not node.key:
+            raise WireError(f"the node '{node.id}' is another program's")
+        if not is_proven(known.node):
+            self._forget(known, out, is_closed=False)
+
+    def _admit_record(
+        self, node: NodeRecord, record: PublisherRecord | SubscriberRecord, out: list[Outgoing]
+    ) -> None:
+        if record.number and not is_proven(node, record):
+            raise WireError(
+                f"the id {record.id} does not come from the node's key and the number {record.number}"
+            )
+        is_publisher = isinstance(record, PublisherRecord)
+        owners = self._census.publisher_owners if is_publisher else self._census.subscriber_owners
+        owner = owners.get(record.id)
+        if owner is None or owner.node.id == node.id:
+            return
+        theirs = (owner.publishers if is_publisher else owner.subscribers)[record.id].record
+        if not is_proven(node, record) or is_proven(owner.node, theirs):
+            raise WireError(f"the id {record.id} is that of another program's publisher or subscriber")
+        if is_publisher:
+            self._unlist_publisher(owner, record.id, out)
+        else:
+            self._census.remove_subscriber(owner.node.id, record.id)
+
+    def _admit_more(self, request: Join | AddPublisher | AddSubscriber, count: int) -> None:
+        census = self._census
+        member = census.members.get(request.node.id)
+        own = 0 if member is None else len(member.publishers) + len(member.subscribers)
+        mine = count if isinstance(request, Join) else own + 1
+        if mine > max(own, RECORDS_MAX):
+            raise WireError(f"a node has {RECORDS_MAX} publishers and subscribers at most")
+        all_ = len(census.publisher_owners) + len(census.subscriber_owners)
+        if mine > max(own, ALWAYS_ROOM) and all_ + mine - own > ALL_RECORDS_MAX:
+            raise WireError(f"the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most")
+
+    # ---- requests
+
+    def _carry_out(self, request: Request, now: float, sender: str, out: list[Outgoing]) -> Reply:
+        if isinstance(request, AddPublisher):
+            return self._add_publisher(request, now, sender, out)
+        if isinstance(request, AddSubscriber):
+            return self._add_subscriber(request, now, sender, out)
+        if isinstance(request, Join):
+            return self._join(request, now, sender, out)
+        if isinstance(request, Renew):
+            return self._renew(request, now, sender)
+        if isinstance(request, Look):
+            return Seen(self.epoch, self.revision, self.view())
+        if isinstance(request, ReportAlerts):
+            self._census.report_alerts(request.source, request.alerts)
+        elif not isinstance(request, Ping | Listen):
+            self._note(request, out)
+        return Done(self.epoch, self.revision)
+
+    def _note(
+        self,
+        request: RemovePublisher | RemoveSubscriber | Leave | ReportMissing,
+        out: list[Outgoing],
+    ) -> None:
+        if isinstance(request, RemovePublisher):
+            self._remove_publisher(request, out)
+        elif isinstance(request, RemoveSubscriber):
+            self._census.remove_subscriber(request.node_id, request.id)
+        elif isinstance(request, ReportMissing):
+            self._census.report_missing(request.node_id, request.publisher_id, request.subscriber_ids)
+        else:
+            member = self._census.members.get(request.node_id)
+            if member is not None:
+                self._forget(member, out, is_closed=True)
+
+    def _meet(self, node: NodeRecord, now: float, sender: str, *, is_managed: bool | None = None) -> Member:
+        member = self._census.meet(node, now, is_managed=is_managed)
+        self._census.bind(member, sender)
+        return member
+
+    def _add_publisher(self, request: AddPublisher, now: float, sender: str, out: list[Outgoing]) -> Reply:
+        check_record(request.publisher)
+        member = self._meet(request.node, now, sender)
+        self._place(member, request.publisher, out)
+        expected: list[Expected] = []
+        hung: list[Expected] = []
+        for other, subscriber in self._census.subscribers_of(request.publisher.topic):
+            if not other.is_managed:
+                entry = Expected(subscriber.record.id, other.node.id, other.node.name)
+                # Who did not answer this node is not waited for by it; by others when it is late as well.
+                is_hung = member.node.id in other.hung or (other.hung and self._leases.is_late(other, now))
+                (hung if is_hung else expected).append(entry)
+        return Added(self.epoch, self.revision, tuple(expected), tuple(hung))
+
+    def _add_subscriber(self, request: AddSubscriber, now: float, sender: str, out: list[Outgoing]) -> Reply:
+        check_record(request.subscriber)
+        member = self._meet(request.node, now, sender)
+        self._census.add_subscriber(member, request.subscriber)
+        found = self._census.publishers_of(request.subscriber.topic)
+        # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
+        out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
+        return Found(self.epoch, self.revision, found)
+
+    def _join(self, request: Join, now: float, sender: str, out: list[Outgoing]) -> Reply:
+        records: tuple[PublisherRecord | SubscriberRecord, ...] = (*request.publishers, *request.subscribers)
+        for record in records:
+            check_record(record)
+        member = self._meet(request.node, now, sender, is_managed=request.managed)
+        kept = {record.id for record in request.publishers}
+        for gone in [known for known in member.publishers if known not in kept]:
+            self._census.remove_publisher(member.node.id, gone)
+        kept = {record.id for record in request.subscribers}
+        for gone in [known for known in member.subscribers if known not in kept]:
+            self._census.remove_subscriber(member.node.id, gone)
+        for subscriber in request.subscribers:
+            self._census.add_subscriber(member, subscriber)
+        for publisher in request.publishers:
+            self._place(member, publisher, out)
+        topics = {record.topic for record in request.subscribers}
+        found = [remote for topic in sorted(topics) for remote in self._census.publishers_of(topic)]
+        return Found(self.epoch, self.revision, tuple(found))
+
+    def _renew(self, request: Renew, now: float, sender: str) -> Reply:
+        member = self._census.members.get(request.node_id)
+        if member is not None and member.route != sender:
+            member = None  # it has another connection now, or it is not this node at all: joining tells
+        if member is None or request.epoch != self.epoch or not same_ids(member, request):
+            if member is not None:
+                member.renewed_at = now
+            return Renewed(self.epoch, self.revision, again=True)
+        self._census.renew(member, request.publishers, request.subscribers, now, request.cpu_ratio)
+        topics: Iterable[str] = ()
+        if self._census.publishers_revision > request.revision:
+            topics = sorted({subscriber.record.topic for subscriber in member.subscribers.values()})
+        changed = tuple(
+            TopicPublishers(topic, self._census.publishers_of(topic))
+            for topic in topics
+            if self._census.topic_revision(topic) > request.revision
+        )
+        last_seqs, next_s = self._census.last_seqs(member), self._leases.renew(member, now)
+        return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s)
+
+    def _unlist_publisher(self, member: Member, publisher: int, out: list[Outgoing]) -> None:
+        """Take out a publisher that has not said that it closes."""
+        last_seq = member.publishers[publisher].last_seq
+        record = self._census.remove_publisher(member.node.id, publisher)
+        if record is not None:
+            gone = PublisherGone(self.epoch, self.revision, record.id, record.topic, False, last_seq)
+            self._tell(record, gone, out)
+
+    def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
+        record = self._census.remove_publisher(request.node_id, request.id)
+        if record is not None:
+            gone = PublisherGone(
+                self.epoch, self.revision, record.id, record.topic, is_closed=True, last_seq=request.last_seq
+            )
+            self._tell(record, gone, out)
+
+    # ---- telling subscribers
+
+    def _place(self, member: Member, record: PublisherRecord, out: list[Outgoing]) -> None:
+        if self._census.add_publisher(member, record) and record.endpoints:
+            remote = self._census.remote(member, record)
+            self._tell(record, PublisherCame(self.epoch, self.revision, remote), out)
+
+    def _forget(self, member: Member, out: list[Outgoing], *, is_closed: bool) -> None:
+        publishers = list(member.publishers.values())
+        self._census.forget(member.node.id)
+        for publisher in publishers:
+            gone = PublisherGone(
+                self.epoch,
+                self.revision,
+                publisher.record.id,
+                publisher.record.topic,
+                is_closed=is_closed,
+                last_seq=publisher.last_seq,
+            )
+            self._tell(publisher.record, gone, out)
+
+    def _tell(self, record: PublisherRecord, push: Push, out: list[Outgoing]) -> None:
+        told: set[str] = set()
+        for member, _subscriber in self._census.subscribers_of(record.topic):
+            if not member.is_managed and member.node.id not in told:
+                told.add(member.node.id)
+                out.append(Outgoing(member.node.id, push))

@@ -1,0 +1,122 @@
+"""Listening: the addresses, beside the loopback one, at which a master serves other computers."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import logging
+from collections.abc import Callable, Iterable
+
+import zmq
+
+from nep.errors import AddressInUseError, NepError
+from nep.protocol.graph_view import Alert
+from nep.system.addresses import endpoint_of
+from nep.system.interfaces import ANY, OwnAddress, own_addresses
+
+__all__ = ["Listening", "check_hosts"]
+
+_logger = logging.getLogger("nep.master")
+
+
+def check_hosts(hosts: Iterable[str], here: Iterable[OwnAddress]) -> tuple[str, ...]:
+    """`hosts`, each once. Raises `NepError` for what is no address of this computer (see `own_addresses`)."""
+    known = {own.host for own in here}
+    checked = tuple(dict.fromkeys(hosts))
+    for host in checked:
+        try:
+            address = ipaddress.IPv4Address(host)
+        except ValueError:
+            raise NepError(f"'{host}' is no IPv4 address; write it as '192.168.1.20'") from None
+        if host != ANY and host not in known and not address.is_loopback:
+            others = ", ".join(sorted(known)) or "none that others can reach; join a network first"
+            raise NepError(f"'{host}' is no address of this computer; it has {others}")
+    return checked
+
+
+class Listening:
+    """Binds `router` to further addresses, all with `port`. Follows addresses that come and go.
+
+    Belongs to the master's thread. `here` tells the addresses of this computer.
+    """
+
+    def __init__(
+        self,
+        router: zmq.Socket[bytes],
+        port: int,
+        here: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
+    ) -> None:
+        self.hosts: tuple[str, ...] = ()
+        """What was asked for."""
+        self._router = router
+        self._port = port
+        self._here = here
+        self._bound: set[str] = set()
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where the router is bound besides its own address."""
+        return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound)
+
+    def serve(self, hosts: Iterable[str]) -> None:
+        """Serve at these and no others.
+
+        Raises `NepError` for what is no address of this computer and `AddressInUseError` where another
+        program has the port; nothing has changed then.
+        """
+        here = self._here()
+        chosen = check_hosts(hosts, here)
+        new: list[str] = []
+        try:
+            for host in self._wanted(chosen, here) - self._bound:
+                self._bind(host)
+                new.append(host)
+        except NepError:
+            for host in new:
+                self._unbind(host)
+            raise
+        self.hosts = chosen
+        for host in self._bound - self._wanted(chosen, here):
+            self._unbind(host)
+
+    def follow(self) -> tuple[Alert, ...]:
+        """Look which addresses this computer has now; the alerts for those that it has no more."""
+        if not self.hosts:
+            return ()
+        here = self._here()
+        wanted = self._wanted(self.hosts, here)
+        for host in self._bound - wanted:
+            self._unbind(host)
+        for host in wanted - self._bound:
+            with contextlib.suppress(AddressInUseError):  # tried again the next time
+                self._bind(host)
+        return tuple(self._lost(host, here) for host in self.hosts if host != ANY and host not in self._bound)
+
+    def _wanted(self, hosts: tuple[str, ...], here: tuple[OwnAddress, ...]) -> set[str]:
+        present = {own.host for own in here}
+        if ANY in hosts:
+            return present
+        return {host for host in hosts if host in present or ipaddress.IPv4Address(host).is_loopback}
+
+    def _lost(self, host: str, here: tuple[OwnAddress, ...]) -> Alert:
+        now = ", ".join(own.host for own in here)
+        return Alert(
+            f"listen:{host}",
+            f"This computer has the address {host} no more, so other computers do not reach its programs",
+            f"Let them connect at {now} instead." if now else "Join the network again.",
+        )
+
+    def _bind(self, host: str) -> None:
+        address = f"{host}:{self._port}"
+        try:
+            self._router.bind(endpoint_of(address))
+        except zmq.ZMQError as error:
+            raise AddressInUseError(address) from error
+        self._bound.add(host)
+
+    def _unbind(self, host: str) -> None:
+        try:
+            self._router.unbind(endpoint_of(f"{host}:{self._port}"))
+        except zmq.ZMQError as error:  # its address is gone: there was nothing to give back
+            _logger.debug("'%s' could not be unbound: %s", host, error)
+        self._bound.discard(host)

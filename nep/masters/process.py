@@ -1,0 +1,139 @@
+"""Finding a running master, and starting one as a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import zmq
+
+from nep.errors import MasterUnreachable, RequestRefusedError, WireError
+from nep.protocol.encoding import decode_answer, encode_request
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
+from nep.system.addresses import endpoint_of, master_address
+from nep.system.descriptors import check_room
+from nep.system.lazy_import import later
+
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = later("psutil")
+
+_FILES = 16
+
+NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+"""A `creationflags`: Windows opens a window for every console program otherwise."""
+
+__all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "look", "start_process"]
+
+
+class Owner:
+    """The process that started a master. Its number alone would not do: numbers are given out again."""
+
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        try:
+            self._process: psutil.Process | None = psutil.Process(pid)
+        except psutil.NoSuchProcess:
+            self._process = None
+
+    def is_gone(self) -> bool:
+        """Whether that very process has ended."""
+        if self._process is None or not self._process.is_running():
+            return True
+        try:
+            return bool(self._process.status() == psutil.STATUS_ZOMBIE)
+        except psutil.NoSuchProcess:
+            return True
+
+
+def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
+    """Whether a master answers at `address` (default: see `master_address`) within `timeout_s` seconds."""
+    return isinstance(_ask(Ping(), master_address(address), timeout_s), Done)
+
+
+def look(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
+    """Who is there now, asked without a node of one's own; None when no master answers in time."""
+    reply = _ask(Look(), master_address(address), timeout_s)
+    return reply.view if isinstance(reply, Seen) else None
+
+
+def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 2.0) -> None:
+    """Let the master on this computer serve others at these addresses of it ("0.0.0.0": all); none: no more.
+
+    Whoever reaches one of them may then read and command everything: there is no password. Raises
+    `RequestRefusedError` with the reason, `MasterUnreachable` when none answers within `timeout_s` seconds.
+    """
+    chosen = master_address(address)
+    reply = _ask(Listen(tuple(hosts)), chosen, timeout_s)
+    if reply is None:
+        raise MasterUnreachable(chosen, timeout_s)
+    if isinstance(reply, Refused):
+        raise RequestRefusedError(reply.reason)
+
+
+def _ask(request: Request, address: str, timeout_s: float) -> Reply | None:
+    """A master's reply to one request; None when there is none that answers in time."""
+    check_room(_FILES, "a question to the master")
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    socket = context.socket(zmq.DEALER)
+    try:
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.setsockopt(zmq.RECONNECT_IVL, 50)
+        socket.connect(endpoint_of(address))
+        socket.send(encode_request(request, 1))
+        deadline = time.monotonic() + timeout_s
+        while (left := deadline - time.monotonic()) > 0:
+            if not socket.poll(int(min(left, 0.1) * 1000) + 1):
+                continue
+            try:
+                answer = decode_answer(socket.recv())[1]
+            except WireError:
+                return None
+            if isinstance(answer, Reply):
+                return answer
+        return None
+    finally:
+        socket.close()
+        context.term()
+
+
+def start_process(
+    address: str | None = None,
+    owner_pid: int | None = None,
+    *,
+    command: Sequence[str] | None = None,
+    timeout_s: float = 10.0,
+) -> subprocess.Popen[bytes]:
+    """Start `nep master` at `address` as a process that outlives this one, and wait until it answers.
+
+    With `owner_pid` it ends by itself when that process is gone and nobody else needs it. `command` is what
+    runs the `nep` command line (default: this Python). Raises `MasterUnreachable` when it does not come up.
+    """
+    chosen = master_address(address)
+    words = [*(command or (sys.executable, "-m", "nep")), "master"]
+    if owner_pid is not None:
+        words += ["--owner-pid", str(owner_pid)]
+    detached = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | NO_CONSOLE
+    process = subprocess.Popen(
+        words,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "NEP_MASTER": chosen},
+        start_new_session=True,
+        creationflags=detached,
+    )
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline and process.poll() is None:
+        if is_running(chosen, 0.5):
+            return process
+    if process.poll() is None:
+        process.kill()
+    process.wait(5.0)
+    raise MasterUnreachable(chosen, timeout_s)

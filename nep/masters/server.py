@@ -1,0 +1,366 @@
+"""MasterLoop: the master's thread: its ROUTER socket, requests in, pushes and replies out."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+
+import zmq
+
+from nep.errors import ClosedError, NepError, WaitTimeoutError
+from nep.masters.bad_requests import BadRequests, who_sends
+from nep.masters.graph import Graph, GraphView
+from nep.masters.listen_addresses import Listening
+from nep.masters.outgoing import Outgoing, with_hosts, without
+from nep.masters.process import Owner
+from nep.masters.renewals import is_renewal, read_renewal, renewed_body
+from nep.masters.router import MasterPort
+from nep.masters.submission import Submission
+from nep.protocol.encoding import Asked, decode_request, encode_answer
+from nep.protocol.requests import Done, Listen, Look, Refused, Reply, ReportAlerts, Request
+from nep.protocol.viewpacking import ViewPacker
+from nep.system.addresses import endpoint_of
+from nep.system.forks import watch
+from nep.system.garbage import collecting_later
+from nep.system.log_rarely import is_told
+from nep.system.wakeup import Waker
+
+__all__ = ["MasterLoop"]
+
+_logger = logging.getLogger("nep.master")
+_TICK_S = 0.25
+_AWAY_S = 1.0
+"""A master that did not look for so long (a suspended computer, a large request) judges nobody at once."""
+_REST_MS = 10
+_NODES_PER_MS = 50
+"""How long renewals may gather: not at all with fewer nodes than these, then 1 ms longer for so many each."""
+_FOLLOW_S = 2.0
+"""How often the addresses of this computer are looked at while other computers are served."""
+
+
+class MasterLoop:
+    """The thread with all that only it touches. `listeners` are told of every new revision.
+
+    Raises `AddressInUseError` when `address` cannot be bound.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        graph: Graph,
+        listeners: Sequence[Callable[[GraphView], None]],
+        owner: Owner | None,
+    ) -> None:
+        self._graph = graph
+        self._listeners = listeners
+        self._owner = owner
+        self._port = MasterPort(address)
+        self.address = self._port.address
+        self._waker = Waker()
+        self._submitted: deque[Submission] = deque()
+        self._pending: dict[int, Submission] = {}
+        self._calls = 0
+        self._views = ViewPacker()
+        self._bad = BadRequests()
+        self._renewals: list[tuple[bytes, bytes]] = []
+        self._tell_at = 0.0
+        self._is_open = False
+        self._closing = self._is_forked = False
+        self._told_revision = graph.revision
+        self.ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
+        self._listening = Listening(self._port.socket, int(self.address.rpartition(":")[2]))
+        self._follow_at = 0.0
+        self._failures = 0
+        self._ticked_at = time.monotonic()
+        watch(self)
+
+    # ---- from other threads
+
+    def start(self) -> None:
+        """Run the thread; only submissions are answered before `open`."""
+        self._thread.start()
+
+    def open(self) -> None:
+        """Answer everybody from now on."""
+        self._is_open = True
+        self._waker.wake()
+
+    def close(self) -> None:
+        """End the thread and give the address back."""
+        self._closing = True
+        self._waker.wake()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join(5.0)
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it is bound."""
+        return (endpoint_of(self.address), *self._listening.endpoints)
+
+    def forked(self) -> None:
+        """In a child: if this is its thread, it ends and touches nothing. See `nep.system.forks`."""
+        self._closing = self._is_forked = True
+
+    def submit(self, request: Request, timeout_s: float) -> Reply:
+        """Carry out a request of this process. See `Master.submit`."""
+        submission = Submission(request)
+        self._submitted.append(submission)
+        self._waker.wake()
+        if not submission.done.wait(timeout_s):
+            raise WaitTimeoutError("an answer of the master", timeout_s)
+        if submission.reply is None:
+            raise ClosedError(f"the master at '{self.address}'")
+        return submission.reply
+
+    # ---- in the master's thread
+
+    def _run(self) -> None:
+        waker = (self._waker.fd, int(zmq.POLLIN))
+        polled: list[tuple[int | zmq.Socket[bytes], int]] = [waker]
+        tick_at = time.monotonic()
+        try:
+            while not self._closing:
+                if self._is_open and len(polled) == 1:
+                    polled.append((self._port.socket, int(zmq.POLLIN)))
+                zmq.zmq_poll(polled, self._until(tick_at))
+                self._waker.clear()
+                now = time.monotonic()
+                due = self._graph.learning_end
+                is_due = now >= tick_at or (due is not None and now >= due)
+                if is_due:
+                    tick_at = now + _TICK_S
+                try:
+                    self._turn(waker, is_due=is_due)
+                except Exception as error:  # noqa: BLE001 - logged; one program must not end the others
+                    self._failed(error, "something in its turn")
+        finally:
+            if not self._is_forked:
+                self.ended.set()
+                self._release()
+                for submission in (*self._submitted, *self._pending.values()):
+                    submission.done.set()
+
+    def _turn(self, waker: tuple[int, int], *, is_due: bool) -> None:
+        """Serve all that came, then what time brings."""
+        self._serve_submissions()
+        if self._is_open:
+            self._serve_router()
+            if self._renewals and self._rest_from_renewals(waker):
+                self._serve_router()
+            self._answer_renewals()
+        now = time.monotonic()
+        if is_due:
+            self._tick(now)
+        self._tell_listeners(now)
+
+    def _failed(self, error: Exception, what: str) -> None:
+        """Log what went wrong; rarely, when it does again and again."""
+        self._failures += 1
+        if is_told(self._failures):
+            sentence = "the master could not carry out %s (%d times so far)"
+            _logger.error(sentence, what, self._failures, exc_info=error)
+
+    def _rest_from_renewals(self, waker: tuple[int, int]) -> bool:
+        """With hundreds of nodes, let renewals gather: waking up costs more than answering one."""
+        rest_ms = min(_REST_MS, len(self._graph.members) // _NODES_PER_MS)
+        if rest_ms:
+            zmq.zmq_poll([waker], rest_ms)
+        return bool(rest_ms)
+
+    def _until(self, tick_at: float) -> int:
+        due = self._graph.learning_end
+        at = tick_at if due is None else min(tick_at, due)
+        if self._listeners and self._graph.revision != self._told_revision:
+            at = min(at, self._tell_at)
+        return max(0, int((at - time.monotonic()) * 1000) + 1)
+
+    def _tick(self, now: float) -> None:
+        was_away, self._ticked_at = now - self._ticked_at > _AWAY_S, now
+        if not was_away:  # else it is we who were late: what they sent meanwhile may still wait here
+            self._send(self._graph.tick(now))
+            self._send(self._graph.silent(now))
+        ended = (self._graph.node_at(_name_of(sender)) for sender in self._port.ended(now))
+        self._send(self._graph.probes([each.node.id for each in ended if each is not None]))
+        self._graph.apply(ReportAlerts("requests", self._bad.alerts(now)), 0, now, "")
+        if self._owner is not None and self._owner.is_gone() and not self._is_needed():
+            self._closing = True
+        if self._listening.hosts and now >= self._follow_at:
+            self._follow_at = now + _FOLLOW_S
+            self._report_lost_addresses()
+
+    def _report_lost_addresses(self) -> None:
+        self._graph.apply(ReportAlerts("listening", self._listening.follow()), 0, time.monotonic(), "")
+
+    def _is_needed(self) -> bool:
+        """Whether a node of a process other than the owner and this one is registered."""
+        own = {os.getpid(), None if self._owner is None else self._owner.pid}
+        return any(node.pid not in own for node in self._graph.nodes)
+
+    def _serve_submissions(self) -> None:
+        while self._submitted:
+            submission = self._submitted.popleft()
+            self._calls -= 1  # calls from inside count downwards, so that they never meet a node's
+            self._pending[self._calls] = submission
+            self._apply(Asked(self._calls, submission.request), "")
+
+    def _serve_router(self) -> None:
+        enough_at = time.monotonic() + _TICK_S
+        for _ in range(1000):  # then time for the rest of the loop
+            if time.monotonic() > enough_at:
+                return
+            try:
+                sender, *body = self._port.receive()
+            except zmq.Again:
+                return
+            except zmq.ZMQError:
+                _logger.exception("the master could not read a request")
+                return
+            if len(body) == 1 and is_renewal(body[0]):
+                self._renewals.append((sender, body[0]))
+            else:
+                self._answer_renewals()  # they came before
+                self._serve(sender, body, self._port.peer())
+
+    def _answer_renewals(self) -> None:
+        """All of them, then all answers: so the network's thread is woken once, too."""
+        renewals, self._renewals = self._renewals, []
+        answers = [self._renew_safely(sender, body) for sender, body in renewals]
+        for (sender, body), answer in zip(renewals, answers, strict=True):
+            if answer is None:
+                self._serve(sender, [body], "")
+            elif not self._port.send(sender, answer):
+                self._send(self._graph.drop(self._speaking_at(_name_of(sender))))
+
+    def _renew_safely(self, sender: bytes, body: bytes) -> bytes | None:
+        """As `_renew_quickly`; what fails takes the usual way, which answers it."""
+        try:
+            return self._renew_quickly(sender, body)
+        except Exception as error:  # noqa: BLE001 - logged; the others are renewed
+            self._failed(error, "a renewal")
+            return None
+
+    def _renew_quickly(self, sender: bytes, body: bytes) -> bytes | None:
+        """The answer to a usual renewal; None when it is something else."""
+        said = read_renewal(body)
+        if said is None:
+            return None
+        graph = self._graph
+        last_seqs = graph.renew_quickly(said, time.monotonic(), _name_of(sender))
+        if last_seqs is None:
+            return None
+        hosts, next_s = self._listening.hosts, graph.members[said.node_id].renew_s
+        return renewed_body(said.call, graph.epoch, graph.revision, last_seqs, hosts, next_s)
+
+    def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
+        asked = decode_request(body[-1] if len(body) == 1 else b"")
+        if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
+            asked = Asked(asked.call, "who may connect is decided on the master's own computer")
+        name = _name_of(sender)
+        reason = self._apply(asked, name)
+        if reason:
+            member = self._graph.node_at(name)
+            node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
+            self._bad.add(*who_sends(node_id, node_name, peer), reason, time.monotonic())
+
+    def _apply(self, asked: Asked, sender: str) -> str:
+        """Carry out a request, of this process when `sender` is empty; why it was refused, or ""."""
+        request, outgoing = asked.request, tuple[Outgoing, ...]()
+        try:
+            if isinstance(request, str):
+                outgoing = (Outgoing(sender, self._refused(request), asked.call),)
+            elif isinstance(request, Listen):
+                outgoing = (Outgoing(sender, self._listen(request), asked.call),)
+            else:
+                now, is_foreign = time.monotonic(), bool(sender)
+                with collecting_later() if isinstance(request, Look) else nullcontext():
+                    outgoing = self._graph.apply(request, asked.call, now, sender, is_foreign=is_foreign)
+                    self._send(outgoing)
+                return _reason_in(outgoing)
+        except Exception as error:  # noqa: BLE001 - logged; one request must never end the master
+            self._failed(error, "a request")
+            outgoing = (Outgoing(sender, self._refused(), asked.call),)
+        self._send(outgoing)
+        return request if isinstance(request, str) else ""
+
+    def _listen(self, request: Listen) -> Reply:
+        try:
+            self._listening.serve(request.hosts)
+        except NepError as error:
+            return Refused(self._graph.epoch, self._graph.revision, str(error))
+        self._report_lost_addresses()
+        return Done(self._graph.epoch, self._graph.revision)
+
+    def _send(self, outgoing: Sequence[Outgoing]) -> None:
+        """Send in order; nodes that turn out to be dead on the way are dropped, and nobody waits for them."""
+        dead: set[str] = set()
+        for each in outgoing:
+            if each.call is not None and each.call < 0:
+                self._reply_inside(each)
+            elif not self._deliver(each, frozenset(dead)):
+                dead.update([each.to] if each.call is None else self._speaking_at(each.to))
+        if dead:
+            self._send(self._graph.drop(dead))
+
+    def _reply_inside(self, each: Outgoing) -> None:
+        submission = self._pending.pop(each.call or 0, None)
+        if submission is not None:
+            submission.reply = with_hosts(each.answer, self._listening.hosts)  # type: ignore[assignment]
+            submission.done.set()
+
+    def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
+        """Send one answer; False when there is no such connection any more."""
+        route = each.to
+        if each.call is None:
+            member = None if each.to in dead else self._graph.members.get(each.to)
+            if member is None:
+                return True
+            route = member.route
+        answer = with_hosts(without(each.answer, dead), self._listening.hosts)
+        try:
+            body = self._views.body(answer, each.call or 0)
+        except Exception as error:  # noqa: BLE001 - logged; the others get theirs, who asked gets an answer
+            self._failed(error, "an answer")
+            if each.call is None:
+                return True
+            body = encode_answer(self._refused(), each.call)
+        return self._port.send(route.encode("utf-8", "surrogateescape"), body)
+
+    def _speaking_at(self, route: str) -> tuple[str, ...]:
+        """The id of the node that this connection speaks for."""
+        member = self._graph.node_at(route)
+        return () if member is None else (member.node.id,)
+
+    def _refused(self, reason: str = "the master could not carry this out; its log says why") -> Refused:
+        return Refused(self._graph.epoch, self._graph.revision, reason)
+
+    def _tell_listeners(self, now: float) -> None:
+        """With many nodes that come at once, not after each: telling shall not take most of the time."""
+        if self._listeners and self._graph.revision != self._told_revision and now >= self._tell_at:
+            self._told_revision = self._graph.revision
+            view = replace(self._graph.view(), listens=self._listening.hosts)
+            for changed in self._listeners:
+                try:
+                    changed(view)
+                except Exception:  # the master outlives what is attached to it
+                    _logger.exception("something attached to the master failed")
+            self._tell_at = 4.0 * time.monotonic() - 3.0 * now  # three times as long as it took
+
+    def _release(self) -> None:
+        self._port.close()
+        self._waker.close()
+
+
+def _reason_in(outgoing: Sequence[Outgoing]) -> str:
+    """Why a request was refused that was answered so; "" when it was not."""
+    return next((each.answer.reason for each in outgoing if isinstance(each.answer, Refused)), "")
+
+
+def _name_of(sender: bytes) -> str:
+    return sender.decode("utf-8", "surrogateescape")

@@ -1,0 +1,213 @@
+"""Viewing: the census as frozen values, with the alerts that follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from nep.masters.registry import Census, Member, Publisher, Subscriber
+from nep.protocol.graph_view import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.plain import made
+from nep.protocol.records import as_count
+
+__all__ = ["Viewer"]
+
+
+_NAMES = 5
+"""So many programs are named in a sentence."""
+
+
+class Viewer:
+    """Looks at `census` again and again. What has not changed is the very value of the last view."""
+
+    def __init__(self, census: Census) -> None:
+        self._census = census
+        self._topics: dict[str, TopicInfo] = {}
+        self._alerts: dict[str, tuple[Alert, ...]] = {}
+
+    def view(self, epoch: int) -> GraphView:
+        """Everything that the census knows now."""
+        census, touched = self._census, self._census.touched
+        names = census.topics
+        for name in touched:
+            self._topics.pop(name, None)
+            self._alerts.pop(name, None)
+        touched.clear()
+        known = self._topics
+        if len(known) > len(names) or not known.keys() <= set(names):
+            for gone in known.keys() - set(names):
+                del known[gone]
+                self._alerts.pop(gone, None)
+        for name in names:
+            if name not in known:
+                publishing, subscribing = census.publishing(name), census.subscribers_of(name)
+                known[name] = _look_at(name, publishing, subscribing)
+                is_told = any(each.problem for _member, each in subscribing)
+                is_told = is_told or any(each.problem for _member, each in publishing)
+                if len(publishing) > 1 or is_told:
+                    self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
+        nodes = {each.node.id: _node_info(each) for each in census.members.values()}
+        topics = {name: known[name] for name in names}
+        return GraphView(epoch, census.revision, nodes, topics, tuple(self._all_alerts()))
+
+    def _all_alerts(self) -> Iterator[Alert]:
+        yield from self._census.reported_alerts
+        yield from _name_alerts(self._census)
+        for name in sorted(self._alerts):
+            yield from self._alerts[name]
+        yield from _missing_alerts(self._census)
+
+
+def _node_info(member: Member) -> NodeInfo:
+    node = member.node
+    every_field: dict[str, object] = {
+        "id": node.id,
+        "name": node.name,
+        "host": node.host,
+        "pid": node.pid,
+        "language": node.language,
+        "generation": node.generation,
+        "since_ns": node.since_ns,
+        "cpu_ratio": member.cpu_ratio,
+    }
+    return made(NodeInfo, every_field)
+
+
+def _look_at(
+    name: str, publishing: list[tuple[Member, Publisher]], subscribing: list[tuple[Member, Subscriber]]
+) -> TopicInfo:
+    """A topic as it is now. Plain loops: with thousands of topics this is what a look waits for."""
+    first = publishing[0][1].record if publishing else None
+    rate = bandwidth = None
+    stamp_ns: int | None = None
+    is_alone = len(publishing) < 2
+    counted = publishing if is_alone else _counted(publishing)
+    publishers, subscribers = [], []
+    for entry in publishing:
+        member, publisher = entry
+        rates = publisher.meter.rates()
+        publishers.append(_publisher_info(member, publisher, rates))
+        if is_alone or entry in counted:
+            if rates is not None:
+                rate, bandwidth = (rate or 0.0) + rates[0], (bandwidth or 0.0) + rates[1]
+            if publisher.last_stamp_ns is not None:
+                stamp_ns = max(stamp_ns or 0, publisher.last_stamp_ns)
+    lost: int | None = None
+    received = 0
+    for member, subscriber in subscribing:
+        subscribers.append(_subscriber_info(member, subscriber))
+        if subscriber.lost is not None:
+            lost = as_count((lost or 0) + subscriber.lost)
+            received += subscriber.received or 0
+    every_field: dict[str, object] = {
+        "name": name,
+        "msg_type": first.msg_type if first else subscribing[0][1].record.msg_type,
+        "codec": first.codec if first else "",
+        "publishers": tuple(publishers),
+        "subscribers": tuple(subscribers),
+        "rate_hz": rate,
+        "bandwidth_Bps": bandwidth,
+        "last_stamp_ns": stamp_ns,
+        "lost": lost,
+        "loss_ratio": None if lost is None else lost / (lost + received) if lost else 0.0,
+    }
+    return made(TopicInfo, every_field)
+
+
+def _counted(publishing: list[tuple[Member, Publisher]]) -> list[tuple[Member, Publisher]]:
+    """Those whose messages are counted: the gateway's own publishers repeat what the originals sent."""
+    has_originals = any(member.node.generation not in {"native", "gateway"} for member, _ in publishing)
+    return [each for each in publishing if not (has_originals and each[0].node.generation == "gateway")]
+
+
+def _publisher_info(member: Member, publisher: Publisher, rates: tuple[float, float] | None) -> PublisherInfo:
+    record = publisher.record
+    every_field: dict[str, object] = {
+        "id": record.id,
+        "node_id": member.node.id,
+        "endpoints": record.endpoints,
+        "latched": record.latched,
+        "count": publisher.count,
+        "bytes": publisher.bytes,
+        "last_seq": publisher.last_seq,
+        "last_stamp_ns": publisher.last_stamp_ns,
+        "rate_hz": None if rates is None else rates[0],
+        "bandwidth_Bps": None if rates is None else rates[1],
+    }
+    return made(PublisherInfo, every_field)
+
+
+def _subscriber_info(member: Member, subscriber: Subscriber) -> SubscriberInfo:
+    every_field: dict[str, object] = {
+        "id": subscriber.record.id,
+        "node_id": member.node.id,
+        "received": subscriber.received,
+        "lost": subscriber.lost,
+    }
+    return made(SubscriberInfo, every_field)
+
+
+def _name_alerts(census: Census) -> Iterator[Alert]:
+    by_name: dict[str, int] = {}
+    for member in census.members.values():
+        by_name[member.node.name] = by_name.get(member.node.name, 0) + 1
+    for name, count in sorted(by_name.items()):
+        if count > 1:
+            yield Alert(
+                f"name:{name}",
+                f"{count} programs call themselves “{name}”",
+                "Give each program a name of its own; all of them go on working.",
+            )
+
+
+def _missing_alerts(census: Census) -> Iterator[Alert]:
+    for member in census.members.values():
+        if member.hung:
+            yield Alert(
+                f"missing:{member.node.id}",
+                f"“{member.node.name}” does not answer {_names(_names_of(census, member.hung))}",
+                "It may be busy or stopped in a debugger. What is published meanwhile may not reach it.",
+            )
+
+
+def _topic_alerts(
+    topic: str, publishing: list[tuple[Member, Publisher]], subscribing: list[tuple[Member, Subscriber]]
+) -> Iterator[Alert]:
+    types: dict[str, list[str]] = {}
+    for member, publisher in publishing:
+        if member.node.generation != "gateway":
+            types.setdefault(publisher.record.msg_type, []).append(member.node.name)
+    if len(types) > 1:
+        said = " and ".join(f"{_names(names)} as “{kind}”" for kind, names in sorted(types.items()))
+        yield Alert(
+            f"type:{topic}",
+            f"The topic “{topic}” has {len(types)} types: it is published by {said}",
+            "Use the same type in all programs, or give one of the topics another name.",
+        )
+    for member, publisher in publishing:
+        if publisher.problem:
+            yield Alert(
+                f"encode:{topic}",
+                f"“{member.node.name}” cannot send on “{topic}”: {publisher.problem}",
+                "Look at the program: nobody gets these messages.",
+            )
+            break
+    for member, subscriber in subscribing:
+        if subscriber.problem:
+            yield Alert(
+                f"message:{topic}",
+                f"“{member.node.name}” cannot read “{topic}”: {subscriber.problem}",
+                "Look at the program that publishes it.",
+            )
+            return
+
+
+def _names_of(census: Census, node_ids: Iterable[str]) -> set[str]:
+    """The names of these nodes, as far as they are there."""
+    return {census.members[each].node.name for each in node_ids if each in census.members} or {"programs"}
+
+
+def _names(names: Iterable[str]) -> str:
+    """Some names for a sentence: all of them, or how many more there are."""
+    said = sorted(set(names))
+    more = f" and {len(said) - _NAMES} more" if len(said) > _NAMES else ""
+    return ", ".join(f"“{name}”" for name in said[:_NAMES]) + more

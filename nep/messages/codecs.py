@@ -1,0 +1,195 @@
+"""Codecs: bytes ↔ payload. A codec is chosen by its name, on the wire by its number.
+
+| name    | number | payload                                                                  |
+|---------|--------|--------------------------------------------------------------------------|
+| json    | 1      | what JSON has; also numpy arrays and scalars, dataclasses, date and time |
+| string  | 2      | `str`, as UTF-8                                                          |
+| bytes   | 3      | `bytes`                                                                  |
+| msgpack | 4      | what msgpack has, bytes and NaN included; date and time as its timestamp |
+| image   | 5      | a picture: an array (height, width, 3) in BGR order, see `nep.messages.image_codec`    |
+
+JSON has no NaN and no infinity: they are sent as `null`, and a publisher tells of it (see
+`nep.messages.nulls`). Keys that are numbers become strings. msgpack takes numpy arrays and dataclasses as
+JSON does. Readers in other languages may want keys that are text or numbers; ours reads all that Python can
+have. Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from datetime import date, datetime, time, timezone
+from enum import Enum
+from uuid import UUID
+
+import msgpack  # type: ignore[import-untyped]
+import orjson
+
+from nep.errors import DecodeError, EncodeError, did_you_mean
+from nep.messages import image_codec
+from nep.messages.encoded import Encoded, encoded
+from nep.messages.packing import pack, unpack
+
+__all__ = ["CODECS", "Codec", "Encoded", "codec", "codec_for", "codec_numbered"]
+
+_BYTES = (bytes, bytearray, memoryview)
+_NUMPY = orjson.OPT_SERIALIZE_NUMPY
+
+
+@dataclass(frozen=True)
+class Codec:
+    """One way to turn payloads into bytes and back.
+
+    `encode` raises `EncodeError`, `decode` raises `DecodeError`; `empty` makes what `listen()` hands out
+    when nothing came; `number` goes into the message's header. `check` raises `EncodeError` for what can be
+    seen at once, whatever the payload's size: it is of a type that the codec does not take.
+    """
+
+    name: str
+    number: int
+    encode: Callable[[object], Encoded]
+    decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
+    empty: Callable[[], object]
+    check: Callable[[object], object]
+
+
+def _plain(value: object) -> object:
+    """What neither orjson nor msgpack know: things with `tolist()` (numpy), sets are refused by name."""
+    to_list = getattr(value, "tolist", None)
+    if callable(to_list):
+        return to_list()
+    raise TypeError(f"'{type(value).__name__}' has no form in it")
+
+
+def _encode_json(payload: object) -> Encoded:
+    try:
+        return encoded((orjson.dumps(payload, _plain, _NUMPY), None))
+    except TypeError:
+        pass  # number keys need the slower way; everything else fails again with its reason
+    try:
+        return Encoded(orjson.dumps(payload, _plain, _NUMPY | orjson.OPT_NON_STR_KEYS))
+    except (TypeError, RecursionError) as error:
+        reason = str(error.__cause__ or error) or "it does not fit"
+        raise EncodeError("json", type(payload).__name__, reason) from error
+
+
+def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+    try:
+        return orjson.loads(data)
+    except orjson.JSONDecodeError as first:
+        # The original NEP's 0.5.4.8 sends bare NaN, which only Python's own reader takes.
+        try:
+            return json.loads(bytes(data))
+        except (ValueError, RecursionError):
+            raise DecodeError("json", len(data), str(first)) from first
+
+
+def _anything(payload: object) -> None:
+    """What is in it shows only when it is encoded."""
+
+
+def _check_string(payload: object) -> str:
+    if not isinstance(payload, str):
+        raise EncodeError("string", type(payload).__name__, "publish a 'str', or use the type 'json'")
+    return payload
+
+
+def _encode_string(payload: object) -> Encoded:
+    text = _check_string(payload)
+    try:
+        return Encoded(text.encode("utf-8"))
+    except UnicodeEncodeError as error:
+        raise EncodeError("string", "str", "it holds half of a surrogate pair") from error
+
+
+def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+    try:
+        return str(data, "utf-8")
+    except UnicodeDecodeError as error:
+        raise DecodeError("string", len(data), f"byte {error.start} is no UTF-8") from error
+
+
+def _check_bytes(payload: object) -> bytes | bytearray | memoryview:
+    if not isinstance(payload, _BYTES):
+        raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")
+    return payload
+
+
+def _encode_bytes(payload: object) -> Encoded:
+    if isinstance(payload, bytes):
+        return encoded((payload, None))
+    return Encoded(bytes(_check_bytes(payload)))
+
+
+def _decode_bytes(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+    return data if isinstance(data, bytes) else bytes(data)
+
+
+def _packable(value: object) -> object:
+    """What msgpack does not know, in the form that it has in JSON; only times keep their own."""
+    if isinstance(value, datetime):  # without a zone, or of a class of its own
+        return msgpack.Timestamp.from_datetime(value.astimezone(timezone.utc))
+    if isinstance(value, date | time):
+        return value.isoformat()
+    if isinstance(value, UUID):
+        return str(value)
+    if isinstance(value, Enum):
+        return value.value
+    if is_dataclass(value) and not isinstance(value, type):
+        return {
+            each.name: getattr(value, each.name) for each in fields(value) if not each.name.startswith("_")
+        }
+    return _plain(value)
+
+
+def _encode_msgpack(payload: object) -> Encoded:
+    try:
+        return Encoded(pack(payload, _packable))
+    except ValueError as error:
+        raise EncodeError("msgpack", type(payload).__name__, str(error)) from error
+
+
+def _decode_msgpack(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
+    try:
+        return unpack(data)
+    except ValueError as error:
+        raise DecodeError("msgpack", len(data), str(error)) from error
+
+
+def _decode_image(data: bytes | memoryview, extension: Mapping[str, object]) -> object:
+    return image_codec.decode(memoryview(data), extension)
+
+
+def _none() -> object:
+    return None
+
+
+JSON = Codec("json", 1, _encode_json, _decode_json, dict, _anything)
+STRING = Codec("string", 2, _encode_string, _decode_string, str, _check_string)
+BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes)
+MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _anything)
+IMAGE = Codec("image", 5, image_codec.encode, _decode_image, _none, image_codec.check)
+
+CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}
+_NUMBERED = {each.number: each for each in CODECS.values()}
+# What the original NEP calls by another name.
+_ALIASES = {"images": IMAGE, "dictionary": JSON, "dict": JSON}
+
+
+def codec(name: str) -> Codec:
+    """The codec of this name. Raises `DecodeError` for a name there is not."""
+    try:
+        return CODECS[name]
+    except KeyError:
+        raise DecodeError(name, 0, f"no such codec; {did_you_mean(name, tuple(CODECS))}") from None
+
+
+def codec_numbered(number: int) -> Codec | None:
+    """The codec of a header's number, None when this version of nep does not have it."""
+    return _NUMBERED.get(number)
+
+
+def codec_for(msg_type: str) -> Codec:
+    """The codec that carries a message type: the one of the same name, json for any other type."""
+    return CODECS.get(msg_type) or _ALIASES.get(msg_type, JSON)

@@ -1,0 +1,266 @@
+"""The codec `image`: pictures as JPEG, PNG or raw bytes ↔ arrays, colours in BGR order.
+
+The extension that travels beside the bytes is `{"shape": [height, width, channels], "encoding": NAME}`, where
+NAME is "jpeg", "png", or says how raw bytes are laid out: "mono8", "bgr8", "bgra8", "mono16", "bgr16",
+"bgra16", "rgb8", "rgba8", or the type of its numbers and the count of channels, such as "32FC1" (float).
+
+An array is published as what keeps it: `uint8` of one or three channels, which a camera sends, as JPEG of
+quality 90; with an alpha channel or of 16 bits (depth) as PNG; any other numbers as raw bytes.
+`raw_image(array)` makes a payload that is sent raw, without loss and without the time for a PNG. Bytes that
+already are a JPEG or PNG file pass unchanged. Who receives it gets an array (height, width) of one channel,
+else (height, width, channels), of the same numbers. Messages of the original NEP carry no extension: their
+first bytes tell what they are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from nep.errors import DecodeError, EncodeError
+from nep.messages.encoded import Encoded
+from nep.messages.image_files import ImageFile, check_size, examine
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = [
+    "JPEG_QUALITY",
+    "RawLayout",
+    "decode",
+    "encode",
+    "picture_info",
+    "raw_array",
+    "raw_image",
+    "raw_layout",
+    "read_file",
+]
+
+JPEG_QUALITY = 90
+_NEEDS = "install the picture codec with: pip install 'nep-studio[image]'"
+_QUICK_PNG = [16, 1]  # IMWRITE_PNG_COMPRESSION: the quickest that compresses
+_NAMED = {
+    "mono8": ("u1", 1), "bgr8": ("u1", 3), "bgra8": ("u1", 4), "rgb8": ("u1", 3), "rgba8": ("u1", 4),
+    "mono16": ("<u2", 1), "bgr16": ("<u2", 3), "bgra16": ("<u2", 4), "rgb16": ("<u2", 3),
+    "rgba16": ("<u2", 4),
+}  # fmt: skip
+_NUMBERS = {"8U": "u1", "8S": "i1", "16U": "<u2", "16S": "<i2", "32S": "<i4", "32F": "<f4", "64F": "<f8"}
+_LAYOUT = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)C([1-4])")
+_ENCODING = {value: key for key, value in _NAMED.items() if not key.startswith("rgb")}
+_TYPE_NAMES = "uint8, int8, uint16, int16, int32, float32 or float64"
+
+
+@dataclass(frozen=True, slots=True)
+class RawLayout:
+    """How raw pixels are laid out: numpy's name of their numbers, how many a pixel has, red first or last."""
+
+    numbers: str
+    channels: int
+    is_red_first: bool = False
+
+
+def _opencv() -> ModuleType:
+    """OpenCV, loaded at the first picture: it costs a fifth of a second and is optional."""
+    import cv2  # noqa: PLC0415 - optional and heavy
+
+    return cv2
+
+
+def _numpy() -> ModuleType:
+    import numpy as np  # noqa: PLC0415 - optional and heavy
+
+    return np
+
+
+# ---- arrays become bytes
+
+
+def encode(payload: object) -> Encoded:
+    """A picture as bytes that keep it, or JPEG/PNG bytes unchanged. Raises `EncodeError`."""
+    kind = type(payload).__name__
+    if isinstance(payload, bytes | bytearray | memoryview):
+        data = bytes(payload)
+        try:
+            return Encoded(data, examine(data).extension)
+        except DecodeError as error:
+            raise EncodeError("image", kind, error.reason) from error
+    try:
+        frame = _checked(payload)
+        channels = 1 if frame.ndim == 2 else frame.shape[2]
+        numbers = frame.dtype.name
+        if numbers == "uint8" and channels in (1, 3):
+            return _as_file(frame, "jpeg", [1, JPEG_QUALITY])  # 1 = IMWRITE_JPEG_QUALITY
+        if numbers in ("uint8", "uint16") and channels in (1, 3, 4):
+            return _as_file(frame, "png", _QUICK_PNG)
+    except ImportError as error:
+        raise EncodeError("image", kind, _NEEDS) from error
+    return _raw(frame)
+
+
+def raw_image(payload: object) -> Encoded:
+    """A picture without loss: its numbers as they are. Raises `EncodeError`."""
+    try:
+        return _raw(_checked(payload))
+    except ImportError as error:
+        raise EncodeError("image", type(payload).__name__, _NEEDS) from error
+
+
+def _as_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
+    opencv = _opencv()
+    try:
+        is_made, buffer = opencv.imencode(f".{kind}", frame, options)
+    except opencv.error:  # such as a JPEG of more than 65535 rows
+        is_made, buffer = False, None
+    if not is_made:
+        reason = f"OpenCV cannot make a {kind} of it; publish 'nep.raw_image(…)' of it"
+        raise EncodeError("image", type(frame).__name__, reason)
+    return Encoded(buffer.tobytes(), {"shape": _shape(frame), "encoding": kind})
+
+
+def _raw(frame: NDArray[Any]) -> Encoded:
+    shape = _shape(frame)
+    numbers = _numbers(frame.dtype)
+    encoding = _ENCODING.get((numbers, shape[2]))
+    if encoding is None:
+        encoding = f"{next(name for name, each in _NUMBERS.items() if each == numbers)}C{shape[2]}"
+    return Encoded(frame.astype(numbers, copy=False).tobytes(), {"shape": shape, "encoding": encoding})
+
+
+def _numbers(dtype: np.dtype[Any]) -> str:
+    """The type of numbers as `_NUMBERS` names it: little-endian, as everything on the wire."""
+    return dtype.newbyteorder("<").str.removeprefix("|")
+
+
+def _shape(frame: NDArray[Any]) -> list[int]:
+    return [frame.shape[0], frame.shape[1], 1 if frame.ndim == 2 else frame.shape[2]]
+
+
+def check(payload: object) -> None:
+    """Raises `EncodeError` for what is no picture by its type, its shape or its numbers."""
+    if isinstance(payload, (bytes, bytearray, memoryview)):
+        return
+    try:
+        _picture(payload)
+    except ImportError as error:
+        raise EncodeError("image", type(payload).__name__, _NEEDS) from error
+
+
+def _picture(payload: object) -> NDArray[Any]:
+    """The array of a picture as it is. Raises `EncodeError`."""
+    np = _numpy()
+    kind = type(payload).__name__
+    if not isinstance(payload, np.ndarray):
+        raise EncodeError("image", kind, "publish a 'uint8' array (height, width, 3) or a JPEG")
+    if _numbers(payload.dtype) not in _NUMBERS.values():
+        raise EncodeError("image", kind, f"its numbers are '{payload.dtype}'; use {_TYPE_NAMES}")
+    is_picture = payload.ndim == 2 or (payload.ndim == 3 and 1 <= payload.shape[2] <= 4)
+    if not is_picture or 0 in payload.shape:
+        reason = f"its shape {payload.shape} is none of a picture; use (height, width, 3)"
+        raise EncodeError("image", kind, reason)
+    frame: NDArray[Any] = payload
+    try:
+        height, width = frame.shape[:2]
+        check_size(width, height, frame.nbytes / height / width, frame.nbytes)
+    except DecodeError as error:
+        raise EncodeError("image", kind, error.reason) from error
+    return frame
+
+
+def _checked(payload: object) -> NDArray[Any]:
+    """An array of a picture; one channel in two dimensions. Raises `EncodeError`."""
+    np = _numpy()
+    frame = _picture(payload)
+    if frame.ndim == 3 and frame.shape[2] == 1:
+        frame = frame[:, :, 0]
+    whole: NDArray[Any] = np.ascontiguousarray(frame, dtype=frame.dtype.newbyteorder("="))
+    return whole
+
+
+# ---- bytes become arrays
+
+
+def decode(data: memoryview, extension: Mapping[str, object]) -> object:
+    """The picture as an array, (height, width) or (height, width, channels) in BGR order.
+
+    Raises `DecodeError`, before it takes memory for more than a picture may have (see
+    `nep.messages.image_files`).
+    """
+    try:
+        layout = raw_layout(extension.get("encoding"))
+        if layout is None:
+            return read_file(examine(data))
+        frame = raw_array(data, layout, extension.get("shape"))
+        if layout.is_red_first:
+            frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
+        return frame
+    except ImportError as error:
+        raise DecodeError("image", data.nbytes, _NEEDS) from error
+
+
+def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
+    """The pixels of a file, turned as it says; a JPEG `reduced` by 1, 2, 4 or 8. Raises `DecodeError`."""
+    opencv, np = _opencv(), _numpy()
+    if file.kind == "png":
+        flag = -1  # IMREAD_UNCHANGED: its numbers, one channel, alpha
+    else:
+        whole, colour = {1: (0, 1), 2: (16, 17), 4: (32, 33), 8: (64, 65)}[reduced]  # IMREAD_REDUCED_…
+        flag = 128 + (whole if file.channels == 1 else colour)  # IMREAD_IGNORE_ORIENTATION
+    try:
+        picture = opencv.imdecode(np.frombuffer(file.data, np.uint8), flag)
+    except (opencv.error, MemoryError) as error:
+        raise DecodeError("image", len(file.data), "they are a picture larger than can be read") from error
+    if picture is None:
+        raise DecodeError("image", len(file.data), "they are no picture that OpenCV reads")
+    return _turned(picture, file.orientation)
+
+
+def _turned(picture: NDArray[Any], orientation: int) -> NDArray[Any]:
+    """The picture upright, as EXIF's orientation says."""
+    if orientation == 1:
+        return picture
+    if orientation >= 5:
+        picture = picture.swapaxes(0, 1)
+    rows = slice(None, None, -1 if orientation in (3, 4, 7, 8) else 1)
+    columns = slice(None, None, -1 if orientation in (2, 3, 6, 7) else 1)
+    upright: NDArray[Any] = _numpy().ascontiguousarray(picture[rows, columns])
+    return upright
+
+
+def raw_layout(encoding: object) -> RawLayout | None:
+    """The layout that an encoding names; None for one that is none of raw bytes."""
+    if not isinstance(encoding, str):
+        return None
+    named = _NAMED.get(encoding)
+    if named is not None:
+        return RawLayout(*named, is_red_first=encoding.startswith("rgb"))
+    found = _LAYOUT.fullmatch(encoding)
+    return None if found is None else RawLayout(_NUMBERS[found[1]], int(found[2]))
+
+
+def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any]:
+    """Raw bytes as an array of the layout's own order of colours, without a copy. Raises `DecodeError`."""
+    np = _numpy()
+    numbers = np.dtype(layout.numbers)
+    sides = shape[:2] if isinstance(shape, list | tuple) else ()
+    if len(sides) < 2 or not all(isinstance(side, int) for side in sides):
+        raise DecodeError("image", data.nbytes, f"'{shape!s:.60}' is no shape of a picture")
+    height, width = sides
+    pixel_bytes = layout.channels * numbers.itemsize
+    if min(height, width) < 1 or height * width * pixel_bytes != data.nbytes:
+        reason = f"a picture of {width} x {height} pixels with {pixel_bytes} bytes each has another size"
+        raise DecodeError("image", data.nbytes, reason)
+    check_size(width, height, pixel_bytes, data.nbytes)
+    flat: NDArray[Any] = np.frombuffer(data, numbers)
+    return flat.reshape((height, width) if layout.channels == 1 else (height, width, layout.channels))
+
+
+def picture_info(data: bytes | memoryview) -> dict[str, object] | None:
+    """The extension of a JPEG or PNG file, from its head; None for what `decode` would refuse by it."""
+    try:
+        return examine(data).extension
+    except DecodeError:
+        return None

@@ -1,0 +1,66 @@
+"""Inbox: messages that wait for their reader, bounded in number and in bytes."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Literal
+
+from nep.messages.message import Message
+
+__all__ = ["MAX_BYTES", "MAX_MESSAGES", "Inbox", "Keep"]
+
+Keep = Literal["all", "latest"]
+"""What a subscriber wants: every message as long as there is room, or only the newest."""
+
+MAX_MESSAGES = 10_000
+MAX_BYTES = 256 * 2**20
+
+
+class Inbox:
+    """A queue that drops its oldest message when it is full. It lives under its owner's lock."""
+
+    def __init__(self, keep: Keep, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:
+        self._keeps_all = keep == "all"
+        self._max_messages = max_messages if self._keeps_all else 1
+        self._max_bytes = max_bytes
+        self.messages: deque[Message] = deque()
+        """What waits, oldest first. Only to be looked at."""
+        self._bytes = 0
+
+    def put(self, message: Message) -> int:
+        """Add a message; how many others were dropped for it. Replacing the latest is no drop."""
+        self.messages.append(message)
+        self._bytes += message.size_bytes
+        dropped = 0
+        # The newest stays even when it alone is larger than the bound.
+        while len(self.messages) > self._max_messages or (
+            self._bytes > self._max_bytes and len(self.messages) > 1
+        ):
+            self._bytes -= self.messages.popleft().size_bytes
+            dropped += self._keeps_all
+        return dropped
+
+    def take(self) -> Message | None:
+        """The oldest message, None when there is none."""
+        if not self.messages:
+            return None
+        message = self.messages.popleft()
+        self._bytes -= message.size_bytes
+        return message
+
+    def take_all(self, most_bytes: int | None = None) -> list[Message]:
+        """All messages, oldest first; no more when they are `most_bytes` together."""
+        if most_bytes is None or self._bytes <= most_bytes:
+            messages = list(self.messages)
+            self.messages.clear()
+            self._bytes = 0
+            return messages
+        messages = []
+        while self.messages and most_bytes > 0:
+            messages.append(self.messages.popleft())
+            most_bytes -= messages[-1].size_bytes
+            self._bytes -= messages[-1].size_bytes
+        return messages
+
+    def __len__(self) -> int:
+        return len(self.messages)

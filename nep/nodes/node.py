@@ -1,0 +1,416 @@
+"""Node: a program, or a part of one, with its publishers and subscribers."""
+
+from __future__ import annotations
+
+import atexit
+import itertools
+import logging
+import os
+import platform
+import secrets
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
+
+from nep.arguments import WrongTypeError, at_least, flag, function, limit, one_of, seconds, text
+from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
+from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
+from nep.backends.lookup import backend_named
+from nep.errors import ClosedError, DecodeError
+from nep.messages.codecs import codec_for
+from nep.messages.queue import MAX_MESSAGES, Keep
+from nep.nodes.log_handler import LogHandler, handler_of
+from nep.nodes.publisher import SLICE_S, Publisher, Subscriber
+from nep.protocol.graph_view import GraphView
+from nep.protocol.records import NodeRecord
+from nep.protocol.registration import id_from, node_id_from
+from nep.protocol.wire import check_node_name, check_topic
+from nep.system import forks
+from nep.system.addresses import checked_host, master_address
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["Node"]
+
+FLUSH_S = 2.0
+"""How long closing waits for what was published to be delivered."""
+
+_WORKER_PRIORITY = 10
+"""0 and more: before a worker waits for processes of its own, which may need what was published."""
+
+_alive: set[Node] = set()
+"""Nodes live until they are closed or the interpreter ends: a publisher may outlive its node's variable."""
+_inherited: list[Node] = []
+"""Nodes of the process that forked this one: closed, and kept, because nothing of them may be touched."""
+_closed_in = 0
+"""The process in which `multiprocessing` knows that nodes are to be closed."""
+
+
+class Node:
+    """A node of this name. It needs no master until something is made on it; works in any thread.
+
+    `transport` names a back end: "zeromq" (also "ZMQ"), "memory" (nodes of this process only). `master` is
+    the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`: how long `new_pub` and
+    `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for ever. Raises
+    `UnknownBackendError`, `BadNameError`, `TooManyFilesError`. In a child that is forked it is closed, with
+    all that was made on it; a new node works there.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        transport: str = "zeromq",
+        *,
+        master: str | None = None,
+        wait_s: float | None = 2.0,
+        generation: str = "native",
+    ) -> None:
+        self.name = check_node_name(name)
+        key = secrets.token_hex(16)
+        self.id = node_id_from(key)
+        self._key = key
+        self._numbers = itertools.count(1)
+        self._backend = backend_named(text("transport", transport))
+        self._master = master or ("memory" if self._backend.name == "memory" else master_address())
+        if self._backend.name != "memory":
+            self._master = master_address(self._master)
+        self._wait_s = seconds("wait_s", wait_s)
+        self._lock = threading.RLock()
+        self._stop_spin = threading.Event()
+        self._callbacks: tuple[tuple[Subscriber, Inlet, Callable[[Any], object]], ...] = ()
+        self._publishers: set[Publisher] = set()
+        self._subscribers: set[Subscriber] = set()
+        self._is_closed = False
+        self._is_forked = False
+        self._log_handler: LogHandler | None = None
+        record = NodeRecord(
+            self.id,
+            name,
+            platform.node(),
+            os.getpid(),
+            generation=generation,
+            since_ns=time.time_ns(),
+            key=key,
+        )
+        self._carrier: Carrier = self._backend.open(record)
+        _alive.add(self)
+        _close_with_worker()
+        forks.watch(self)
+
+    # ---- how to connect
+
+    def hybrid(
+        self,
+        master_ip: str = "127.0.0.1",
+        mode: str = "many2many",
+        transport: str = "",  # noqa: ARG002 - the node's transport is used, as in the original
+    ) -> Hybrid:
+        """Connected through a master; any number of publishers and subscribers, whatever the mode says.
+
+        "127.0.0.1" means the node's own master.
+        """
+        is_own = master_ip == "127.0.0.1" or self._backend.name == "memory"
+        return Hybrid(self._master if is_own else master_address(master_ip), checked_mode(mode))
+
+    def direct(
+        self,
+        ip: str = "127.0.0.1",
+        port: str | int = "9000",
+        mode: str = "one2many",
+        transport: str = "",  # noqa: ARG002 - the node's transport is used, as in the original
+        *,
+        generation: Literal["A", "B"] = "A",
+        wire: Literal["original", "native"] = "original",
+    ) -> Direct:
+        """Connected without a master to `ip:port`; see `Direct` for the modes.
+
+        Sends the frames of the original NEP up to 0.5.4.5, or from 0.5.4.8 on (`generation="B"`), or native
+        ones; receives both forms of the original. Raises `NepError` for what is no address, mode or
+        port, `ValueError` for another generation or wire.
+        """
+        return Direct(
+            checked_host(ip),
+            checked_port(port),
+            checked_mode(mode),
+            one_of("generation", generation, ("A", "B")),
+            one_of("wire", wire, ("original", "native")),
+        )
+
+    # ---- publishers and subscribers
+
+    def new_pub(
+        self,
+        topic: str,
+        msg_type: str = "json",
+        configuration: Configuration | None = None,
+        *,
+        latched: bool = False,
+    ) -> Publisher:
+        """A publisher. The first message reaches every subscriber that was there before this returned.
+
+        `latched`: whoever subscribes later gets the last message at once. Raises `MasterUnreachable`,
+        `BadTopicError`, `AddressInUseError`, `TooManyFilesError`, `ClosedError`, and `ValueError` for
+        what is none of the allowed arguments.
+        """
+        number = next(self._numbers)
+        spec = PublisherSpec(
+            id_from(self._key, number),
+            check_topic(topic),
+            text("msg_type", msg_type),
+            codec_for(msg_type),
+            flag("latched", latched),
+            self._configured(configuration),
+            self._wait_s,
+            number,
+        )
+        publisher = Publisher(self._open_carrier().publisher(spec), spec, self._publishers.discard)
+        with self._lock:
+            self._publishers.add(publisher)
+            if self._is_closed:
+                publisher.node_closes()
+        return publisher
+
+    def new_sub(
+        self,
+        topic: str,
+        msg_type: str = "json",
+        configuration: Configuration | None = None,
+        *,
+        keep: Keep = "all",
+        max_messages: int = MAX_MESSAGES,
+        sink: Sink | None = None,
+    ) -> Subscriber:
+        """A subscriber. What is published after this returned arrives, from every registered publisher.
+
+        `keep="latest"`: only the newest message is kept for `listen`; "all": up to `max_messages` (and
+        256 MB), then the oldest are dropped and counted. `sink`: takes the messages in batches, 200 times a
+        second at most, in a thread of the node's own, instead of `listen`. Raises as `new_pub` does.
+        """
+        number = next(self._numbers)
+        spec = SubscriberSpec(
+            id_from(self._key, number),
+            check_topic(topic),
+            text("msg_type", msg_type),
+            self._configured(configuration),
+            self._wait_s,
+            one_of("keep", keep, ("all", "latest")),
+            at_least("max_messages", max_messages, 1),
+            sink=None if sink is None else function("sink", sink),
+            number=number,
+        )
+        return self._subscribed(self._open_carrier().subscriber(spec), spec)
+
+    def new_callback(
+        self,
+        topic: str,
+        msg_type: str,
+        callback: Callable[[Any], object],
+        configuration: Configuration | None = None,
+    ) -> Subscriber:
+        """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`."""
+        carrier = self._open_carrier()
+        function("callback", callback)
+        number = next(self._numbers)
+        spec = SubscriberSpec(
+            id_from(self._key, number),
+            check_topic(topic),
+            text("msg_type", msg_type),
+            self._configured(configuration),
+            self._wait_s,
+            number=number,
+        )
+        inlet = carrier.subscriber(spec)
+        subscriber = self._subscribed(inlet, spec)
+        with self._lock:
+            if not inlet.is_closed:
+                self._callbacks = (*self._callbacks, (subscriber, inlet, callback))
+        return subscriber
+
+    def _configured(self, configuration: object) -> Configuration:
+        if configuration is None:
+            return self.hybrid()
+        if not isinstance(configuration, Hybrid | Direct):
+            kind = type(configuration).__name__
+            raise WrongTypeError(f"configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'")
+        return configuration
+
+    def _subscribed(self, inlet: Inlet, spec: SubscriberSpec) -> Subscriber:
+        subscriber = Subscriber(inlet, spec, self._forget)
+        with self._lock:
+            self._subscribers.add(subscriber)
+        return subscriber
+
+    def _forget(self, subscriber: Subscriber) -> None:
+        """It is closed."""
+        with self._lock:
+            self._subscribers.discard(subscriber)
+            self._callbacks = tuple(each for each in self._callbacks if each[0] is not subscriber)
+
+    # ---- spinning
+
+    def spin(self, timeout_s: float | None = None) -> None:
+        """Run callbacks in this thread until `stop_spin`, `close`, or for `timeout_s` seconds.
+
+        What a callback raises comes out here. A `stop_spin` that came before ends the next spin at once. In a
+        child that is forked, also by a callback, it raises `ClosedError`.
+        """
+        timeout_s = seconds("timeout_s", timeout_s)
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        try:
+            while not self._stop_spin.is_set() and not self._is_closed:
+                left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+                if left <= 0.0:
+                    return
+                if not self._run_callbacks():
+                    waited = [inlet for _sub, inlet, _call in self._callbacks if not inlet.is_closed]
+                    self._carrier.wait(waited, left)
+            if self._is_forked:
+                raise self._closed_error()
+        finally:
+            self._stop_spin.clear()
+
+    def stop_spin(self) -> None:
+        """End `spin`, from any thread or from a callback."""
+        if not self._is_forked:
+            self._stop_spin.set()
+            self._carrier.wake()
+
+    def _run_callbacks(self) -> bool:
+        """One message for each callback that has one; whether there was any."""
+        worked = False
+        for subscriber, inlet, callback in self._callbacks:
+            try:
+                message = inlet.ready.popleft()
+            except IndexError:
+                found = None if inlet.is_closed else inlet.poll()
+                if found is None:
+                    continue
+                message = found
+            worked = True
+            try:
+                payload = subscriber.decoded(message)
+            except DecodeError:
+                continue  # it is logged and an alert
+            callback(payload)
+            if self._stop_spin.is_set() or self._is_closed:
+                break
+        return worked
+
+    # ---- what it tells, the graph, and the end
+
+    @property
+    def log(self) -> logging.Logger:
+        """A logger whose records, from INFO on, Console and `nep log` show (`nep.nodes.log_handler`)."""
+        return self.log_handler.logger
+
+    @property
+    def log_handler(self) -> LogHandler:
+        """Publishes records as this node's; add it to a logger to publish all that a program logs."""
+        with self._lock:
+            self._log_handler = self._log_handler or handler_of(self)
+            return self._log_handler
+
+    def graph(self, timeout_s: float = 2.0) -> GraphView:
+        """Who is there now. Raises `MasterUnreachable` when the master does not answer in time."""
+        seconds("timeout_s", timeout_s)
+        return self._open_carrier().graph(self.hybrid(), timeout_s)
+
+    def close(self, timeout_s: float = FLUSH_S) -> None:
+        """Unregister and end; what was published is delivered first, within `timeout_s`. May be called twice.
+
+        What could not be delivered is logged as a warning. Happens by itself when the interpreter ends.
+        """
+        limit("timeout_s", timeout_s)
+        _close((self,), timeout_s)
+
+    def _end_log(self, timeout_s: float) -> None:
+        """Publish what was logged, and no more."""
+        if self._log_handler is not None:
+            self._log_handler.close(timeout_s)
+
+    def _begin_close(self) -> bool:
+        """Say that all ends here, and wait for nothing; whether it was open. `_finish_close` follows."""
+        with self._lock:
+            if self._is_closed:
+                return False
+            self._is_closed = True
+            publishers = tuple(self._publishers)
+        _alive.discard(self)
+        self._stop_spin.set()
+        for publisher in publishers:
+            publisher.node_closes()
+        self._carrier.begin_close()
+        with self._lock:
+            self._publishers.clear()
+            self._subscribers.clear()
+            self._callbacks = ()
+        return True
+
+    def _finish_close(self, timeout_s: float) -> None:
+        """Deliver what was published, within `timeout_s`, and give everything back."""
+        self._carrier.close(timeout_s)
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_closed = self._is_forked = True
+        self._lock = threading.RLock()
+        self._stop_spin = threading.Event()
+        for publisher in self._publishers:
+            publisher.forked()
+        for subscriber in self._subscribers:
+            subscriber.forked()
+        self._callbacks = ()
+        _alive.discard(self)
+        _inherited.append(self)
+
+    def _open_carrier(self) -> Carrier:
+        if self._is_closed:
+            raise self._closed_error()
+        return self._carrier
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(f"node '{self.name}'", is_forked=self._is_forked)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Node({self.name!r}, {self._backend.name!r}, master={self._master!r})"
+
+
+def _close(nodes: Sequence[Node], timeout_s: float) -> None:
+    """Close all of them within `timeout_s`: no node's subscribers wait for those of another node."""
+    started = time.monotonic()
+    for each in nodes:
+        each._end_log(0.0)  # noqa: SLF001 - they are one with the node
+    for each in nodes:  # what they publish goes out like anything else
+        each._end_log(max(0.0, started + timeout_s / 4 - time.monotonic()))  # noqa: SLF001
+    for each in [each for each in nodes if each._begin_close()]:  # noqa: SLF001
+        each._finish_close(max(0.0, started + timeout_s - time.monotonic()))  # noqa: SLF001
+
+
+def _close_all() -> None:
+    _close(tuple(_alive), FLUSH_S)
+
+
+def _close_with_worker() -> None:
+    """Let a worker of `multiprocessing` close its nodes: one that was forked skips the interpreter's exit.
+
+    It forgets what was registered before it began, so this is done when a node is made.
+    """
+    global _closed_in  # noqa: PLW0603 - one for the process
+    parent_of_worker = getattr(sys.modules.get("multiprocessing.process"), "parent_process", None)
+    if _closed_in != os.getpid() and parent_of_worker is not None and parent_of_worker() is not None:
+        _closed_in = os.getpid()
+        sys.modules["multiprocessing.util"].Finalize(None, _close_all, exitpriority=_WORKER_PRIORITY)
+
+
+atexit.register(_close_all)

@@ -1,0 +1,363 @@
+"""Publisher and Subscriber: payloads in, payloads out. Made by `Node.new_pub` and `Node.new_sub`."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from nep.arguments import limit, seconds
+from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.errors import ClosedError, DecodeError, EncodeError, WireError
+from nep.messages.codecs import codec_for
+from nep.messages.encoded import Encoded, encoded
+from nep.messages.message import Message
+from nep.messages.nulls import NullTeller
+from nep.nodes.unsendable import Unsendable
+from nep.system.log_rarely import is_told
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["SLICE_S", "Publisher", "Subscriber"]
+
+SLICE_S = 0.1
+"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+
+_logger = logging.getLogger("nep")
+_DATA = (bytes, memoryview)  # made once: this is asked for every message that nobody hears
+
+
+class Publisher:
+    """Publishes on one topic. Use it from any thread; a context manager."""
+
+    def __init__(
+        self,
+        outlet: Outlet,
+        spec: PublisherSpec,
+        on_close: Callable[[Publisher], object] | None = None,
+    ) -> None:
+        self._on_close = on_close
+        self._is_forked = False
+        self._outlet = outlet
+        self._spec = spec
+        self._nulls = NullTeller(spec.topic) if spec.codec.name == "json" else None
+        self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
+        self._unsendable = Unsendable(spec.topic, spec.codec.encode, outlet.report)
+        self._is_latched = spec.is_latched
+        self._is_closed = False
+
+    @property
+    def topic(self) -> str:
+        """The topic's name."""
+        return self._spec.topic
+
+    @property
+    def msg_type(self) -> str:
+        """The type under which it is registered."""
+        return self._spec.msg_type
+
+    @property
+    def id(self) -> int:
+        """Its id, as in `Message.publisher` and in the graph."""
+        return self._spec.id
+
+    @property
+    def subscribers(self) -> int:
+        """How many subscribers are connected now. Costs nothing."""
+        return 0 if self._is_forked else self._outlet.subscribers
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of nodes that subscribe and have not connected: hung, or just being connected."""
+        return () if self._is_forked else self._outlet.missing
+
+    @property
+    def count(self) -> int:
+        """Messages published so far, also those that nobody was there to hear."""
+        return self._outlet.count
+
+    @property
+    def nulled(self) -> int:
+        """Messages in which NaN or infinity was sent as `null`, because JSON has neither; they are logged."""
+        return 0 if self._nulls is None else self._nulls.count
+
+    @property
+    def refused(self) -> int:
+        """Payloads that could not be encoded, and so nobody got; why is logged and an alert in the graph."""
+        return self._unsendable.count
+
+    def publish(self, payload: object) -> None:
+        """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.
+
+        Raises `EncodeError` for a payload of a type that the message type does not take, and `ClosedError`.
+        What cannot be sent because of something inside is refused: counted in `refused`, logged, and an alert
+        in the graph until one can. So nothing depends on whether somebody listens: with no subscriber a
+        payload is encoded only now and then, to see whether it could be sent, unless it is latched.
+        """
+        if self._is_closed or not (self._outlet.is_heard or self._is_latched):
+            self._skip(payload)
+            return
+        try:
+            made = payload if isinstance(payload, Encoded) else self._encode(payload)
+        except Exception as error:  # noqa: BLE001 - a payload may be of any class, which may raise anything
+            self._check(payload)
+            self._unsendable.add(payload, error)
+            return
+        if made is payload or self._unsendable.problem:
+            self._send(made)
+        else:
+            self._outlet.send(made)
+
+    def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
+        """Send bytes that are encoded already. Raises as `publish` does."""
+        if self._is_closed or not (self._outlet.is_heard or self._is_latched):
+            self._skip(Encoded(data, extension))
+        else:
+            self._send(encoded((data, extension)))
+
+    def _send(self, made: Encoded) -> None:
+        if type(made.data) is not bytes or made.extension is not None:
+            self._check(made)
+        try:
+            self._outlet.send(made)
+        except WireError as error:  # what is in the extension
+            self._unsendable.add(made, error)
+            return
+        if self._unsendable.problem:
+            self._unsendable.cure()
+
+    def _check(self, payload: object) -> None:
+        """Raises `EncodeError` for what can be seen at once."""
+        if not isinstance(payload, Encoded):
+            self._spec.codec.check(payload)
+            return
+        codec, data, extension = self._spec.codec.name, payload.data, payload.extension
+        if not isinstance(data, _DATA):
+            raise EncodeError(codec, type(data).__name__, "give its 'bytes'")
+        if extension is not None and not isinstance(extension, Mapping):
+            raise EncodeError(codec, type(extension).__name__, "an extension is a map")
+
+    def _skip(self, payload: object) -> None:
+        """Count a message that nobody wants; now and then see whether it could be sent."""
+        if self._is_closed:
+            raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
+        self._check(payload)
+        if self._unsendable.try_out(payload):
+            self._outlet.skip()
+
+    def close(self, timeout_s: float = 2.0) -> None:
+        """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
+        limit("timeout_s", timeout_s)
+        if not self._is_closed:
+            self._is_closed = True
+            try:
+                self._outlet.close(timeout_s)
+            finally:
+                if self._on_close is not None:
+                    self._on_close(self)
+
+    def node_closes(self) -> None:
+        """Its node closes it, with all others."""
+        self._is_closed = True
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_closed = self._is_forked = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Publisher({self.topic!r}, {self.msg_type!r})"
+
+
+class Subscriber:
+    """Receives from one topic, in order. Iterating yields `Message`s until it is closed."""
+
+    def __init__(
+        self,
+        inlet: Inlet,
+        spec: SubscriberSpec,
+        on_close: Callable[[Subscriber], object] | None = None,
+    ) -> None:
+        self._on_close = on_close
+        self._is_forked = False
+        self._inlet = inlet
+        self._spec = spec
+        self._ready = inlet.ready
+        self._empty = codec_for(spec.msg_type).empty
+        self._problem = ""
+        self._unreadable = 0
+
+    @property
+    def topic(self) -> str:
+        """The topic's name."""
+        return self._spec.topic
+
+    @property
+    def msg_type(self) -> str:
+        """The type under which it is registered; messages tell their own."""
+        return self._spec.msg_type
+
+    @property
+    def id(self) -> int:
+        """Its id in the graph."""
+        return self._spec.id
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self._inlet.received
+
+    @property
+    def lost(self) -> int | None:
+        """Messages that did not arrive or were dropped here unread; None where nobody can know."""
+        return self._inlet.lost
+
+    @property
+    def refused(self) -> int:
+        """What came and was no message at all; why is an alert in the graph."""
+        return self._inlet.refused
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it, or its node, was closed."""
+        return self._inlet.is_closed
+
+    def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
+        """(True, payload) of the next message, or (False, an empty payload) when there is none.
+
+        Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
+        decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
+        """
+        try:
+            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+        except TypeError:
+            is_wrong = True
+        if is_wrong:
+            seconds("timeout_s", timeout_s)
+        ready = self._ready
+        while ready:  # read already
+            try:
+                message = ready.popleft()
+            except IndexError:  # another thread took the last one
+                break
+            try:
+                return True, self.decoded(message) if self._problem else message.payload
+            except DecodeError as error:
+                self._tell(error)
+        limit = None if block_mode and timeout_s is None else timeout_s or 0.0
+        deadline = time.monotonic() + limit if limit else None
+        while True:
+            came = self.receive(limit)
+            if came is None:
+                return False, self._empty()
+            try:
+                return True, self.decoded(came)
+            except DecodeError:
+                if deadline is not None:
+                    limit = max(0.0, deadline - time.monotonic())
+
+    def receive(self, timeout_s: float | None = None) -> Message | None:
+        """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
+
+        Raises `ClosedError`, and `ValueError` for a time below 0.
+        """
+        try:
+            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+        except TypeError:
+            is_wrong = True
+        if is_wrong:
+            seconds("timeout_s", timeout_s)
+        if self._ready:  # read already
+            try:
+                return self._ready.popleft()
+            except IndexError:  # another thread took it
+                pass
+        if self._inlet.is_closed or (timeout_s is not None and timeout_s <= 0.0):
+            return self._poll()
+        wait_s = SLICE_S if timeout_s is None or timeout_s > SLICE_S else timeout_s
+        message = self._inlet.receive(wait_s)
+        return message or self._receive_on(None if timeout_s is None else timeout_s - wait_s)
+
+    def _receive_on(self, timeout_s: float | None) -> Message | None:
+        """After the first slice."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            if self._inlet.is_closed:
+                raise self._closed()
+            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+            if left <= 0.0:
+                return None
+            message = self._inlet.receive(left)
+            if message is not None:
+                return message
+
+    def _poll(self) -> Message | None:
+        if self._inlet.is_closed:
+            raise self._closed()
+        return self._inlet.poll()
+
+    def _closed(self) -> ClosedError:
+        return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
+
+    def decoded(self, message: Message) -> object:
+        """The payload of a message that it got; a problem is logged rarely and shown in the graph.
+
+        Raises `DecodeError`.
+        """
+        try:
+            payload = message.payload
+        except DecodeError as error:
+            self._tell(error)
+            raise
+        if self._problem:
+            self._problem = ""
+            self._inlet.report("")
+        return payload
+
+    def _tell(self, error: DecodeError) -> None:
+        """A message cannot be read: tell the graph, and log it rarely."""
+        self._unreadable += 1
+        if is_told(self._unreadable):
+            _logger.warning(
+                "a message on '%s' cannot be read (%d so far): %s", self.topic, self._unreadable, error
+            )
+        self._problem = str(error)
+        self._inlet.report(self._problem)
+
+    def close(self) -> None:
+        """Unregister; what was not read is forgotten. May be called twice."""
+        if not self._is_forked:
+            self._inlet.close()
+            if self._on_close is not None:
+                self._on_close(self)
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_forked = True
+        self._inlet.forked()
+
+    def __iter__(self) -> Iterator[Message]:
+        while True:
+            try:
+                message = self.receive()
+            except ClosedError:
+                return
+            if message is not None:
+                yield message
+                message = None  # what was read can be given back before the next one comes
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Subscriber({self.topic!r}, {self.msg_type!r})"

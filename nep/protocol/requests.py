@@ -1,0 +1,281 @@
+"""What nodes and the master say to each other, as values. Their form on the wire: `nep.protocol.encoding`.
+
+Every reply and push carries the master's `epoch`, which changes when the master is restarted, and the graph's
+`revision`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from nep.protocol.graph_view import Alert, GraphView
+from nep.protocol.records import (
+    Expected,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    RemotePublisher,
+    SubscriberCount,
+    SubscriberRecord,
+)
+
+RENEW_S = 1.0
+"""How often a node renews, unless the master says otherwise."""
+
+# ---- requests
+
+
+@dataclass(frozen=True)
+class Join:
+    """Register a node with all that it has, replacing what the master knew of it.
+
+    `epoch` is that of the master the node was registered with before, 0 if there was none. A `managed` node
+    (an original program) has no connection of its own and no lease: who registered it says when it leaves.
+    """
+
+    node: NodeRecord
+    epoch: int = 0
+    publishers: tuple[PublisherRecord, ...] = ()
+    subscribers: tuple[SubscriberRecord, ...] = ()
+    managed: bool = False
+
+
+@dataclass(frozen=True)
+class AddPublisher:
+    """Register one publisher (and its node, if the master does not know it). Answered by `Added`."""
+
+    node: NodeRecord
+    publisher: PublisherRecord
+
+
+@dataclass(frozen=True)
+class AddSubscriber:
+    """Register one subscriber (and its node, if the master does not know it). Answered by `Found`."""
+
+    node: NodeRecord
+    subscriber: SubscriberRecord
+
+
+@dataclass(frozen=True)
+class RemovePublisher:
+    """A publisher closes; its last message was `last_seq`."""
+
+    node_id: str
+    id: int
+    last_seq: int = 0
+
+
+@dataclass(frozen=True)
+class RemoveSubscriber:
+    """A subscriber closes."""
+
+    node_id: str
+    id: int
+
+
+@dataclass(frozen=True)
+class Leave:
+    """A node closes, with all that it has."""
+
+    node_id: str
+
+
+@dataclass(frozen=True)
+class Renew:
+    """A node lives; its statistics. `revision` is the one of the last `Renewed` or `Joined` that it got.
+
+    `cpu_ratio`: the share of one core that its program used since the last renewal; None if it is not known.
+    """
+
+    node_id: str
+    epoch: int
+    revision: int
+    publishers: tuple[PublisherCount, ...] = ()
+    subscribers: tuple[SubscriberCount, ...] = ()
+    cpu_ratio: float | None = None
+
+
+@dataclass(frozen=True)
+class ReportMissing:
+    """These subscribers did not answer a new publisher in time."""
+
+    node_id: str
+    publisher_id: int
+    subscriber_ids: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class ReportAlerts:
+    """All alerts of something attached to the master (`source`) that are present now; earlier ones are cured.
+
+    Only for `Master.submit`: it has no form on the wire.
+    """
+
+    source: str
+    alerts: tuple[Alert, ...]
+
+
+@dataclass(frozen=True)
+class Listen:
+    """Serve other computers at these addresses of this one; none: serve this computer only.
+
+    Answered by `Done`. Refused when it comes from another computer.
+    """
+
+    hosts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Look:
+    """Ask for the whole graph. Answered by `Seen`."""
+
+
+@dataclass(frozen=True)
+class Ping:
+    """Ask whether a master is there. Answered by `Done`."""
+
+
+Request = (
+    Join
+    | AddPublisher
+    | AddSubscriber
+    | RemovePublisher
+    | RemoveSubscriber
+    | Leave
+    | Renew
+    | ReportMissing
+    | ReportAlerts
+    | Listen
+    | Look
+    | Ping
+)
+
+# ---- replies
+
+
+@dataclass(frozen=True)
+class Done:
+    """It is done; also the answer to a ping."""
+
+    epoch: int
+    revision: int
+
+
+@dataclass(frozen=True)
+class Added:
+    """A publisher is registered. It waits for `expected`; `hung` are known not to answer at present.
+
+    `hosts` (here and below) are the addresses at which the master serves other computers: publishers on the
+    master's own computer serve there, too.
+    """
+
+    epoch: int
+    revision: int
+    expected: tuple[Expected, ...] = ()
+    hung: tuple[Expected, ...] = ()
+    hosts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Found:
+    """A subscriber is registered, or a node has joined: the publishers to connect to."""
+
+    epoch: int
+    revision: int
+    publishers: tuple[RemotePublisher, ...] = ()
+    hosts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class TopicPublishers:
+    """All publishers of one topic, now."""
+
+    topic: str
+    publishers: tuple[RemotePublisher, ...]
+
+
+@dataclass(frozen=True)
+class Renewed:
+    """A lease is renewed. `again`: the master does not know this node as it is, it shall join again.
+
+    `topics` are those of the node's subscribers that changed since its revision; `last_seqs` are the newest
+    messages of the publishers it subscribes to, as of their last renewal. The next renewal is due in `next_s`
+    seconds: the master lets the nodes of a large graph renew less often.
+    """
+
+    epoch: int
+    revision: int
+    again: bool = False
+    topics: tuple[TopicPublishers, ...] = ()
+    last_seqs: Mapping[int, int] = field(default_factory=dict)
+    hosts: tuple[str, ...] = ()
+    next_s: float = RENEW_S
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The whole graph."""
+
+    epoch: int
+    revision: int
+    view: GraphView
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The request could not be carried out; `reason` is a sentence."""
+
+    epoch: int
+    revision: int
+    reason: str
+
+
+Reply = Done | Added | Found | Renewed | Seen | Refused
+
+# ---- pushes
+
+
+@dataclass(frozen=True)
+class PublisherCame:
+    """A topic that the node subscribes to has a new publisher."""
+
+    epoch: int
+    revision: int
+    publisher: RemotePublisher
+
+
+@dataclass(frozen=True)
+class PublisherGone:
+    """A publisher of such a topic is no longer listed.
+
+    `is_closed`: it said so itself, and `last_seq` was its last message; else its node is silent or dead, and
+    the connection stays, because the publisher may only be suspended.
+    """
+
+    epoch: int
+    revision: int
+    id: int
+    topic: str
+    is_closed: bool = False
+    last_seq: int = 0
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Sent to a node that has been silent, to find out whether its connection is still there. Ignored."""
+
+    epoch: int
+    revision: int
+
+
+Push = PublisherCame | PublisherGone | Probe
+
+
+def node_of(request: Request) -> str | None:
+    """The id of the node that a request speaks for; None when it speaks for nobody."""
+    if isinstance(request, Join | AddPublisher | AddSubscriber):
+        return request.node.id
+    if isinstance(request, ReportAlerts | Listen | Look | Ping):
+        return None
+    return request.node_id

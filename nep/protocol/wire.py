@@ -1,0 +1,294 @@
+r"""The native wire: parts ↔ messages. Pure functions; the specification is `docs/wire.md`.
+
+A message is three parts, or four: topic and `\0`, a header of 32 bytes, the payload, and a msgpack map when
+the header's flag says so. Small ones travel with the first three in one part, to subscribers whose hello says
+that they read it. Beside messages three notices travel, all under a subscriber's own hello topic
+`\xffhello/<subscriber id>/<topic>`: *echo* (topic and header: "I have seen you; my messages are counted from
+here"), *bye* (the same with the flag BYE: "nothing comes after this") and messages for it alone (all parts).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from nep.errors import BadNameError, BadTopicError, WireError
+from nep.messages.packing import pack, unpack
+from nep.text import control_in
+
+__all__ = [
+    "BYE",
+    "EXTENSION",
+    "HEADER_BYTES",
+    "LATCHED",
+    "SIZE_MAX",
+    "SUBSCRIPTION_MAX_BYTES",
+    "VERSION",
+    "Header",
+    "Hello",
+    "Read",
+    "apart",
+    "check_node_name",
+    "check_size",
+    "check_topic",
+    "extension_part",
+    "form_of",
+    "hello_part",
+    "join",
+    "pack_quickly",
+    "parse_hello",
+    "parse_read",
+    "read_extension",
+    "read_header",
+    "read_part",
+    "topic_part",
+    "unpack_at",
+    "unpack_quickly",
+]
+
+VERSION = 1
+HEADER_BYTES = 32
+TOPIC_MAX_BYTES = 200
+NODE_NAME_MAX_BYTES = 200
+SUBSCRIPTION_MAX_BYTES = 4096
+"""Whoever subscribes more is disconnected: libzmq keeps some forty bytes for each of them."""
+
+LATCHED = 1
+"""Flag: the publisher keeps this message and sends it to whoever comes late."""
+EXTENSION = 2
+"""Flag: a fourth part follows, a msgpack map."""
+BYE = 4
+"""Flag of a notice: the publisher is closing and has sent everything."""
+
+HELLO = b"\xffhello/"
+"""How a hello filter starts. 0xff sorts behind all of UTF-8, so it is installed after the topic filter."""
+HELLO_ONE = b"\xffhello1/"
+"""The same of a subscriber that also reads messages of one part."""
+HELLO_TELLS = b"\xffhello2/"
+"""The same of one that besides answers every later echo with what it has read."""
+READ = b"\xffread/"
+"""How a filter starts that answers an echo. It is taken back at once."""
+
+_HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
+_QUICKLY = struct.Struct("<IIQQQ")  # the first three in one
+SIZE_MAX = 2**32 - 1
+
+
+class Header(NamedTuple):
+    """The second part. `stamp_ns` is the publisher's clock, `publisher` its id; `seq` counts from 1.
+
+    `size` is that of the payload in bytes, 0 when it is not told.
+    """
+
+    codec: int
+    flags: int
+    seq: int
+    stamp_ns: int
+    publisher: int
+    size: int = 0
+
+    def pack(self) -> bytes:
+        """The 32 bytes, little-endian."""
+        return _HEADER.pack(
+            VERSION, self.codec, self.flags, self.size, self.seq, self.stamp_ns, self.publisher
+        )
+
+
+def form_of(codec: int, flags: int) -> int:
+    """The first four bytes of a header of this version, as a number: what many messages have in common."""
+    return VERSION | codec << 8 | flags << 16
+
+
+pack_quickly: Callable[[int, int, int, int, int], bytes] = _QUICKLY.pack
+"""The 32 bytes of (form, size, seq, stamp_ns, publisher). A size beyond `SIZE_MAX` is told as 0."""
+unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _QUICKLY.unpack
+"""(form, size, seq, stamp_ns, publisher) of a header, unchecked. Raises `struct.error`."""
+unpack_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _QUICKLY.unpack_from
+"""The same of a header that begins at an offset."""
+
+
+def check_topic(topic: str) -> str:
+    """`topic` itself when the grammar allows it: 1 to 200 bytes of UTF-8, no white space, control or `{`.
+
+    Raises `BadTopicError` with the reason.
+    """
+    if not isinstance(topic, str):
+        raise BadTopicError(str(topic), "a topic is a 'str'")
+    try:
+        size = len(topic.encode("utf-8"))
+    except UnicodeEncodeError:
+        raise BadTopicError(ascii(topic), "it is no Unicode text") from None
+    if not 1 <= size <= TOPIC_MAX_BYTES:
+        raise BadTopicError(topic, f"it has {size} bytes, 1 to {TOPIC_MAX_BYTES} are allowed")
+    for letter in topic:
+        if letter.isspace() or letter == "{":
+            raise BadTopicError(topic, f"the character '{ascii(letter)[1:-1]}' is not allowed in it")
+    if control := control_in(topic):
+        raise BadTopicError(topic, f"the character '{control}' is not allowed in it")
+    return topic
+
+
+def check_node_name(name: str) -> str:
+    """`name` itself when a node may have it: 1 to 200 bytes of UTF-8 and nothing that controls.
+
+    Raises `BadNameError` with the reason.
+    """
+    if not isinstance(name, str):
+        raise BadNameError(str(name), "a name is a 'str'")
+    if control := control_in(name):
+        raise BadNameError(name, f"the character '{control}' is not allowed in it")
+    size = len(name.encode("utf-8"))
+    if not 1 <= size <= NODE_NAME_MAX_BYTES:
+        raise BadNameError(name, f"it has {size} bytes, 1 to {NODE_NAME_MAX_BYTES} are allowed")
+    return name
+
+
+def topic_part(topic: str) -> bytes:
+    """The first part of a topic's messages, and the filter of its subscribers: the name and a zero byte."""
+    return topic.encode("utf-8") + b"\0"
+
+
+class Hello(NamedTuple):
+    """What a hello filter says: who subscribes to what.
+
+    `one_part`: messages may come to it in one part. `tells`: it tells what it has read.
+    """
+
+    subscriber: int
+    topic: str
+    one_part: bool
+    tells: bool = False
+
+
+class Read(NamedTuple):
+    """What a subscriber has read of a publisher: everything up to `seq`. It wants `bound_bytes` under way."""
+
+    subscriber: int
+    publisher: int
+    seq: int
+    bound_bytes: int
+
+
+def hello_part(subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False) -> bytes:
+    """The hello filter of a subscriber, and the first part of what is sent to it alone."""
+    begin = HELLO_TELLS if tells else HELLO_ONE if one_part else HELLO
+    return begin + f"{subscriber:016x}/{topic}".encode()
+
+
+def parse_hello(part: bytes) -> Hello | None:
+    """What a hello filter says; None for anything else."""
+    begin = next((each for each in (HELLO_TELLS, HELLO_ONE, HELLO) if part.startswith(each)), None)
+    if begin is None:
+        return None
+    digits, slash, topic = part[len(begin) :].partition(b"/")
+    try:
+        if len(digits) != 16 or not slash:
+            return None
+        tells = begin == HELLO_TELLS
+        return Hello(int(digits, 16), topic.decode("utf-8"), tells or begin == HELLO_ONE, tells)
+    except ValueError:
+        return None
+
+
+def read_part(read: Read) -> bytes:
+    """The filter that answers an echo."""
+    return READ + b"/".join(b"%016x" % number for number in read)
+
+
+def parse_read(part: bytes) -> Read | None:
+    """What such a filter says; None for anything else."""
+    words = part[len(READ) :].split(b"/")
+    if not part.startswith(READ) or [len(each) for each in words] != [16] * 4:
+        return None
+    try:
+        return Read(*(int(each, 16) for each in words))
+    except ValueError:
+        return None
+
+
+def read_header(part: bytes) -> Header:
+    """The header in a second part. Raises `WireError`; an unknown version is named in it."""
+    if len(part) != HEADER_BYTES:
+        raise WireError(f"a header has {HEADER_BYTES} bytes, this one has {len(part)}", len(part))
+    version, codec, flags, size, seq, stamp_ns, publisher = _HEADER.unpack(part)
+    if version != VERSION:
+        raise WireError(f"its version is {version}, this nep reads version {VERSION}; update nep", len(part))
+    return Header(codec, flags, seq, stamp_ns, publisher, size)
+
+
+def check_size(header: Header, size: int) -> None:
+    """Raises `WireError` when a payload of `size` bytes is not the one that `header` announced."""
+    if header.size and header.size != size:
+        raise WireError(f"its header tells of {header.size} bytes, its payload has {size}", size)
+
+
+def extension_part(extension: Mapping[str, object]) -> bytes:
+    """The fourth part. Raises `WireError` when a value has no form in msgpack."""
+    try:
+        return pack(dict(extension))
+    except ValueError as error:
+        raise WireError(f"an extension holds what msgpack cannot: {error}") from error
+
+
+def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
+    """The map in a fourth part. Raises `WireError`."""
+    try:
+        value = unpack(part)
+    except ValueError as error:
+        raise WireError(f"the extension is no msgpack: {error}", len(part)) from error
+    if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
+        raise WireError("the extension is no map with names", len(part))
+    return value
+
+
+def join(
+    topic: str,
+    header: Header,
+    payload: bytes | memoryview,
+    extension: Mapping[str, object] | None = None,
+) -> tuple[bytes | memoryview, ...]:
+    """All parts of a message; the EXTENSION flag is set here when there is one."""
+    if not extension:
+        return topic_part(topic), header.pack(), payload
+    flagged = header._replace(flags=header.flags | EXTENSION)
+    return topic_part(topic), flagged.pack(), payload, extension_part(extension)
+
+
+def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
+    """Topic, header and payload of a message in one part. Raises `WireError` when it is too short."""
+    cut = part.find(b"\0") + 1
+    if not cut or len(part) < cut + HEADER_BYTES:
+        raise WireError("a message has 3 or 4 parts, this one has 1", len(part))
+    return part[:cut], part[cut : cut + HEADER_BYTES], part[cut + HEADER_BYTES :]
+
+
+class Parts(NamedTuple):
+    """A message as read from its parts."""
+
+    topic: str
+    header: Header
+    payload: bytes | memoryview
+    extension: Mapping[str, object]
+
+
+def split(parts: Sequence[bytes | memoryview]) -> Parts:
+    """The message in `parts`. Raises `WireError` for anything that the specification does not allow."""
+    if len(parts) == 1:
+        parts = apart(bytes(parts[0]))
+    if len(parts) < 3:
+        raise WireError(f"a message has 3 or 4 parts, this one has {len(parts)}")
+    name = bytes(parts[0])
+    header = read_header(bytes(parts[1]))
+    wanted = 4 if header.flags & EXTENSION else 3
+    if len(parts) != wanted:
+        raise WireError(f"its flags ask for {wanted} parts, there are {len(parts)}")
+    check_size(header, len(parts[2]))
+    try:
+        topic = name[:-1].decode("utf-8")
+        if name[-1:] != b"\0":
+            raise WireError("its topic does not end with a zero byte", len(name))
+        check_topic(topic)
+    except (UnicodeDecodeError, BadTopicError) as error:
+        raise WireError(f"its topic is none: {error}", len(name)) from error
+    return Parts(topic, header, parts[2], read_extension(parts[3]) if wanted == 4 else {})
