@@ -91,7 +91,7 @@ def _main(given: Sequence[str]) -> int:
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
     allow_many()
-    from app.core.last_threads import end_process  # noqa: PLC0415  for a window only
+    from app.core.process_end import end_process  # noqa: PLC0415  for a window only
     from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
     code = run(

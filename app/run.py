@@ -22,13 +22,13 @@ from app.blocks.fleet_search import Found, find_robots
 from app.blocks.publishing import guarded
 from app.blocks.undisturbed import undisturbed
 from app.blocks.workspace import Workspace, parse_workspace
-from app.core.companions import VIRTUAL_ROBOTS
-from app.core.document import read
-from app.core.moving import risky, wanted_by
-from app.core.processes import Processes
-from app.core.runner import Runner, RunnerEvent
-from app.core.stop_report import StopReport
-from app.core.stopping import RobotStopper, StopTarget
+from app.core.documents.document import read
+from app.core.robots.motion_permission import risky, wanted_by
+from app.core.robots.own_processes import Processes
+from app.core.robots.stop import RobotStopper, StopTarget
+from app.core.robots.stop_report import StopReport
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
+from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError
 from app.robots.description import Robot, parse
 from app.robots.identity import DESCRIPTION_TYPE

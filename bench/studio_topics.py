@@ -18,7 +18,7 @@ from time import time_ns
 from PySide6.QtCore import QTimer
 from studio_window import BARE, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
-from app.core.source import GraphSeen
+from app.core.network.source import GraphSeen
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 SHARE, HZ, SETTLE_S = 0.25, 20, 4.0

@@ -19,7 +19,7 @@ import psutil
 from PySide6.QtCore import QCoreApplication, QEventLoop, Qt, QTimer
 
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.ui import messages
 from app.ui.application import Options, make_application, make_window
 from app.ui.commands import Commands

@@ -13,29 +13,21 @@ from functools import partial
 from pathlib import Path
 
 from app.core.alerts import Alerts
-from app.core.arrivals import arrivals
-from app.core.checks import Checks
-from app.core.companions import VIRTUAL_ROBOTS, CompanionFailed, Companions
 from app.core.console import Console
-from app.core.doctor import doctor_of
-from app.core.document import Document
-from app.core.documents import Documents
+from app.core.documents.document import Document
+from app.core.documents.journal import Journal
+from app.core.documents.open_documents import Documents
+from app.core.documents.saved_tabs import KeptTabs
 from app.core.faults import survived
-from app.core.fleet import Fleet
-from app.core.health import ASK_DOCTOR, Health
-from app.core.images import Images
-from app.core.journal import Journal
-from app.core.kept_tabs import KeptTabs
-from app.core.mailbox import Batch, Drained, Mailbox
-from app.core.master_state import Learning, MasterState
-from app.core.nodes import Nodes
-from app.core.own_faults import OwnFaults
-from app.core.processes import Processes
-from app.core.reach import Reach, ReachChanged
-from app.core.runner import RunnerEvent
-from app.core.runs import Runs
-from app.core.settings import Settings
-from app.core.source import (
+from app.core.messages.image_streams import Images
+from app.core.network.decode_checks import Checks
+from app.core.network.doctor import doctor_of
+from app.core.network.graph_changes import arrivals
+from app.core.network.mailbox import Batch, Drained, Mailbox
+from app.core.network.master_state import Learning, MasterState
+from app.core.network.nodes import Nodes
+from app.core.network.remote_access import Reach, ReachChanged
+from app.core.network.source import (
     GraphSeen,
     JobFailed,
     LiveSource,
@@ -44,11 +36,19 @@ from app.core.source import (
     Source,
     WatchFailed,
 )
-from app.core.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
-from app.core.stopping import RobotStopper, StopTarget
-from app.core.topics import Topics
-from app.core.traffic import Traffic
-from app.core.watches import Watch, Watches
+from app.core.network.topics import Topics
+from app.core.network.traffic import Traffic
+from app.core.network.watches import Watch, Watches
+from app.core.own_faults import OwnFaults
+from app.core.robots.fleet import Fleet
+from app.core.robots.health import ASK_DOCTOR, Health
+from app.core.robots.own_processes import Processes
+from app.core.robots.stop import RobotStopper, StopTarget
+from app.core.robots.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, CompanionFailed, Companions
+from app.core.run.control import Runs
+from app.core.run.runner import RunnerEvent
+from app.core.storage.settings import Settings
 from nep.masters.master import master_address
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE

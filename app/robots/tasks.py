@@ -20,7 +20,8 @@ BEAT_S = 0.5
 """While something runs or waits, the robot says at least so often that it lives."""
 STOP_ANSWER_S = 0.5
 """A stop is answered after so long at the latest (or the robot's own `within_s`, when that is longer), also
-when something goes on: well before Studio gives up (`app.core.runs.STOP_TIMEOUT_S`) and calls it silent."""
+when something goes on: well before Studio gives up (`app.core.run.control.STOP_TIMEOUT_S`) and calls it
+silent."""
 _GRACE_S = 1.0
 """So long a function may take to put things away after a cancel, a time-out or one that takes its place."""
 _LONGEST_QUEUE = 50

@@ -20,7 +20,7 @@ from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, s
 from app.ui.widgets.small import Tile
 
 if TYPE_CHECKING:
-    from app.core.robot_link import Invocation
+    from app.core.robots.robot_link import Invocation
 
 RISKS = {"moves": "moves the robot", "locomotes": "moves the robot"}
 

@@ -17,11 +17,11 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
 from app import resources
-from app.core.earlier import bring_here
-from app.core.file_lock import Turn
-from app.core.journal import left_behind
+from app.core.documents.journal import left_behind
+from app.core.documents.versions import bring_here
 from app.core.session import Session
-from app.core.settings import home
+from app.core.storage.file_lock import Turn
+from app.core.storage.settings import home
 from app.ui import fonts, messages, single_window, turns
 from app.ui.commands import Commands
 from app.ui.first_paint import AfterFirstPaint

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal, Slot
 
-from app.core import deep_json
+from app.core.storage import deep_json
 
 Json = dict[str, object]
 

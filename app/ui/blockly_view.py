@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from app.core import deep_json
+from app.core.storage import deep_json
 from app.ui.blockly_bridge import Json
 from app.ui.blockly_host import BlocklyHost
 from app.ui.blockly_scheme import register_scheme as register_scheme

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 
-from app.core.companions import VIRTUAL_ROBOTS
 from app.core.faults import log_folder
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
 from app.errors import SettingsError
 from app.ui.actions import Actions, Handler
 from app.ui.docks import Dock

@@ -27,7 +27,7 @@ from app.ui.widgets.menus import Menu, drop_below
 from nep.errors import DecodeError
 
 if TYPE_CHECKING:
-    from app.core.images import ImageStream
+    from app.core.messages.image_streams import ImageStream
 
 LOOK_MS = 200
 

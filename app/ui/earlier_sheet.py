@@ -12,9 +12,9 @@ from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.core.behaviour_file import read_file
-from app.core.block_difference import Difference, difference
-from app.core.earlier import Version, namesakes_of, versions_of
+from app.core.documents.diff import Difference, difference
+from app.core.documents.file_format import read_file
+from app.core.documents.versions import Version, namesakes_of, versions_of
 from app.errors import DocumentError
 from app.ui.dates import when_words
 from app.ui.entry_list import EntryList, Heading, Line

@@ -9,7 +9,7 @@ from typing import Protocol
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from app.core.behaviour_file import SUFFIX
+from app.core.documents.file_format import SUFFIX
 
 FILTER = f"Behaviours (*{SUFFIX})"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.core.behaviour_file import SUFFIX
+from app.core.documents.file_format import SUFFIX
 from app.errors import DocumentError
 
 

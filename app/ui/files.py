@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from app.blocks.mend import mend
-from app.core import deep_json
-from app.core.behaviour_file import SUFFIX
-from app.core.document import Document
-from app.core.earlier import Earlier, free_path, keep_earlier, stamp_of
-from app.core.journal import Unsaved
+from app.core.documents.document import Document
+from app.core.documents.file_format import SUFFIX
+from app.core.documents.journal import Unsaved
+from app.core.documents.versions import Earlier, free_path, keep_earlier, stamp_of
 from app.core.session import Session
-from app.core.settings import home
+from app.core.storage import deep_json
+from app.core.storage.settings import home
 from app.errors import AppError, DocumentError, SettingsError
 from app.ui.file_dialogs import Asks
 from app.ui.file_words import sentence_of, strange_words

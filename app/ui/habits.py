@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from app.core.settings import RecentFile
+from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
 from app.ui.actions import Actions, Handler
 from app.ui.developer_tools import DeveloperTools

@@ -19,7 +19,7 @@ from app.ui.widgets import EmptyAction, EmptyState, IconButton, Line, Segments, 
 from app.ui.words import size_words
 
 if TYPE_CHECKING:
-    from app.core.lazy_json import JsonIndex
+    from app.core.messages.lazy_json import JsonIndex
 
 NOTHING, LARGE, TREE, RAW = range(4)
 

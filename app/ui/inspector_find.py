@@ -16,7 +16,7 @@ from app.ui.tree_values import search
 from app.ui.widgets import IconButton, SearchField, paint
 
 if TYPE_CHECKING:
-    from app.core.lazy_json import JsonIndex
+    from app.core.messages.lazy_json import JsonIndex
 
 MOST = 1000
 Path = tuple[str | int, ...]

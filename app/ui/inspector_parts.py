@@ -11,7 +11,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.lazy_json import LazyList, LazyObject
+from app.core.messages.lazy_json import LazyList, LazyObject
 from app.ui import plain
 from app.ui.theme import Theme
 from app.ui.widgets import Changing, IconButton, Line, label, paint
@@ -19,7 +19,7 @@ from app.ui.words import age_words, grouped, latency_words, size_words
 from nep.errors import NepError
 
 if TYPE_CHECKING:
-    from app.core.topics import Topic
+    from app.core.network.topics import Topic
     from nep.messages.message import Message
 
 FACTS_S = 0.1  # nobody reads faster, and each time is painted

@@ -12,7 +12,7 @@ SILENT = "silent"
 
 
 class Told(Protocol):
-    """What is known of a robot that is there (`app.core.robot_link.RobotLink`)."""
+    """What is known of a robot that is there (`app.core.robots.robot_link.RobotLink`)."""
 
     @property
     def robot(self) -> Robot: ...

@@ -10,7 +10,7 @@ from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.faults import survived
-from app.core.robot_link import NOT_STOPPED, STOPPING
+from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.ui.app_bar import AppBar
 from app.ui.arrangements import Arrangements

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from app.core.companions import VIRTUAL_ROBOTS
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
 from app.core.session import Session
 from app.ui.files import Files
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
-from app.core.nodes import NodeEntry
+from app.core.network.nodes import NodeEntry
 from app.ui.table import Cell, Column, Order
 from app.ui.words import age_words
 

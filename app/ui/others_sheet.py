@@ -6,7 +6,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.core.reach import Reach
+from app.core.network.remote_access import Reach
 from app.ui.overlay import Overlay
 from app.ui.theme import Theme
 from app.ui.widgets import Button, Choice, IconButton, label, paint

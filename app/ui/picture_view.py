@@ -17,8 +17,8 @@ from app.ui.widgets import paint
 from app.ui.words import age_words
 
 if TYPE_CHECKING:
-    from app.core.images import ImageStream
-    from app.core.pictures import Picture, Pixel
+    from app.core.messages.image_streams import ImageStream
+    from app.core.messages.picture import Picture, Pixel
 
 SILENT_AFTER_S = 2.0
 LABEL_EDGE = 8

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from app.ui.picture_boxes import Box, boxes_of
 
 if TYPE_CHECKING:
-    from app.core.robot_link import RobotLink
+    from app.core.robots.robot_link import RobotLink
     from app.core.session import Session
     from app.robots.description import Sensor
 

@@ -13,7 +13,7 @@ from app.ui.theme import Theme
 from app.ui.widgets import Chip, paint
 
 if TYPE_CHECKING:
-    from app.core.robot_link import RobotLink
+    from app.core.robots.robot_link import RobotLink
 
 STATUS = {
     "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",

@@ -18,9 +18,9 @@ from app.ui.widgets import Button, Card, label
 from app.ui.widgets.menus import Menu
 
 if TYPE_CHECKING:
-    from app.core.fleet import Fleet
-    from app.core.known_robots import KnownRobot
-    from app.core.robot_link import RobotLink
+    from app.core.robots.fleet import Fleet
+    from app.core.robots.known import KnownRobot
+    from app.core.robots.robot_link import RobotLink
 
 
 TURTLE = "diffdrive"

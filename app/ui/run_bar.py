@@ -8,7 +8,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from app.core.run_view import RunView
+from app.core.run.view import RunView
 from app.ui.run_parts import Bar, Mark, Result, Sentence
 from app.ui.theme import Theme
 from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, name_command, paint

@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QFont, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.core.run_view import RunView
+from app.core.run.view import RunView
 from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.theme import Theme

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from app.core.images import ImageStream
+    from app.core.messages.image_streams import ImageStream
     from app.core.session import Session
 
 CODEC = "image"

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-from app.core import snapshots
-from app.core.settings import Settings
+from app.core.messages import snapshots
+from app.core.storage.settings import Settings
 from app.ui.file_dialogs import show_free
 from app.ui.overlay import Overlay
 from app.ui.theme import MODES, Theme

@@ -14,7 +14,7 @@ from PySide6.QtCore import QKeyCombination, QObject, Qt, Signal
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QApplication
 
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.errors import SettingsError
 from app.ui import plain
 from app.ui.actions import TABLE, Row

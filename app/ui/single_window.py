@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject
 from shiboken6 import isValid
 
-from app.core.file_lock import Turn
-from app.core.files import private_folder
+from app.core.storage.atomic_file import private_folder
+from app.core.storage.file_lock import Turn
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QImage
 
-from app.core import snapshots
-from app.core.pictures import png_of
+from app.core.messages import snapshots
+from app.core.messages.picture import png_of
 from nep.errors import NepError
 
 if TYPE_CHECKING:

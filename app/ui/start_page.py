@@ -20,8 +20,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.files import read_whole
-from app.core.settings import RecentFile
+from app.core.storage.atomic_file import read_whole
+from app.core.storage.settings import RecentFile
 from app.ui.miniature import Row, rows
 from app.ui.start_art import EmptyPageArt, RobotArt
 from app.ui.start_parts import BigCard, DevelopersLine, ExampleCard, RecentRow

@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.settings import RecentFile
+from app.core.storage.settings import RecentFile
 from app.ui import plain
 from app.ui.dates import day_words
 from app.ui.icons import paint_icon

@@ -9,9 +9,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.health_facts import facts_of, has_told
-from app.core.reach import words_of
-from app.core.robot_link import STOPPING
+from app.core.network.remote_access import words_of
+from app.core.robots.health_facts import facts_of, has_told
+from app.core.robots.robot_link import STOPPING
 from app.core.session import Session
 from app.ui.theme import Theme
 from app.ui.widgets import Line, StatusItem, paint

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from app.core.document import Document
-from app.core.journal import Unsaved
+from app.core.documents.document import Document
+from app.core.documents.journal import Unsaved
 from app.core.session import Session
 from app.ui.actions import Handler
 from app.ui.banner import BannerPlace

@@ -10,7 +10,7 @@ from app.ui.table import Cell, Column
 from app.ui.words import age_words, bandwidth_words, grouped, plural, rate_words
 
 if TYPE_CHECKING:
-    from app.core.topics import Topic
+    from app.core.network.topics import Topic
 
 ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
 

@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import orjson
 
-from app.core.lazy_json import LazyList, LazyObject
+from app.core.messages.lazy_json import LazyList, LazyObject
 from app.ui.tree_values import is_container, keys_of, size_of, values_of
 
 Mark = Literal["", "changed", "added", "removed"]

@@ -19,7 +19,7 @@ from app.ui.try_words import end_words, output_words
 from app.ui.widgets import paint
 
 if TYPE_CHECKING:
-    from app.core.robot_link import Invocation
+    from app.core.robots.robot_link import Invocation
 
 ROW = 28
 SHOWN = 5

@@ -10,7 +10,7 @@ from app.ui.sensor_words import number_words
 from app.ui.words import seconds_words
 
 if TYPE_CHECKING:
-    from app.core.robot_link import Invocation
+    from app.core.robots.robot_link import Invocation
 
 TO_GO = "to_go"
 SHARES = ("progress", "ratio", "share")

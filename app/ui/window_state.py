@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from PySide6.QtCore import QByteArray, QSize
 from PySide6.QtWidgets import QMainWindow
 
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.errors import SettingsError
 from app.ui.theme import MODES, Mode, Theme
 from app.ui.theme_system import wish_of

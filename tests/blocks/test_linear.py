@@ -13,7 +13,7 @@ import pytest
 from app.blocks.compiler import compile_behaviour
 from app.blocks.names import Names
 from app.blocks.workspace import parse_workspace
-from app.core.problem_list import listed
+from app.core.documents.problems import listed
 from tests.blocks.samples import block, call, define, number, robot, say, started, workspace
 
 Saved = dict[str, object]

@@ -13,9 +13,9 @@ import sys
 import threading
 from pathlib import Path
 
-from app.core.behaviour_file import read_file
-from app.core.document import Document
-from app.core.journal import Journal
+from app.core.documents.document import Document
+from app.core.documents.file_format import read_file
+from app.core.documents.journal import Journal
 from app.errors import DocumentError
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.arrivals import MOST_LINES, arrivals
+from app.core.network.graph_changes import MOST_LINES, arrivals
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from app import resources
-from app.core.behaviour_file import BehaviourFile, parse_file, read_file, write_file
-from app.core.document import Document
-from app.core.journal import Journal, left_behind
+from app.core.documents.document import Document
+from app.core.documents.file_format import BehaviourFile, parse_file, read_file, write_file
+from app.core.documents.journal import Journal, left_behind
 from app.errors import DocumentError
 
 ROOT = Path(__file__).parents[2]
@@ -22,8 +22,8 @@ posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of Uni
 FULL = """
 import json, resource, signal, sys
 from pathlib import Path
-from app.core.document import Document
-from app.core.journal import Journal
+from app.core.documents.document import Document
+from app.core.documents.journal import Journal
 from app.errors import DocumentError
 path, journals = Path(sys.argv[1]), Path(sys.argv[2])
 document = Document(lambda: Journal(journals))

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.mailbox import MESSAGES_PER_TOPIC
+from app.core.network.mailbox import MESSAGES_PER_TOPIC
 from app.core.session import Session
 from nep.masters.master import Master
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC

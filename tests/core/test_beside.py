@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.core.beside import Beside
+from app.core.documents.background_compile import Beside
 from tests.blocks.fakes import until
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.block_difference import Difference, difference
+from app.core.documents.diff import Difference, difference
 
 Block = dict[str, object]
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from app.core import checks as module
-from app.core.checks import Checks
+from app.core.network import decode_checks as module
+from app.core.network.decode_checks import Checks
 from nep.messages.message import Message
 
 BAD, GOOD = b"{not json", b'{"n": 1}'

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from app.core.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, LONGEST_LINE, REST_S, Gate, Output
+from app.core.run.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, LONGEST_LINE, REST_S, Gate, Output
 
 LINE = b'{"is": "print", "text": "x"}\n'
 

@@ -10,11 +10,11 @@ from typing import cast
 import pytest
 
 import nep
-from app.core.announcements import MOST_ROBOTS, Announcements
-from app.core.mailbox import Batch
-from app.core.robot_link import RobotLink
+from app.core.network.mailbox import Batch
+from app.core.network.watches import Watches
+from app.core.robots.announcements import MOST_ROBOTS, Announcements
+from app.core.robots.robot_link import RobotLink
 from app.core.session import Session
-from app.core.watches import Watches
 from app.robots.identity import DESCRIPTION_TYPE, Senders
 from nep.masters.master import Master
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core import companions
-from app.core.companions import KNOWN_WITHIN_S, WISH_KEPT_S, Companions
-from app.core.fleet import Fleet
+from app.core.network.watches import Watches
+from app.core.robots import virtual_processes
+from app.core.robots.fleet import Fleet
+from app.core.robots.virtual_processes import KNOWN_WITHIN_S, WISH_KEPT_S, Companions
 from app.core.session import Session
-from app.core.settings import Settings
-from app.core.watches import Watches
+from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.driver import Driver
 from nep.masters.master import Master
@@ -50,8 +50,8 @@ class World:
         self.started: list[list[str]] = []
         self.processes: list[Process] = []
         self.events: list[object] = []
-        monkeypatch.setattr(companions.subprocess, "Popen", self._start)
-        monkeypatch.setattr(companions.tempfile, "TemporaryFile", io.BytesIO)
+        monkeypatch.setattr(virtual_processes.subprocess, "Popen", self._start)
+        monkeypatch.setattr(virtual_processes.tempfile, "TemporaryFile", io.BytesIO)
         self.companions = Companions(
             "127.0.0.1:1", self.events.append, lambda _name: self.there, lambda: self.now
         )

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from app.core import deep_json
+from app.core.storage import deep_json
 
 
 def stack(blocks: int) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 
-from app.core.doctor import Doctor, doctor_of
+from app.core.network.doctor import Doctor, doctor_of
 from nep.doctor import Finding
 
 FINE = Finding("master", "ok", "A master runs.")

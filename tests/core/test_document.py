@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from app.core import behaviour_file
-from app.core.beside import Beside
-from app.core.compiled import Compiled
-from app.core.document import Document, read
-from app.core.files import LARGEST_BYTES
-from app.core.journal import Journal, left_behind
+from app.core.documents import file_format
+from app.core.documents.background_compile import Beside
+from app.core.documents.compiled import Compiled
+from app.core.documents.document import Document, read
+from app.core.documents.journal import Journal, left_behind
+from app.core.storage.atomic_file import LARGEST_BYTES
 from app.errors import DocumentError
 from app.robots import rize
 from tests.blocks.fakes import until
@@ -235,7 +235,7 @@ def test_only_on_a_full_disk_room_is_asked_for(
         raise OSError(number, os.strerror(number))
 
     document.edited(STARTED)
-    monkeypatch.setattr(behaviour_file, "write_atomically", refuse)
+    monkeypatch.setattr(file_format, "write_atomically", refuse)
     with pytest.raises(DocumentError) as raised:
         document.save(tmp_path / "Mine.nepb")
     assert str(raised.value).endswith(f"can't be written ({os.strerror(number)}){then}")

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from app.core.behaviour_file import BehaviourFile, write_file
-from app.core.document import Document
-from app.core.documents import CLOSED_KEPT, Documents
-from app.core.journal import Journal, left_behind
+from app.core.documents.document import Document
+from app.core.documents.file_format import BehaviourFile, write_file
+from app.core.documents.journal import Journal, left_behind
+from app.core.documents.open_documents import CLOSED_KEPT, Documents
 from app.errors import DocumentError
 from app.robots import rize
 

@@ -8,9 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from app.core import earlier
-from app.core.earlier import bring_here, free_path, keep_earlier, namesakes_of, stamp_of, versions_of
-from app.core.settings import data_home, home
+from app.core.documents import versions
+from app.core.documents.versions import (
+    bring_here,
+    free_path,
+    keep_earlier,
+    namesakes_of,
+    stamp_of,
+    versions_of,
+)
+from app.core.storage.settings import data_home, home
 from app.errors import DocumentError
 
 
@@ -68,7 +75,7 @@ def test_a_copy_that_is_gone_leaves_the_file(tmp_path: Path, folder: Path) -> No
 
 
 def test_only_the_newest_copies_stay(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(earlier, "COPIES_KEPT", 2)
+    monkeypatch.setattr(versions, "COPIES_KEPT", 2)
     path = tmp_path / "Round.nepb"
     for number in range(4):
         path.write_bytes(b"%d" % number)
@@ -136,13 +143,13 @@ def test_of_many_versions_the_newest_and_some_of_each_time_stay(tmp_path: Path, 
     for when in times:
         kept(path, folder, str(when).encode(), when - hour, when)
     found = [each.replaced_s for each in versions_of(path, folder)]
-    assert len(found) == earlier.OF_ONE_FILE
-    assert found[: earlier.NEWEST] == times[: -earlier.NEWEST - 1 : -1]
+    assert len(found) == versions.OF_ONE_FILE
+    assert found[: versions.NEWEST] == times[: -versions.NEWEST - 1 : -1]
     assert len(set(times[:20]) & set(found)) >= 19, "one of nearly each day"
 
 
 def test_versions_do_not_fill_the_disk(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(earlier, "BYTES_KEPT", 25)
+    monkeypatch.setattr(versions, "BYTES_KEPT", 25)
     path = tmp_path / "Round.nepb"
     for number in range(4):
         kept(path, folder, b"%010d" % number, number * 100, number * 1000)

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from app.core.file_lock import Turn, locked
+from app.core.storage.file_lock import Turn, locked
 
 HOLDER = """
 import sys
 from pathlib import Path
-from app.core.file_lock import locked
+from app.core.storage.file_lock import locked
 with locked(Path(sys.argv[1])) as held:
     print(held, flush=True)
     sys.stdin.read()

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from app.core.behaviour_file import read_file
-from app.core.earlier import bring_here, keep_earlier
-from app.core.files import read_whole, write_atomically
-from app.core.journal import Journal, left_behind
-from app.core.settings import Settings
+from app.core.documents.file_format import read_file
+from app.core.documents.journal import Journal, left_behind
+from app.core.documents.versions import bring_here, keep_earlier
+from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.storage.settings import Settings
 from app.errors import DocumentError
 from nep.system.replace_file import replace_file
 
@@ -62,7 +62,7 @@ def test_a_killed_writer_never_leaves_a_part(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     code = (
         "import sys, pathlib\n"
-        "from app.core.files import write_atomically\n"
+        "from app.core.storage.atomic_file import write_atomically\n"
         "path = pathlib.Path(sys.argv[1])\n"
         "n = 0\n"
         "while True:\n"

@@ -16,11 +16,11 @@ FULL = """
 import json, sys
 from pathlib import Path
 from app.core import snapshots
-from app.core.behaviour_file import BehaviourFile, write_file
-from app.core.document import Document
-from app.core.earlier import keep_earlier
-from app.core.journal import Journal, left_behind
-from app.core.settings import Settings
+from app.core.documents.file_format import BehaviourFile, write_file
+from app.core.documents.document import Document
+from app.core.documents.versions import keep_earlier
+from app.core.documents.journal import Journal, left_behind
+from app.core.storage.settings import Settings
 from app.errors import AppError
 from nep.messages.message import Message
 

@@ -8,12 +8,12 @@ from typing import cast
 import pytest
 
 from app.core.alerts import Alert, Alerts
-from app.core.checks import Checked
-from app.core.fleet import Fleet
-from app.core.health import AWAY_S, CURE_S, Health
-from app.core.mailbox import Batch
-from app.core.topics import Topics
-from nep.masters.master import graph
+from app.core.network.decode_checks import Checked
+from app.core.network.mailbox import Batch
+from app.core.network.topics import Topics
+from app.core.robots.fleet import Fleet
+from app.core.robots.health import AWAY_S, CURE_S, Health
+from nep.masters import graph
 from nep.messages.message import Message
 from nep.protocol.graph_view import PublisherInfo, SubscriberInfo, TopicInfo
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.health_facts import LOW_PERCENT, HealthFact, facts_of
-from app.core.robot_link import RobotLink
-from app.core.topics import Topic
+from app.core.network.topics import Topic
+from app.core.robots.health_facts import LOW_PERCENT, HealthFact, facts_of
+from app.core.robots.robot_link import RobotLink
 from app.robots import rize, simulated
 from app.robots.description import Field, Sensor, parse, td_for
 

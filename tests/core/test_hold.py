@@ -18,7 +18,7 @@ import pytest
 import nep
 from app.blocks.compiler import compile_behaviour
 from app.blocks.fleet_search import find_robots
-from app.core.runner import Runner
+from app.core.run.runner import Runner
 from nep.messages.message import Message
 from tests.blocks.samples import block, number, started, workspace
 from tests.core.test_runner import Heard

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app.core.images import Images, Rate
-from app.core.pictures import decode
-from app.core.watches import Watches
+from app.core.messages.image_streams import Images, Rate
+from app.core.messages.picture import decode
+from app.core.network.watches import Watches
 from nep.messages.message import Message
 
 
@@ -87,7 +87,7 @@ def test_a_message_that_nobody_foresaw_ends_no_other_pictures(images: Images, mo
             raise KeyError("no such thing")
         return decode(message, *more)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("app.core.images.decode", strange)
+    monkeypatch.setattr("app.core.messages.image_streams.decode", strange)
     stream = images.stream("/camera")
     images.offer([jpeg((1, 2, 3), seq=1)])
     until(lambda: stream.error is not None)

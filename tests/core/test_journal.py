@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.journal import Journal, left_behind
+from app.core.documents.journal import Journal, left_behind
 
 WORKSPACE: dict[str, object] = {"blocks": {"blocks": [{"type": "events_started", "id": "é\ud800"}]}}
 
@@ -18,7 +18,7 @@ WORKSPACE: dict[str, object] = {"blocks": {"blocks": [{"type": "events_started",
 def _killed_writer(folder: Path) -> None:
     code = (
         "import os, sys, pathlib\n"
-        "from app.core.journal import Journal\n"
+        "from app.core.documents.journal import Journal\n"
         "j = Journal(pathlib.Path(sys.argv[1]), clock=lambda: 123.0)\n"
         "j.write('Greeting', pathlib.Path('/a/greeting.nepb'),"
         " {'blocks': 1}, {'Pepper': {'title': 'Pepper'}})\n"

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from app.core.fleet import Fleet
-from app.core.known_robots import KEY, LIMIT, KnownRobot, KnownRobots
-from app.core.settings import Settings
-from app.core.watches import Watches
+from app.core.network.watches import Watches
+from app.core.robots.fleet import Fleet
+from app.core.robots.known import KEY, LIMIT, KnownRobot, KnownRobots
+from app.core.storage.settings import Settings
 from app.robots import rize
 
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.core import lazy_json
-from app.core.lazy_json import JsonIndex, LazyList, LazyObject, Unreadable
+from app.core.messages import lazy_json
+from app.core.messages.lazy_json import JsonIndex, LazyList, LazyObject, Unreadable
 
 TEXTS = st.text(alphabet=st.sampled_from('ab"\\{}[],: \n\u00e9\u20ac'), max_size=12)
 NUMBERS = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.losses import WINDOW_S, RecentLosses
+from app.core.network.losses import WINDOW_S, RecentLosses
 
 
 def test_only_what_was_lost_lately_counts() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from app.core.mailbox import Mailbox
+from app.core.network.mailbox import Mailbox
 from nep.messages.message import Message
 
 

@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 import nep
-from app.core.master_start import AGAIN_AT_MOST_S, MasterStart
+from app.core.network.master_start import AGAIN_AT_MOST_S, MasterStart
 from tests.nep.programs import eventually
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.master_state import LEARNING_S, Learning
+from app.core.network.master_state import LEARNING_S, Learning
 from nep.protocol.graph_view import GraphView
 
 

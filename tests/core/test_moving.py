@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.moving import MayNotMoveError, Moving, actions_of, risky, wanted_by
-from app.core.settings import Settings
+from app.core.robots.motion_permission import MayNotMoveError, Moving, actions_of, risky, wanted_by
+from app.core.storage.settings import Settings
 from app.robots.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
 

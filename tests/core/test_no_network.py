@@ -12,7 +12,7 @@ LOOK = """
 import sys, threading, time
 from pathlib import Path
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 
 session = Session(Settings(Path(sys.argv[1])), journal_folder=Path(sys.argv[1]) / "journal")
 session.start()

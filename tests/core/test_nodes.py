@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.nodes import GONE_SHOWN_S, Nodes
+from app.core.network.nodes import GONE_SHOWN_S, Nodes
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.core.pictures import decode, png_of
+from app.core.messages.picture import decode, png_of
 from nep.errors import DecodeError, EncodeError, NepError
 from nep.messages.message import Message
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from app.blocks import compile_behaviour
 from app.blocks.robot_mend import asked_of, can_do, use_robot
-from app.core.document import Document
-from app.core.journal import Journal
-from app.core.problem_list import Mend, listed
+from app.core.documents.document import Document
+from app.core.documents.journal import Journal
+from app.core.documents.problems import Mend, listed
 from app.robots import simulated
 from app.robots.description import Robot, parse, td_for
 from tests.blocks.samples import block, say, started, text, workspace

@@ -7,8 +7,8 @@ import threading
 import pytest
 
 from app.core.alerts import Alerts
-from app.core.reach import ALERT, Reach
-from app.core.settings import Settings
+from app.core.network.remote_access import ALERT, Reach
+from app.core.storage.settings import Settings
 from nep.errors import RequestRefusedError
 from nep.protocol.graph_view import GraphView
 from nep.system.interfaces import OwnAddress

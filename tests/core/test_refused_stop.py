@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.health_facts import facts_of
-from app.core.robot_link import RobotLink
-from app.core.runner_event import RunnerEvent
+from app.core.robots.health_facts import facts_of
+from app.core.robots.robot_link import RobotLink
+from app.core.run.runner_event import RunnerEvent
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Failed, Kind, Link, action, safe_stop
 from app.run import FAILED, run_file
@@ -160,8 +160,8 @@ def test_run_prints_what_the_robot_said(master: Master, arm: Driver, tmp_path: P
 @pytest.fixture
 def patient(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
     """Waits for the answers to a stop as long as a test needs."""
-    monkeypatch.setattr("app.core.stopping.STOP_TIMEOUT_S", 120.0)
-    monkeypatch.setattr("app.core.stopping.LONGEST_STOP_S", 120.0)
+    monkeypatch.setattr("app.core.robots.stop.STOP_TIMEOUT_S", 120.0)
+    monkeypatch.setattr("app.core.robots.stop.LONGEST_STOP_S", 120.0)
     return session
 
 

@@ -17,8 +17,8 @@ from types import FrameType
 import pytest
 
 import nep
-from app.core.mailbox import MESSAGES_PER_TOPIC
-from app.core.robot_link import Invocation, RobotLink
+from app.core.network.mailbox import MESSAGES_PER_TOPIC
+from app.core.robots.robot_link import Invocation, RobotLink
 from app.core.session import Session
 from app.robots.description import td_for
 from app.robots.turtle import ROBOT

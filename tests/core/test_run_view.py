@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.run_view import RunState, listed, seconds, stop_words, view_of
-from app.core.stop_report import RobotStop, StopReport
+from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.run.view import RunState, listed, seconds, stop_words, view_of
 
 PEPPER = RobotStop("Pepper", True, 38.2)
 TURTLE = RobotStop("Turtle", True, 41.4)

@@ -13,7 +13,7 @@ import pytest
 
 import nep
 from app.blocks.compiler import compile_behaviour
-from app.core.runner import Runner, RunnerEvent, child_command
+from app.core.run.runner import Runner, RunnerEvent, child_command
 from app.errors import RunnerError
 from tests.blocks.samples import block, number, say, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot

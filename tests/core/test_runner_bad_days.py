@@ -10,8 +10,8 @@ import time
 import psutil
 import pytest
 
-from app.core.child_process import MOST_BYTES
-from app.core.runner import EVENTS_PER_S, Runner
+from app.core.run.child_process import MOST_BYTES
+from app.core.run.runner import EVENTS_PER_S, Runner
 from tests.core.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, quickest_stop
 
 __all__ = ["heard"]

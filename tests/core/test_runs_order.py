@@ -8,12 +8,12 @@ from typing import cast
 
 import pytest
 
-from app.core.runner import Runner
+from app.core.robots.stop import RobotStopper
+from app.core.robots.stop_events import OneStopped, StopDone
+from app.core.robots.stop_report import StopReport
+from app.core.run.runner import Runner
 from app.core.session import Session
-from app.core.settings import Settings
-from app.core.stop_events import OneStopped, StopDone
-from app.core.stop_report import StopReport
-from app.core.stopping import RobotStopper
+from app.core.storage.settings import Settings
 from tests.blocks.fakes import until
 
 
@@ -91,7 +91,7 @@ def test_a_fault_in_the_words_of_a_stop_leaves_nothing_stopping(
 ) -> None:
     runs = session.runs
     runs._stop(("Arm",))
-    monkeypatch.setattr(f"app.core.runs.{place}", failing)
+    monkeypatch.setattr(f"app.core.run.control.{place}", failing)
     with pytest.raises(OSError, match="out of order"):
         runs.on_stop(StopDone(runs._stop_number, StopReport((), 1.0).with_asked(["Arm"])))
     assert (runs._run.state, runs.kept) == ("unanswered", {"Arm"})

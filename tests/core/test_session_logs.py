@@ -9,10 +9,10 @@ import pytest
 
 import nep
 from app.core.alerts import Alerts
-from app.core.companions import CompanionFailed
+from app.core.network.source import MasterFound, MasterLost
+from app.core.robots.virtual_processes import CompanionFailed
 from app.core.session import Session
-from app.core.settings import Settings
-from app.core.source import MasterFound, MasterLost
+from app.core.storage.settings import Settings
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC
 from tests.blocks.samples import number, stack, started, text, workspace, write
 from tests.core.waiting import tick_until

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.settings import RECENT_LIMIT, Settings, home
+from app.core.storage.settings import RECENT_LIMIT, Settings, home
 from app.errors import SettingsError
 
 

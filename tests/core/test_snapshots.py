@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.core import snapshots
+from app.core.messages import snapshots
 from nep.errors import DecodeError
 from nep.messages.message import Message
 

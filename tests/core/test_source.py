@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 import nep
-from app.core.source import GraphSeen, LiveSource, MasterFound, MasterLost
+from app.core.network.source import GraphSeen, LiveSource, MasterFound, MasterLost
 from nep.masters.master import Master
 from nep.masters.process import look
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE

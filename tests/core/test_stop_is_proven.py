@@ -10,8 +10,8 @@ from dataclasses import replace
 import pytest
 
 import nep
-from app.core.stop_report import RobotStop, StopReport, not_reached
-from app.core.stopping import RobotStopper, StopTarget
+from app.core.robots.stop import RobotStopper, StopTarget
+from app.core.robots.stop_report import RobotStop, StopReport, not_reached
 from app.robots.description import Topics
 from app.robots.identity import first_to_announce, identity_of
 from nep.errors import AddressInUseError

@@ -6,9 +6,9 @@ import pytest
 
 import nep
 from app.blocks.compiler import compile_behaviour
-from app.core.runner import Runner
-from app.core.stop_report import RobotStop, StopReport
-from app.core.stopping import RobotStopper
+from app.core.robots.stop import RobotStopper
+from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.run.runner import Runner
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, say, started, workspace
 from tests.blocks.wire_robot import RizeRobot, WireRobot

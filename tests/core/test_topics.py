@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import count
 
-from app.core.mailbox import Batch
-from app.core.topics import FIGURES_LATE_S, GONE_SHOWN_S, START_S, Topics, total_rate_hz
+from app.core.network.mailbox import Batch
+from app.core.network.topics import FIGURES_LATE_S, GONE_SHOWN_S, START_S, Topics, total_rate_hz
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import ValuesView
 from dataclasses import replace
 
-from app.core.losses import WINDOW_S
-from app.core.mailbox import Batch
-from app.core.topics import AT_ONCE, Topics
-from app.core.traffic import Traffic
+from app.core.network.losses import WINDOW_S
+from app.core.network.mailbox import Batch
+from app.core.network.topics import AT_ONCE, Topics
+from app.core.network.traffic import Traffic
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from app.core.robot_link import TRIES_KEPT, Invocation, Payload, RobotLink
-from app.core.tries import FIRST_ANSWER_S, GRACE_S, Tries
+from app.core.robots.robot_link import TRIES_KEPT, Invocation, Payload, RobotLink
+from app.core.robots.tries import FIRST_ANSWER_S, GRACE_S, Tries
 from app.robots.description import Action, Robot, parse, td_for
 from app.robots.turtle import ROBOT
 

@@ -8,12 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 
 WRITER = """
 import sys
 from pathlib import Path
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 settings = Settings(Path(sys.argv[1]))
 print("ready", flush=True)
 sys.stdin.readline()

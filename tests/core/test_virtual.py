@@ -14,12 +14,12 @@ from typing import cast
 import psutil
 import pytest
 
-from app.core.fleet import Fleet
-from app.core.moving import MayNotMoveError, Moving
-from app.core.processes import Processes
+from app.core.network.watches import Watches
+from app.core.robots.fleet import Fleet
+from app.core.robots.motion_permission import MayNotMoveError, Moving
+from app.core.robots.own_processes import Processes
 from app.core.session import Session
-from app.core.settings import Settings
-from app.core.watches import Watches
+from app.core.storage.settings import Settings
 from app.robots.description import Robot, parse, td_for
 from app.robots.identity import Identity
 from app.robots.turtle import ROBOT

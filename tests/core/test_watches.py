@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.watches import Watches
+from app.core.network.watches import Watches
 
 
 def test_the_first_watch_begins_and_the_last_ends() -> None:

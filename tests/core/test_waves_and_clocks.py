@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from app.core.network.source import GraphSeen, Job
 from app.core.session import Session
-from app.core.settings import Settings
-from app.core.source import GraphSeen, Job
+from app.core.storage.settings import Settings
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 

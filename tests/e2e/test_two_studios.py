@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from tests.e2e.behaviours import forever, started, turn, write
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until

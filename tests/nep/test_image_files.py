@@ -38,7 +38,7 @@ def test_a_bomb_never_reaches_the_decoder(name: str) -> None:
 CHILD = """
 import json, resource, sys, time
 import cv2, numpy
-from app.core.pictures import decode, png_of
+from app.core.messages.picture import decode, png_of
 from nep.errors import NepError
 from nep.messages.message import Message
 from tests.nep.bad_pictures import BOMBS

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 import nep
-from app.core.runs import STOP_TIMEOUT_S
+from app.core.run.control import STOP_TIMEOUT_S
 from app.robots.driver import Driver
 from app.robots.identity import program_of
 from app.robots.kit import Failed

@@ -18,10 +18,10 @@ import numpy as np
 from app.blocks import Problem, editor_definitions
 from app.core.alerts import Alerts
 from app.core.console import Console
-from app.core.known_robots import KnownRobots
-from app.core.moving import Moving
-from app.core.nodes import Nodes
-from app.core.pictures import Picture
+from app.core.messages.picture import Picture
+from app.core.network.nodes import Nodes
+from app.core.robots.known import KnownRobots
+from app.core.robots.motion_permission import Moving
 from app.robots.inputs import Choice, Parameter
 from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
 from app.robots.parts import Topics as RobotTopics

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.ui import fonts
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow

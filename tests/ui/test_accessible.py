@@ -10,7 +10,7 @@ from PySide6.QtGui import QAccessible
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.core.run_view import RunView
+from app.core.run.view import RunView
 from app.ui.commands import Commands
 from app.ui.docks import Dock
 from app.ui.main_window import MainWindow

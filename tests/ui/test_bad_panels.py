@@ -14,7 +14,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.ui.docks import Dock
 from app.ui.main_window import MainWindow
 from app.ui.panels.base import Panel, PanelContext

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 import nep
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
 from app.ui.panels.alerts import PANEL, AlertsPanel

@@ -8,7 +8,7 @@ import random
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.core import deep_json
+from app.core.storage import deep_json
 from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, UNKNOWN, WAIT_MS, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]

@@ -10,8 +10,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.block_difference import Difference
-from app.core.earlier import keep_earlier
+from app.core.documents.diff import Difference
+from app.core.documents.versions import keep_earlier
 from app.ui.commands import Commands
 from app.ui.dates import when_words
 from app.ui.earlier_sheet import EarlierSheet, difference_words

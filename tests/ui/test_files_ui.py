@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.core.document import Document
-from app.core.earlier import free_path
+from app.core.documents.document import Document
+from app.core.documents.versions import free_path
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
 from tests.ui.shell_parts import Answers

@@ -15,9 +15,9 @@ from PySide6.QtGui import QFont, QFontInfo
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
-from app.core.journal import Journal
+from app.core.documents.journal import Journal
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.ui import fonts
 from app.ui.application import Options, make_application, make_window
 from app.ui.first_paint import AfterFirstPaint
@@ -139,7 +139,7 @@ def test_everything_that_shows_first_has_our_fonts(
     application.setFont(QFont("DejaVu Serif"))  # as the system gives it: nothing of ours is applied yet
     journal = Journal(tmp_path / "journal")
     journal.write("Walk", None, {"blocks": {"blocks": [{"type": "x", "id": "a"}]}}, {})
-    monkeypatch.setattr("app.core.journal._alive", lambda _pid, _born_s: False)
+    monkeypatch.setattr("app.core.documents.journal._alive", lambda _pid, _born_s: False)
     (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
     window, _commands = make_window(Session(Settings(tmp_path), start_companions=False), Options())
     qtbot.addWidget(window)

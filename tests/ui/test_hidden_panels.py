@@ -9,9 +9,9 @@ import pytest
 from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QApplication, QMainWindow
 
+from app.core.network.source import GraphSeen, Job
 from app.core.session import Session
-from app.core.settings import Settings
-from app.core.source import GraphSeen, Job
+from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description import parse, td_for
 from app.ui.docks import RESTS_AFTER_S, Dock, on_screen

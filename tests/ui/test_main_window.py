@@ -10,11 +10,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
 
+from app.core.documents.journal import Journal, left_behind
 from app.core.faults import SaidOnce
-from app.core.journal import Journal, left_behind
-from app.core.run_view import RunView
+from app.core.run.view import RunView
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description import parse, td_for
 from app.ui.actions import TABLE, shortcuts

@@ -10,8 +10,8 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
-from app.core.moving import Moving
-from app.core.settings import Settings
+from app.core.robots.motion_permission import Moving
+from app.core.storage.settings import Settings
 from app.robots.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
 from app.ui.move_question import MoveQuestion

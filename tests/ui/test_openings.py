@@ -12,7 +12,7 @@ from PySide6.QtGui import QAction, QContextMenuEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QWidget
 
 from app.core.session import Session
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description import parse, td_for
 from app.ui.commands import Commands

@@ -6,8 +6,8 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.alerts import Alerts
-from app.core.reach import Reach, words_of
-from app.core.settings import Settings
+from app.core.network.remote_access import Reach, words_of
+from app.core.storage.settings import Settings
 from app.ui.others_sheet import OthersSheet
 from app.ui.theme import Theme
 from nep.protocol.graph_view import GraphView

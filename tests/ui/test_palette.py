@@ -10,9 +10,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from app.core.document import Document
-from app.core.settings import RecentFile
-from app.core.topics import Topic
+from app.core.documents.document import Document
+from app.core.network.topics import Topic
+from app.core.storage.settings import RecentFile
 from app.ui.commands import Commands
 from app.ui.entry_list import Heading
 from app.ui.main_window import MainWindow

@@ -11,7 +11,7 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from app.core import lazy_json
+from app.core.messages import lazy_json
 from app.ui.inspector_body import LARGE, NOTHING, RAW, TREE
 from app.ui.inspector_compare import changes_words, count_changes
 from app.ui.inspector_parts import LARGE_BYTES, image_summary, message_facts, plain_words

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from app.core.nodes import NodeEntry, Nodes
+from app.core.network.nodes import NodeEntry, Nodes
 from app.ui.node_rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
 from app.ui.panels.nodes import PANEL, NodesPanel
 from app.ui.table import CELL_ROLE

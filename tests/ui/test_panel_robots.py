@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.known_robots import KEY
+from app.core.robots.known import KEY
 from app.robots.parts import Field
 from app.ui.long_text import LongText
 from app.ui.panels.robots import PANEL, RobotsPanel

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.run_view import RunView
+from app.core.run.view import RunView
 from app.ui.run_bar import RunBar, ToolBar
 from app.ui.theme import Theme
 from app.ui.widgets import StopButton, paint

@@ -8,8 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core import snapshots
-from app.core.settings import RecentFile, Settings
+from app.core.messages import snapshots
+from app.core.storage.settings import RecentFile, Settings
 from app.ui.commands import Commands
 from app.ui.main_window import MainWindow
 from app.ui.settings_sheet import SettingsSheet

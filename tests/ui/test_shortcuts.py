@@ -9,7 +9,7 @@ from PySide6.QtCore import QKeyCombination, Qt
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtTest import QTest
 
-from app.core.settings import Settings
+from app.core.storage.settings import Settings
 from app.robots.description import Parameter
 from app.ui.actions import TABLE
 from app.ui.app_bar import AppBar

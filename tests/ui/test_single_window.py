@@ -15,7 +15,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalSocket
 from PySide6.QtWidgets import QApplication
 
-from app.core.file_lock import Turn
+from app.core.storage.file_lock import Turn
 from app.ui import single_window
 from app.ui.single_window import Asked, Meeting, found, hand_over, is_ours, parse, peer_of, place
 
@@ -63,7 +63,7 @@ def test_another_process_hands_over_whole_paths(qtbot, name: str, tmp_path: Path
 STARTING = """
 import sys
 from pathlib import Path
-from app.core.file_lock import Turn
+from app.core.storage.file_lock import Turn
 from app.ui.single_window import Asked, found
 print("begun", flush=True)
 turn = Turn(Path(sys.argv[2]))

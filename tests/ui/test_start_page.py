@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
 from app import resources
-from app.core.settings import RecentFile
+from app.core.storage.settings import RecentFile
 from app.ui.dates import day_words
 from app.ui.miniature import Row, category_of, rows
 from app.ui.start_page import StartPage, read_examples

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QPoint, QRect
 
 from app import resources
-from app.core.run_view import RunView
+from app.core.run.view import RunView
 from app.core.session import Session
 from app.ui.commands import Commands
 from app.ui.docks import Dock

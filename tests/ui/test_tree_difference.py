@@ -8,7 +8,7 @@ import math
 import pytest
 from PySide6.QtCore import QModelIndex
 
-from app.core.lazy_json import JsonIndex
+from app.core.messages.lazy_json import JsonIndex
 from app.ui.tree import Node, TreeModel
 from app.ui.tree_difference import MISSING, OFF, differs, mark_of, parts_of
 

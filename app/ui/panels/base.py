@@ -18,8 +18,8 @@ from PySide6.QtWidgets import QWidget
 from app.ui.theme import Theme
 
 if TYPE_CHECKING:
+    from app.core.network.watches import Look
     from app.core.session import Session
-    from app.core.watches import Look
 
 Density = Literal["compact", "comfortable"]
 ANY_TYPE = "*"

@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.robot_link import NOT_STOPPED, STOPPING
+from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.ui.behaviour_tab import TabFacts
 from app.ui.behaviour_title import BehaviourTitle
 from app.ui.blocks_wait import BlocksWait
@@ -22,10 +22,10 @@ from app.ui.widgets import EmptyAction, EmptyState
 
 if TYPE_CHECKING:
     from app.blocks import Program
-    from app.core.document import Document
-    from app.core.robot_link import RobotLink
-    from app.core.runs import Runs
-    from app.core.watches import Look, Watch
+    from app.core.documents.document import Document
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
+    from app.core.run.control import Runs
 
 LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
 TOOLBOX_WIDTH = 196

@@ -14,9 +14,9 @@ from app.ui.widgets import Chip, Elided, EmptyAction, EmptyState
 from app.ui.words import age_words
 
 if TYPE_CHECKING:
-    from app.core.images import ImageStream
-    from app.core.robot_link import RobotLink
-    from app.core.watches import Look, Watch
+    from app.core.messages.image_streams import ImageStream
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
 
 
 class CameraPanel(PanelWidget):

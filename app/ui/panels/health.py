@@ -10,7 +10,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.health_facts import HealthFact, facts_of
+from app.core.robots.health_facts import HealthFact, facts_of
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.theme import Theme
@@ -18,8 +18,8 @@ from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Scrolled, labe
 from app.ui.words import age_words
 
 if TYPE_CHECKING:
-    from app.core.robot_link import RobotLink
-    from app.core.watches import Look, Watch
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
 
 TITLE_WIDTH = 96
 BESIDE_FROM = 300

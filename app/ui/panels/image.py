@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
-from app.core import snapshots
+from app.core.messages import snapshots
 from app.ui import plain
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.picture_actions import PictureActions
@@ -22,8 +22,8 @@ from app.ui.widgets import EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
-    from app.core.images import ImageStream
-    from app.core.watches import Look, Watch
+    from app.core.messages.image_streams import ImageStream
+    from app.core.network.watches import Look, Watch
     from nep.messages.message import Message
 
 CODEC = "image"

@@ -10,7 +10,7 @@ from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QVBoxLayout
 
-from app.core.reading import Reader, Reading
+from app.core.messages.reader import Reader, Reading
 from app.ui.inspector_actions import InspectorActions
 from app.ui.inspector_body import LARGE, NOTHING, RAW, TREE, InspectorBody
 from app.ui.inspector_compare import count_changes
@@ -29,9 +29,9 @@ from app.ui.widgets.menus import Menu
 from nep.errors import NepError
 
 if TYPE_CHECKING:
-    from app.core.lazy_json import JsonIndex
-    from app.core.topics import Topic
-    from app.core.watches import Look, Watch
+    from app.core.messages.lazy_json import JsonIndex
+    from app.core.network.topics import Topic
+    from app.core.network.watches import Look, Watch
     from nep.messages.message import Message
 
 FIRST_ROWS = 24

@@ -8,7 +8,7 @@ from PySide6.QtCore import QModelIndex, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
-from app.core.source import NODE_NAME
+from app.core.network.source import NODE_NAME
 from app.ui.node_rows import NodeRow, columns, facts_of, limits_of, rows_of
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.table_panel import TablePanel
@@ -18,7 +18,7 @@ from app.ui.widgets import Scrolled
 from app.ui.words import rate_words
 
 if TYPE_CHECKING:
-    from app.core.nodes import NodeEntry
+    from app.core.network.nodes import NodeEntry
 
 SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
 LIVELY = frozenset({"cpu"})

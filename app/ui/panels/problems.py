@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.companions import VIRTUAL_ROBOTS
-from app.core.problem_list import Listed, Mend, listed
+from app.core.documents.problems import Listed, Mend, listed
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
 from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget

@@ -21,8 +21,8 @@ from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
-    from app.core.robot_link import RobotLink
-    from app.core.watches import Look, Watch
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
 STALE = QColor(90, 90, 90, 150)

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.moving import MayNotMoveError
-from app.core.robot_link import NOT_STOPPED, STOPPING
+from app.core.robots.motion_permission import MayNotMoveError
+from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, RobotInputError
 from app.ui.action_card import ActionCard
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -30,8 +30,8 @@ from app.ui.widgets import EmptyAction, EmptyState, Line, label
 from app.ui.words import plural
 
 if TYPE_CHECKING:
-    from app.core.robot_link import RobotLink
-    from app.core.watches import Look, Watch
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
 
 UNFOLDED = 4
 LIST_FROM_WIDTH = 760

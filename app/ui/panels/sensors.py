@@ -19,8 +19,8 @@ from app.ui.widgets import EmptyState, paint
 from app.ui.words import age_words
 
 if TYPE_CHECKING:
-    from app.core.robot_link import RobotLink
-    from app.core.watches import Look, Watch
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
 
 ROW = {"compact": 26, "comfortable": 28}
 FIRST = ("touch", "distance", "battery")  # what people look for; the others keep their order

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QVBoxLayout
 
-from app.core.source import NODE_NAME
+from app.core.network.source import NODE_NAME
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.table_panel import TablePanel
 from app.ui.table import TableModel
@@ -16,7 +16,7 @@ from app.ui.widgets import EmptyAction, label
 from app.ui.words import plural
 
 if TYPE_CHECKING:
-    from app.core.topics import Topic
+    from app.core.network.topics import Topic
 
 FOOT = "Rates come from the publishers; nothing is subscribed but what you look at"
 FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second

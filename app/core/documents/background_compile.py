@@ -1,0 +1,79 @@
+"""Work that would hold the window up, done in a thread beside it; for each owner only the newest counts."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from app.core.storage.deep_json import start_deep
+
+T = TypeVar("T")
+END_S = 2.0
+
+
+class Beside(Generic[T]):
+    """One thread, made when there is something to do; `close` ends it. The other methods never wait."""
+
+    def __init__(self, name: str) -> None:
+        """``name`` is the thread's."""
+        self._name = name
+        self._changed = threading.Condition()
+        self._asked: dict[str, Callable[[], T]] = {}
+        self._done: dict[str, T] = {}
+        self._failed: dict[str, Exception] = {}
+        self._thread: threading.Thread | None = None
+        self._closed = False
+
+    def ask(self, owner: str, work: Callable[[], T]) -> None:
+        """Do this next for the owner, in place of what waits for it."""
+        with self._changed:
+            self._asked[owner] = work
+            if self._thread is None and not self._closed:
+                self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+                start_deep(self._thread)
+            self._changed.notify_all()
+
+    def take(self, owner: str) -> T | None:
+        """What was made for the owner since the last time, None while nothing is ready.
+
+        Raises what the work raised.
+        """
+        with self._changed:
+            failed = self._failed.pop(owner, None)
+            if failed is not None:
+                raise failed
+            return self._done.pop(owner, None)
+
+    def forget(self, owner: str) -> None:
+        """The owner is gone."""
+        with self._changed:
+            self._asked.pop(owner, None)
+            self._done.pop(owner, None)
+            self._failed.pop(owner, None)
+
+    def close(self) -> None:
+        """End the thread; what it does just now is waited for, 2 s at most."""
+        with self._changed:
+            self._closed = True
+            self._asked.clear()
+            self._changed.notify_all()
+        if self._thread is not None:
+            self._thread.join(END_S)
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or bool(self._asked))
+                if self._closed:
+                    return
+                owner = next(iter(self._asked))
+                work = self._asked.pop(owner)
+            try:
+                made = work()
+            except Exception as error:  # noqa: BLE001  it belongs to who asked, and is raised there
+                with self._changed:
+                    self._failed[owner] = error
+                continue
+            with self._changed:
+                self._done[owner] = made

@@ -1,0 +1,313 @@
+"""The behaviour that is open: its blocks, its file, its journal, and what the compiler says of it."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from app.blocks import Problem, Program, compile_behaviour, editor_definitions
+from app.blocks.mend import mend
+from app.blocks.robot_mend import blocks_of, use_robot
+from app.core.documents.background_compile import Beside
+from app.core.documents.compiled import QUICK_S, Compiled, Key, compiled, is_long
+from app.core.documents.file_format import (
+    TOO_DEEP,
+    BehaviourFile,
+    Descriptions,
+    Workspace,
+    read_file,
+    write_file,
+)
+from app.core.documents.journal import Journal, Unsaved
+from app.core.documents.versions import Stamp, stamp_of
+from app.core.storage import deep_json
+from app.errors import DescriptionError, DocumentError
+from app.robots.description import Robot, parse
+
+UNNAMED = "New behaviour"
+
+_keys = itertools.count(1)
+
+
+class Document:
+    """One behaviour.
+
+    ``key`` names it among those that are open. ``revision`` grows when it is replaced from outside the
+    editor, ``mends`` when Studio changed its blocks in a way that can be undone, ``edits`` with every edit.
+    """
+
+    def __init__(
+        self, journal: Callable[[], Journal] = Journal, clock: Callable[[], float] = time.time
+    ) -> None:
+        """Start with an empty new behaviour; ``journal`` makes the journal of each."""
+        self._make_journal = journal
+        self._clock = clock
+        self._timer = time.perf_counter
+        self._journal = journal()
+        self.key = f"behaviour-{next(_keys)}"
+        self.path: Path | None = None
+        self.name = UNNAMED
+        self.others: Mapping[str, object] = {}
+        self.workspace: Workspace = {}
+        self.robots: dict[str, Mapping[str, object]] = {}
+        self.dirty = False
+        self.saved_at: float | None = None
+        self._stamp: Stamp | None = None  # of the file, as it was read or written last
+        self.revision = 0
+        self.mends = 0
+        self.edits = 0
+        self.definitions_revision = 0
+        self._connected: tuple[Robot, ...] = ()
+        self._topics: tuple[str, ...] = ()
+        self._compiled: tuple[Key, Program] | None = None
+        self._compile_s: float | None = None
+        self._asked: Key | None = None
+        self.beside: Beside[Compiled] | None = None
+        self._definitions: tuple[int, Mapping[str, object]] | None = None
+        self.journal_error: str | None = None
+
+    # -- editing and files -----------------------------------------------------------------------------------
+
+    def edited(self, workspace: Workspace) -> None:
+        """The editor changed the blocks. They are in the journal when this returns."""
+        with contextlib.suppress(RecursionError):  # too deep to compare: take it as changed
+            if deep_json.same(workspace, self.workspace):
+                return
+        self.workspace = workspace
+        self.dirty = True
+        self.edits += 1
+        text = self._keep_used_robots()
+        self._write_journal(text)
+
+    def new(self, name: str = UNNAMED) -> None:
+        """Begin an empty behaviour."""
+        self._replace(BehaviourFile(name, {}, {}), None)
+
+    def open(self, path: Path) -> None:
+        """Open a file. Raises DocumentError; then what was open stays."""
+        self._replace(read_file(path), path)
+        self.saved_at = path.stat().st_mtime
+        self._stamp = stamp_of(path)
+
+    def example(self, path: Path) -> None:
+        """Open an example as a new, unsaved behaviour. Raises DocumentError."""
+        self._replace(read_file(path), None)
+
+    def recover(self, unsaved: Unsaved) -> None:
+        """Put back what a crash left behind.
+
+        It is unsaved, and journalled anew before the old journal goes.
+        """
+        found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.others)
+        self._replace(found, unsaved.path)
+        now = stamp_of(unsaved.path) if unsaved.path is not None else None
+        if now is not None and now[0] <= unsaved.edited_s * 1e9:
+            self._stamp = now  # nobody wrote the file after that work was done
+        self.dirty = True
+        self._write_journal()
+        unsaved.journal.unlink(missing_ok=True)
+
+    def save(self, path: Path | None = None) -> None:
+        """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError."""
+        target = path if path is not None else self.path
+        if target is None:
+            raise DocumentError(None, "this behaviour has no file yet; choose one")
+        name = target.stem if path is not None else self.name
+        write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
+        self.path, self.name = target, name
+        self.dirty = False
+        self.saved_at = self._clock()
+        self._stamp = stamp_of(target)
+        self._journal.discard()
+        self.journal_error = None
+
+    def mend(self, action: str) -> bool:
+        """Do what a problem's button says to the blocks; False when the action is no matter of blocks."""
+        mended = deep_json.deeply(lambda: mend(self.workspace, action))
+        if mended is None:
+            return False
+        self.edited(mended)
+        self.mends += 1
+        return True
+
+    def use_robot(self, missing: str, robot: Robot) -> bool:
+        """Let a robot do what the blocks ask of one that is missing; False when nothing asks it."""
+        known = next((each for each in self._known() if each.name == missing), None)
+        if known is None or not blocks_of(self.workspace, missing):
+            return False
+        made = deep_json.deeply(lambda: use_robot(self.workspace, missing, known.model, robot))
+        self.edited(made)
+        self.mends += 1
+        return True
+
+    def lose_file(self) -> None:
+        """Another behaviour was saved as its file: its blocks are unsaved work now."""
+        self.path, self.dirty = None, True
+        self._write_journal()
+
+    def file_went_back(self) -> None:
+        """Its file says again what it said before the last saving: the blocks here are unsaved work."""
+        self.dirty, self._stamp = True, stamp_of(self.path) if self.path is not None else None
+        self._write_journal()
+
+    @property
+    def changed_outside(self) -> bool:
+        """Whether somebody else has written its file since it was opened or saved here."""
+        now = stamp_of(self.path) if self.path is not None else None
+        return now is not None and now != self._stamp
+
+    @property
+    def blank(self) -> bool:
+        """Whether it is a new behaviour that nobody has touched: another may take its place."""
+        return self.path is None and not self.dirty and not self.workspace
+
+    @property
+    def journal(self) -> str:
+        """The name of the file that keeps its unsaved work."""
+        return self._journal.name
+
+    def keep_again(self) -> bool:
+        """Try once more to journal unsaved work that the disk did not take; whether all of it is kept."""
+        if self.dirty and self.journal_error is not None:
+            self._write_journal()
+        return not self.dirty or self.journal_error is None
+
+    def close(self) -> None:
+        """The window closes: unsaved work stays in the journal and is offered at the next start."""
+        if not self.dirty:
+            self._journal.discard()
+
+    # -- robots and the compiler -----------------------------------------------------------------------------
+
+    def set_connected(self, robots: Sequence[Robot]) -> None:
+        """The robots that are connected now."""
+        if tuple(robots) != self._connected:
+            self._connected = tuple(robots)
+            self.definitions_revision += 1
+            self._keep_used_robots()
+
+    def set_topics(self, topics: Sequence[str]) -> None:
+        """The topics that the editor offers to choose from."""
+        if tuple(topics) != self._topics:
+            self._topics = tuple(topics)
+            self.definitions_revision += 1
+
+    @property
+    def absent(self) -> tuple[Robot, ...]:
+        """Robots that the behaviour knows and that are not connected."""
+        there = {robot.name for robot in self._connected}
+        return tuple(robot for robot in self._known() if robot.name not in there)
+
+    def program(self) -> Program:
+        """The blocks as a program, for the robots known now; compiled once for each edit."""
+        key = self._key()
+        if self._compiled is None or self._compiled[0] != key:
+            began = self._timer()
+            self._compiled = (key, self._compiling()())
+            self._compile_s = self._timer() - began
+        return self._compiled[1]
+
+    def newest(self) -> Program | None:
+        """The program of the newest edit that is compiled; a long one is compiled beside the window.
+
+        So it may be that of an edit before, and None when a long behaviour has just been opened.
+        """
+        key = self._key()
+        if self._compiled is not None and self._compiled[0] == key:
+            return self._compiled[1]
+        if self.beside is None:
+            return self.program()
+        done = self.beside.take(self.key)
+        if done is not None:
+            self._compiled, self._compile_s = (done.key, done.program), done.seconds
+        if self._asked != key:
+            if self._is_quick():
+                return self.program()
+            self._asked = key
+            self.beside.ask(self.key, partial(compiled, key, self._compiling(), self._timer))
+        return self._compiled[1] if self._compiled is not None else None
+
+    def _is_quick(self) -> bool:
+        """Whether compiling holds the window up so little that it may be done at once."""
+        if self._compile_s is not None:
+            return self._compile_s < QUICK_S
+        return self._asked is None and not is_long(self.workspace)
+
+    def _key(self) -> Key:
+        return self.revision, self.edits, self.definitions_revision
+
+    def _compiling(self) -> Callable[[], Program]:
+        """The compilation of what is here now; it may run in any thread."""
+        return partial(compile_behaviour, self.workspace, self._connected, absent=self.absent, name=self.name)
+
+    def problems(self) -> tuple[Problem, ...]:
+        """What the compiler says of the blocks."""
+        return self.program().problems
+
+    def definitions(self) -> Mapping[str, object]:
+        """Blocks and toolbox for the editor, from the categories and the robots connected now."""
+        if self._definitions is None or self._definitions[0] != self.definitions_revision:
+            made = editor_definitions(self._connected, self.absent, self._topics)
+            self._definitions = (self.definitions_revision, made)
+        return self._definitions[1]
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _replace(self, found: BehaviourFile, path: Path | None) -> None:
+        self._journal.discard()
+        self._journal = self._make_journal()
+        self.journal_error = None
+        self.name, self.path, self.workspace = found.name, path, found.workspace
+        self.robots, self.others = dict(found.robots), found.others
+        self._compile_s = self._asked = None
+        self.dirty = False
+        self.saved_at = self._stamp = None
+        self.revision += 1
+        self.definitions_revision += 1
+
+    def _write_journal(self, text: str | None = None) -> None:
+        """``text`` is the JSON of the blocks when it is made already."""
+        try:
+            self._journal.write(self.name, self.path, self.workspace, self.robots, text, self.others)
+        except OSError as error:
+            self.journal_error = f"unsaved work can't be kept ({error.strerror or error}); save the file now"
+        except RecursionError:
+            self.journal_error = f"unsaved work can't be kept: {TOO_DEEP}"
+        else:
+            self.journal_error = None
+
+    def _keep_used_robots(self) -> str | None:
+        """Keep the descriptions of the robots that the blocks name: they are known without them later.
+
+        The JSON of the blocks is returned, if they have any.
+        """
+        try:
+            text = deep_json.dumps(self.workspace)
+        except RecursionError:
+            return None  # the journal, which comes next, says so
+        for robot in self._connected:
+            if json.dumps(robot.name, ensure_ascii=False) in text:
+                self.robots[robot.name] = dict(robot.source)
+        return text
+
+    def _known(self) -> list[Robot]:
+        found = (_parsed(description) for description in self.robots.values())
+        return [robot for robot in found if robot is not None]
+
+
+def _parsed(description: Mapping[str, object]) -> Robot | None:
+    try:
+        return parse(description)
+    except DescriptionError:
+        return None  # its blocks are kept as unknown ones, and the problems list names them
+
+
+def read(path: Path) -> tuple[str, Workspace, Descriptions]:
+    """Name, workspace and robots of a behaviour file. Raises DocumentError with what to do next."""
+    found = read_file(path)
+    return found.name, found.workspace, found.robots

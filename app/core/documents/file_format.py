@@ -1,0 +1,99 @@
+"""A behaviour's file: JSON with its name, its blocks and the robots that they name.
+
+What this version does not know (a description, a field of a later program) is kept and written again.
+"""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.core.storage import deep_json
+from app.core.storage.atomic_file import LARGEST_BYTES, read_whole, write_atomically
+from app.errors import DocumentError
+
+FORMAT = "nep-behaviour"
+VERSION = 1
+SUFFIX = ".nepb"
+TOO_DEEP = "more than 4000 blocks hang in one stack; divide it into several scripts"
+FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
+"""What systems say of a disk, a file or a share of a disk that takes nothing more."""
+OURS = frozenset({"format", "version", "name", "workspace", "robots"})
+
+Workspace = Mapping[str, object]
+Descriptions = Mapping[str, Mapping[str, object]]
+
+
+@dataclass(frozen=True)
+class BehaviourFile:
+    """What a behaviour's file says; ``others`` are its fields that this version does not know."""
+
+    name: str
+    workspace: Workspace
+    robots: Descriptions
+    others: Mapping[str, object] = field(default_factory=dict)
+
+
+def read_file(path: Path) -> BehaviourFile:
+    """Read a behaviour's file. Raises DocumentError with what to do next."""
+    try:
+        data = read_whole(path)
+    except OSError as error:
+        raise DocumentError(path, f"can't be read ({error.strerror or error})") from error
+    except ValueError as error:  # letters that no file's name has here
+        raise DocumentError(path, "can't be read (no file has such a name here)") from error
+    return parse_file(data, path)
+
+
+def parse_file(data: bytes, path: Path) -> BehaviourFile:
+    """The behaviour in a file's bytes; ``path`` is for the sentence. Raises DocumentError."""
+    try:
+        content = deep_json.loads(data.decode("utf-8", "surrogatepass"))
+    except (ValueError, RecursionError) as error:
+        raise DocumentError(path, "is damaged or no behaviour; open a copy from before") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise DocumentError(path, f"is no behaviour; behaviours are files ending in {SUFFIX}")
+    version = content.get("version")
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+        raise DocumentError(path, "does not say its version; open a copy from before")
+    if version > VERSION:
+        raise DocumentError(
+            path,
+            f"was made by a newer NEP Studio (version {version}) and is left as it is; update this one",
+        )
+    workspace, robots = content.get("workspace"), content.get("robots", {})
+    if not isinstance(workspace, dict) or not isinstance(robots, dict):
+        raise DocumentError(path, "has no blocks in it; open a copy from before")
+    described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
+    others = {name: value for name, value in content.items() if name not in OURS}
+    return BehaviourFile(str(content.get("name") or path.stem), workspace, described, others)
+
+
+def write_file(path: Path, behaviour: BehaviourFile) -> None:
+    """Write a behaviour's file, atomically: the old one or the new one is there, never a part.
+
+    Raises DocumentError with what to do next; then the old file is whole.
+    """
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": behaviour.name,
+        "workspace": behaviour.workspace,
+        "robots": behaviour.robots,
+        **behaviour.others,
+    }
+    try:
+        data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
+        if len(data) > LARGEST_BYTES:
+            size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
+            said = f"would have {size:.1f} MB; at most {most:.0f} MB are read, use smaller pictures"
+            raise DocumentError(path, said)
+        write_atomically(path, data)
+    except RecursionError as error:
+        raise DocumentError(path, f"can't be written: {TOO_DEEP}") from error
+    except OSError as error:
+        reason = error.strerror or str(error)
+        room = "make room there or " if error.errno in FULL else ""
+        raise DocumentError(path, f"can't be written ({reason}); {room}save it in another place") from error

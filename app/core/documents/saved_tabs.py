@@ -1,0 +1,43 @@
+"""The tabs from one start to the next: which behaviours were open, and what of them was not saved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from app.core.documents.journal import Unsaved
+from app.core.documents.open_documents import Documents
+from app.core.storage.settings import Settings
+from app.errors import SettingsError
+
+KEY = "tabs"
+
+
+class KeptTabs:
+    """Writes the tabs into the settings whenever they change, and opens them again."""
+
+    def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
+        """``complain`` is told, in a sentence, that they can't be kept."""
+        self._settings, self._documents, self._complain = settings, documents, complain
+        self.active = False
+        """Whether this window is the one whose tabs come back; a second window's do not."""
+
+    def come_back(self, left: Sequence[Unsaved]) -> list[Unsaved]:
+        """Open the tabs of the last start, and keep them from now on.
+
+        Of ``left``, the unsaved work that dead Studios left, those are returned for which a person is to be
+        asked.
+        """
+        self.active = True
+        kept: dict[str, object] = self._settings.get(KEY, {})
+        taken = self._documents.put_back(kept, left, ended_well=kept.get("ended_well") is True)
+        self.keep()
+        return [each for each in left if each.journal not in taken]
+
+    def keep(self, *, ended_well: bool = False) -> None:
+        """Keep which tabs are open now; ``ended_well`` when the window closes in order."""
+        if not self.active:
+            return
+        try:
+            self._settings.set(KEY, {**self._documents.kept(), "ended_well": ended_well})
+        except SettingsError as error:
+            self._complain(str(error))

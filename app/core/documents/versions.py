@@ -1,0 +1,193 @@
+"""What a behaviour's file said before Studio wrote over it: kept aside, to be put back or looked at.
+
+A copy's name says of which file it is, when that was written over, and (a mark made of its path) where it is;
+its time is that of the file then.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.core.documents.file_format import SUFFIX
+from app.core.storage.atomic_file import make_private, private_folder, read_whole, write_atomically
+from app.core.storage.settings import data_home, home
+from app.errors import DocumentError
+
+NAME = "earlier"
+COPIES_KEPT = 300
+BYTES_KEPT = 500_000_000
+OF_ONE_FILE = 30
+NEWEST = 10
+"""So many of the newest of a file stay; of the others those go first that lie close together."""
+
+_STAMP = "%Y-%m-%d %H.%M.%S"
+_NAME = re.compile(
+    r"(?P<stem>.*), before (?P<stamp>\d{4}-\d\d-\d\d \d\d\.\d\d\.\d\d)(?: (?P<mark>[0-9a-f]{8}))?(?: \d+)?"
+    + re.escape(SUFFIX)
+)
+
+Stamp = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """A file as it was; ``copy`` holds those bytes."""
+
+    path: Path
+    copy: Path
+
+    def put_back(self) -> None:
+        """Write them into the file again. Raises DocumentError; then the file is untouched."""
+        try:
+            write_atomically(self.path, read_whole(self.copy))
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise DocumentError(self.path, f"can't be put back ({reason}); open {self.copy}") from error
+
+
+def keep_earlier(
+    path: Path, folder: Path | None = None, clock: Callable[[], float] = time.time
+) -> Earlier | None:
+    """Keep what the file says now; None when there is no file, or nothing in it.
+
+    The copies are in ``folder`` (default: ``earlier`` in Studio's folder for data), the newest 300 of them,
+    at most 30 of one file. What is kept already is not kept twice. DocumentError when it can't be kept.
+    """
+    where = _folder(folder)
+    if not path.is_file() or not path.stat().st_size:
+        return None
+    try:
+        data, written = read_whole(path), path.stat()
+        newest = next(iter(versions_of(path, where)), None)
+        if newest is not None and newest.copy.stat().st_size == len(data) and read_whole(newest.copy) == data:
+            return Earlier(path, newest.copy)
+        copy = free_path(where, f"{path.stem}, before", clock(), f" {_mark(path)}")
+        write_atomically(copy, data, private=True)
+        os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
+    except OSError as error:
+        reason = error.strerror or error
+        raise DocumentError(path, f"was not saved: what it said before can't be kept ({reason})") from error
+    with contextlib.suppress(OSError):  # another Studio was quicker
+        _thin_out(where, _mark(path))
+        _drop_oldest(where)
+    return Earlier(path, copy)
+
+
+@dataclass(frozen=True)
+class Version:
+    """One copy: of which file (its name), when that was written, and when it was written over."""
+
+    copy: Path
+    name: str
+    written_s: float
+    replaced_s: float
+    mark: str
+
+
+def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
+    """The versions of a file that are kept, the newest first."""
+    mark = _mark(path)
+    return [each for each in _newest_first(_folder(folder)) if each.mark == mark]
+
+
+def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
+    """Versions of other files of that name, the newest first: of a file that was moved here, for example."""
+    mark, stem = _mark(path), _plain(path.stem)
+    return [each for each in _newest_first(_folder(folder)) if each.mark != mark and each.name == stem]
+
+
+def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
+    """A behaviour's file in ``folder`` that is not there yet: its name, when, and a mark."""
+    stamp = time.strftime(_STAMP, time.localtime(now_s))
+    stem = f"{_plain(name)} {stamp}{mark}"
+    path = folder / f"{stem}{SUFFIX}"
+    number = 2
+    while path.exists():
+        path = folder / f"{stem} {number}{SUFFIX}"
+        number += 1
+    return path
+
+
+def stamp_of(path: Path) -> Stamp | None:
+    """What changes when somebody writes the file; None when there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
+
+
+def _folder(chosen: Path | None) -> Path:
+    return chosen if chosen is not None else data_home() / NAME
+
+
+def bring_here(old: Path | None = None, new: Path | None = None) -> None:
+    """Move the versions that a former Studio kept in the folder for configuration where they belong.
+
+    What can't be moved stays, and is tried again at the next start. Only their owner may read them.
+    """
+    old = old if old is not None else home() / NAME
+    new = new if new is not None else data_home() / NAME
+    if old != new and old.is_dir():
+        with contextlib.suppress(OSError):
+            private_folder(new)
+            for copy in old.glob(f"*{SUFFIX}"):
+                if not (new / copy.name).exists():
+                    shutil.move(copy, new / copy.name)
+            old.rmdir()
+    make_private(new, f"*{SUFFIX}")
+
+
+def _plain(name: str) -> str:
+    return "".join(c if c.isalnum() or c in " -_," else "_" for c in name).strip() or "behaviour"
+
+
+def _mark(path: Path) -> str:
+    """Differs for files in different places."""
+    where = os.path.normcase(path.resolve())
+    return hashlib.sha256(where.encode("utf-8", "surrogateescape")).hexdigest()[:8]
+
+
+def _newest_first(folder: Path) -> list[Version]:
+    found = [_version(copy) for copy in folder.glob(f"*{SUFFIX}")] if folder.is_dir() else []
+    known = [each for each in found if each is not None]
+    return sorted(known, key=lambda each: (each.replaced_s, each.written_s), reverse=True)
+
+
+def _version(copy: Path) -> Version | None:
+    told = _NAME.fullmatch(copy.name)
+    if told is None:
+        return None
+    try:
+        written = copy.stat().st_mtime
+        replaced = time.mktime(time.strptime(told["stamp"], _STAMP))
+    except (OSError, ValueError, OverflowError):
+        return None
+    return Version(copy, told["stem"], written, replaced, told["mark"] or "")
+
+
+def _thin_out(folder: Path, mark: str) -> None:
+    """Of a file that has too many copies, the one goes that leaves the smallest gap."""
+    found = [each for each in _newest_first(folder) if each.mark == mark]
+    while len(found) > OF_ONE_FILE:
+        gaps = {
+            place: found[place - 1].replaced_s - found[place + 1].replaced_s
+            for place in range(NEWEST, len(found) - 1)
+        }
+        found.pop(min(gaps, key=lambda place: gaps[place])).copy.unlink(missing_ok=True)
+
+
+def _drop_oldest(folder: Path) -> None:
+    left = BYTES_KEPT
+    for number, each in enumerate(_newest_first(folder)):
+        left -= each.copy.stat().st_size
+        if number and (number >= COPIES_KEPT or left < 0):
+            each.copy.unlink(missing_ok=True)

@@ -1,0 +1,292 @@
+"""Picture streams: one thread decodes the newest picture of each topic that somebody looks at.
+
+Older pictures that wait are never decoded: at overload a picture is shown late by one decoding, not by a
+queue. A picture is decoded no larger than it is shown (`ImageStream.want`).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from app.core.messages.picture import Picture, Size, decode
+from app.core.network.watches import Look
+from nep.messages.message import Message
+
+RATE_WINDOW_S = 2.0
+RATE_DELAY_S = 0.25
+
+
+class Rate:
+    """Pictures a second by the time of their arrival, over two seconds; None until two were seen.
+
+    The window ends a little before now: pictures that arrived and may still be painted are not judged yet, so
+    that "shown 30 of 30/s" compares the same pictures.
+    """
+
+    def __init__(self) -> None:
+        """Have seen nothing."""
+        self._times: deque[float] = deque(maxlen=4096)
+
+    def add(self, arrived_s: float) -> None:
+        """A picture that arrived at this time (monotonic seconds)."""
+        self._times.append(arrived_s)
+
+    def per_second(self, now: float) -> float | None:
+        """How many a second; None when fewer than two are in the window."""
+        end = now - RATE_DELAY_S
+        while self._times and self._times[0] <= end - RATE_WINDOW_S:
+            self._times.popleft()
+        counted = sum(1 for time_s in self._times if time_s <= end)
+        if counted < 2:
+            return None
+        return counted / min(RATE_WINDOW_S, max(end - self._times[0], 1e-3))
+
+
+@dataclass(eq=False)
+class ImageStream:
+    """The pictures of one topic, for one panel. Figures that are not known are None.
+
+    While it is `held` the picture stays; what arrives is counted and not decoded. `awaits_picture` until one
+    came since somebody looks, or looks again after a `rest`.
+    """
+
+    topic: str
+    _images: Images
+    _watch: Watching
+    picture: Picture | None = None
+    error: str | None = None
+    held: bool = False
+    awaits_picture: bool = True
+    wish: Size | None = None
+    """What `Images` keeps here and reads under its lock: the size that is wanted, ..."""
+    waiting: tuple[Message, float] | None = None
+    """... the newest message that is not decoded yet, and when it arrived, ..."""
+    arriving: Rate = field(default_factory=Rate)
+    """... and how many come."""
+    _shown: Rate = field(default_factory=Rate)
+    _looked_s: float = 0.0
+    _resting: bool = False
+    closed: bool = False
+
+    @property
+    def resting(self) -> bool:
+        """Whether nobody can see it now."""
+        return self._resting
+
+    @property
+    def arriving_hz(self) -> float | None:
+        """Pictures a second that arrive here."""
+        with self._images.lock:
+            return self.arriving.per_second(self._images.clock())
+
+    @property
+    def shown_hz(self) -> float | None:
+        """Pictures a second that were painted."""
+        return self._shown.per_second(self._images.clock())
+
+    @property
+    def silent_s(self) -> float | None:
+        """Seconds in which somebody looked and no picture came; None before the first."""
+        picture = self.picture
+        if picture is None:
+            return None
+        return self._images.clock() - max(picture.received_s, self._looked_s)
+
+    @property
+    def age_s(self) -> float | None:
+        """How old the picture is: seconds since it arrived; None before the first."""
+        return self._images.clock() - self.picture.received_s if self.picture is not None else None
+
+    def want(self, size: Size | None) -> None:
+        """The picture is shown so large (pixels of the screen); None: every pixel is wanted.
+
+        The picture that is there is decoded again when it was decoded smaller.
+        """
+        self._images.want(self, size)
+
+    def hold(self, held: bool) -> None:
+        """Keep the picture as it is, or let the newest one come again."""
+        self._images.hold(self, held)
+
+    def shown(self) -> None:
+        """The panel painted `picture` (said once for each)."""
+        if self.picture is not None:
+            self._shown.add(self.picture.received_s)
+
+    def rest(self) -> None:
+        """Nobody can see it: nothing is received or decoded until `wake`; the picture stays."""
+        if not self._resting:
+            self._resting = self.awaits_picture = True
+            self._images.forget(self)
+            self._watch.rest()
+
+    def wake(self) -> None:
+        """Somebody looks again after a `rest`."""
+        if self._resting and not self.closed:
+            self._resting = False
+            self._looked_s = self._images.clock()
+            self._watch.wake()
+            self._images.add(self)
+
+    def close(self) -> None:
+        """Nobody looks any more; said twice it does nothing."""
+        self._resting = self.closed = True
+        self._images.forget(self)
+        self._watch.close()
+
+
+class Watching(Look, Protocol):
+    """What keeps a stream's topic subscribed (`app.core.network.watches.Watch`)."""
+
+    def close(self) -> None:
+        """For good; said twice it does nothing."""
+
+
+class Images:
+    """All open streams and the thread that decodes for them."""
+
+    def __init__(self, watch: Callable[[str], Watching], clock: Callable[[], float] = time.monotonic) -> None:
+        """``watch(topic)`` subscribes until it is closed; ``clock`` gives monotonic seconds."""
+        self._watch = watch
+        self.clock = clock
+        self.lock = threading.Lock()
+        self._arrived = threading.Condition(self.lock)
+        self._streams: dict[str, list[ImageStream]] = {}
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def stream(self, topic: str) -> ImageStream:
+        """Look at a topic's pictures until the stream is closed."""
+        stream = ImageStream(topic, self, self._watch(topic))
+        self.add(stream)
+        return stream
+
+    def add(self, stream: ImageStream) -> None:
+        """A stream wants pictures, for the first time or again."""
+        with self.lock:
+            self._streams.setdefault(stream.topic, []).append(stream)
+            stream.arriving = Rate()
+            self._arrived.notify()  # one that is held may be wanted larger
+            if self._thread is None and not self._closing:
+                self._thread = threading.Thread(target=self._decode_all, name="studio-images", daemon=True)
+                self._thread.start()
+
+    def offer(self, messages: Sequence[Message]) -> None:
+        """A sink: keep the newest message of each topic that somebody looks at. Called in nep's thread."""
+        if not self._streams:
+            return
+        with self.lock:
+            now = self.clock()
+            for message in messages:
+                for stream in self._streams.get(message.topic, ()):
+                    if not stream.held:
+                        stream.waiting = (message, now)
+                    stream.arriving.add(now)
+            self._arrived.notify()
+
+    def forget(self, stream: ImageStream) -> None:
+        """A stream was closed, or rests."""
+        with self.lock:
+            if not stream.held:
+                stream.waiting = None
+            left = [other for other in self._streams.get(stream.topic, []) if other is not stream]
+            if left:
+                self._streams[stream.topic] = left
+            else:
+                self._streams.pop(stream.topic, None)
+
+    def want(self, stream: ImageStream, size: Size | None) -> None:
+        """See `ImageStream.want`."""
+        with self.lock:
+            if stream.wish == size:
+                return
+            stream.wish = size
+            picture = stream.picture
+            if picture is None or picture.whole or picture.message is None or stream.waiting is not None:
+                return
+            if _too_small(picture, size):
+                stream.waiting = (picture.message, picture.received_s)
+                self._arrived.notify()
+
+    def hold(self, stream: ImageStream, held: bool) -> None:
+        """See `ImageStream.hold`."""
+        with self.lock:
+            stream.held = held
+            if held:
+                stream.waiting = None
+
+    def close(self) -> None:
+        """End the thread."""
+        with self.lock:
+            self._closing = True
+            self._arrived.notify()
+        if self._thread is not None:
+            self._thread.join(timeout=2)
+
+    def _decode_all(self) -> None:
+        while True:
+            with self.lock:
+                while not self._closing and not self._any_waiting():
+                    self._arrived.wait()
+                if self._closing:
+                    return
+                work = self._take_waiting()
+            for streams, message, arrived_s, size in work:
+                try:
+                    picture, error = decode(message, arrived_s, size)
+                except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
+                    picture, error = None, f"“{message.topic}” sends a picture that can't be shown: {problem}"
+                with self.lock:
+                    for stream in streams:
+                        _give(stream, message, picture, error)
+
+    def _any_waiting(self) -> bool:
+        every = (stream for streams in self._streams.values() for stream in streams)
+        return any(stream.waiting is not None for stream in every)
+
+    def _take_waiting(self) -> list[tuple[list[ImageStream], Message, float, Size | None]]:
+        work = []
+        for streams in self._streams.values():
+            waiting = [stream for stream in streams if stream.waiting is not None]
+            if not waiting:
+                continue
+            of_message: dict[int, list[ImageStream]] = {}
+            for stream in waiting:  # one held back decodes its own picture again
+                of_message.setdefault(id(stream.waiting[0]), []).append(stream)  # type: ignore[index]
+            for together in of_message.values():
+                message, arrived_s = together[0].waiting  # type: ignore[misc]
+                work.append((together, message, arrived_s, _largest(together)))
+            for stream in waiting:
+                stream.waiting = None
+        return work
+
+
+def _give(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
+    before = stream.picture
+    if stream.resting:
+        return  # nobody can see it; the next one after `wake` is shown
+    if stream.held and before is not None and before.message is not message:
+        return  # decoded while a person froze the picture before
+    stream.error = error
+    if picture is not None:
+        stream.picture = picture
+        stream.awaits_picture = stream.awaits_picture and before is not None and before.message is message
+
+
+def _largest(streams: Sequence[ImageStream]) -> Size | None:
+    """How large a picture has to be for all of them; None: every pixel."""
+    wishes = [stream.wish for stream in streams]
+    known = [wish for wish in wishes if wish is not None]
+    if len(known) < len(wishes):
+        return None
+    return max(wish[0] for wish in known), max(wish[1] for wish in known)
+
+
+def _too_small(picture: Picture, size: Size | None) -> bool:
+    rows, columns = picture.bgra.shape[:2]
+    return size is None or columns < size[0] or rows < size[1]

@@ -1,0 +1,321 @@
+"""What is on the network, as the window shows it: every topic with its figures and its newest message."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+
+from app.core.network.mailbox import Batch
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView, TopicInfo
+
+GONE_SHOWN_S = 10.0
+RATES_KEPT = 60
+AT_ONCE = 1500
+START_S = 5.0
+"""A camera that is switched on when somebody subscribes it has sent its first picture by then."""
+FIGURES_LATE_S = 6.0
+"""Nodes of large graphs tell their counts every 5 s; what only they tell is not judged earlier."""
+
+
+@dataclass(slots=True, eq=False)
+class Topic:
+    """One topic. Figures that are not known are None; a panel shows them blank.
+
+    ``rate_hz`` messages a second and ``bandwidth_Bps`` bytes a second as the publishers tell, ``age_s``
+    seconds since the newest message by its stamp, ``silent_s`` seconds in which somebody listened and nothing
+    came (None while nobody listens: who sends only when heard is not silent), ``lost`` messages and
+    ``loss_ratio`` of those that a subscriber should have had. ``gone_s`` is None while it is there, else the
+    seconds since it vanished. ``newest``, ``previous`` are kept, and ``received``, ``dropped`` (of those,
+    before a panel saw them) and ``missed`` (sent, but not received here) counted, only while somebody looks.
+    """
+
+    name: str
+    msg_type: str = ""
+    codec: str = "bytes"
+    publishers: int = 0
+    publisher_nodes: tuple[str, ...] = ()
+    subscribers: int = 0
+    rate_hz: float | None = None
+    bandwidth_Bps: float | None = None  # noqa: N815  bytes a second, as the vocabulary spells it
+    age_s: float | None = None
+    silent_s: float | None = None
+    lost: int | None = None
+    loss_ratio: float | None = None
+    new: bool = False
+    gone_s: float | None = None
+    rates: deque[float] = field(default_factory=lambda: deque(maxlen=RATES_KEPT))
+    newest: Message | None = None
+    previous: Message | None = None
+    received: int = 0
+    dropped: int = 0
+    missed: int = 0
+    decode_error: str | None = None
+    watched: bool = False
+    gone_since: float | None = None
+    last_stamp_ns: int | None = None
+    last_received: float | None = None
+    heard_since: float | None = None
+    moved_at: float | None = None
+    info: TopicInfo | None = None
+
+    @property
+    def shown_of(self) -> tuple[int, int]:
+        """How many messages were kept for the panels, of how many sent, since somebody looks."""
+        return self.received - self.dropped, self.received + self.missed
+
+    def facts(self) -> tuple[object, ...]:
+        """What changes seldom; a panel rebuilds its rows when one of these changes."""
+        return (self.msg_type, self.codec, self.publisher_nodes, self.new, self.gone_since is not None)
+
+
+class Topics:
+    """All topics, in the order in which they were first seen. One thread uses it (the window's)."""
+
+    def __init__(self, own: tuple[str, int] | None = None) -> None:
+        """Know no topic yet. ``own`` is the computer and process that looks (default: this one).
+
+        A topic that only the looking process subscribes has vanished: looking does not keep it.
+        """
+        self._own = own if own is not None else (platform.node(), os.getpid())
+        self._topics: dict[str, Topic] = {}
+        self._first_graph = True
+        self._seen = (-1, -1)
+        self._view: GraphView | None = None
+        self._aged = 0
+        self._told_at = 0.0
+        self._past: set[str] = set()  # vanished long ago, but somebody still looks at them
+        self.revision = 0
+        self.values_revision = 0
+
+    def __iter__(self) -> Iterator[Topic]:
+        """Every topic, the vanished ones too for ten seconds."""
+        return (topic for topic in self._topics.values() if topic.name not in self._past)
+
+    def __len__(self) -> int:
+        """How many `__iter__` gives."""
+        return len(self._topics) - len(self._past)
+
+    def __getitem__(self, name: str) -> Topic:
+        """The topic of that name; KeyError when there is none."""
+        return self._topics[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether the name is known."""
+        return name in self._topics
+
+    def get(self, name: str) -> Topic | None:
+        """The topic of that name, or None."""
+        return self._topics.get(name)
+
+    def live(self) -> list[Topic]:
+        """Those that have not vanished."""
+        return [topic for topic in self._topics.values() if topic.gone_since is None]
+
+    def of_type(self, *msg_types: str) -> list[Topic]:
+        """The live topics of one of these types."""
+        return [topic for topic in self.live() if topic.msg_type in msg_types]
+
+    def mark_seen(self, name: str) -> None:
+        """A person looked at it: it is not new any more."""
+        topic = self._topics.get(name)
+        if topic is not None and topic.new:
+            topic.new = False
+            self.revision += 1
+
+    def update(self, view: GraphView, now: float) -> None:
+        """Take over a new graph; ``now`` is a monotonic clock in s.
+
+        Where nobody came or went only the figures are renewed, of very many topics by and by (`age`).
+        """
+        seen = (view.epoch, view.revision)
+        if seen != self._seen:
+            self._take_all(view, now)
+        elif len(self._topics) <= AT_ONCE:
+            _renew(self._topics.values(), view, now)
+        self._seen, self._view, self._told_at = seen, view, now
+        self.values_revision += 1
+
+    def _take_all(self, view: GraphView, now: float) -> None:
+        own = {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
+        shown = {
+            name: info
+            for name, info in view.topics.items()
+            if info.publishers or any(each.node_id not in own for each in info.subscribers)
+        }
+        for name, info in shown.items():
+            topic = self._topics.get(name)
+            if topic is None:
+                topic = self._topics[name] = Topic(name, new=not self._first_graph)
+                self.revision += 1
+            self._take(topic, info, view, now)
+        for name, topic in self._topics.items():
+            if name not in shown and topic.gone_since is None:
+                self._vanish(topic, now)
+        self._first_graph = False
+
+    def forget(self, now: float) -> None:
+        """The master is gone: nothing is known to be there."""
+        for topic in self._topics.values():
+            if topic.gone_since is None:
+                self._vanish(topic, now)
+
+    def age(self, now: float, now_ns: int) -> None:
+        """Let time pass: ages grow, what vanished ten seconds ago leaves.
+
+        Of very many topics each call takes the next `AT_ONCE`, and renews their figures.
+        """
+        if self._aged >= len(self._topics):
+            self._aged = 0
+        begin, self._aged = self._aged, self._aged + AT_ONCE
+        some = list(islice(self._topics.values(), begin, self._aged))
+        if self._view is not None and len(self._topics) > AT_ONCE:
+            _renew(some, self._view, self._told_at)
+        for topic in some:
+            if topic.gone_since is not None:
+                topic.gone_s = now - topic.gone_since
+                if topic.gone_s >= GONE_SHOWN_S:
+                    self._leave(topic)
+            else:
+                topic.age_s = _age(topic, now, now_ns)
+                topic.silent_s = _silence(topic, now, self._told_at)
+
+    def _leave(self, topic: Topic) -> None:
+        """It vanished ten seconds ago; one that somebody still looks at only leaves the lists."""
+        listed = topic.name not in self._past
+        if topic.watched:
+            self._past.add(topic.name)
+        else:
+            self._past.discard(topic.name)
+            del self._topics[topic.name]
+        self.revision += listed
+
+    def add(self, name: str, batch: Batch, now: float) -> None:
+        """Take over what arrived on a watched topic."""
+        topic = self._topics.get(name)
+        if topic is None:
+            topic = self._topics[name] = Topic(name, new=True)
+            self.revision += 1
+        if not batch.messages:
+            return
+        topic.previous = batch.messages[-2] if len(batch.messages) > 1 else topic.newest
+        topic.newest = batch.messages[-1]
+        topic.received += batch.arrived
+        topic.dropped += batch.dropped
+        topic.last_received = topic.moved_at = now
+        self.values_revision += 1
+
+    def check(self, topic: Topic) -> bool:
+        """Decode the newest message of a topic that somebody reads; the sentence is kept.
+
+        Whether it is good.
+        """
+        if topic.newest is None:
+            return True
+        try:
+            _ = topic.newest.payload
+        except NepError as error:
+            topic.decode_error = str(error)
+            return False
+        topic.decode_error = None
+        return True
+
+    def unwatch(self, name: str) -> None:
+        """Nobody looks any more: forget its messages."""
+        topic = self._topics.get(name)
+        if topic is not None:
+            topic.newest = topic.previous = None
+            topic.decode_error = None
+            topic.received = topic.dropped = topic.missed = 0
+            topic.last_received = None
+            topic.watched = False
+
+    def _vanish(self, topic: Topic, now: float) -> None:
+        topic.gone_since, topic.gone_s = now, 0.0
+        topic.publishers, topic.publisher_nodes = 0, ()
+        topic.rate_hz = topic.bandwidth_Bps = topic.age_s = None
+        topic.silent_s = topic.heard_since = topic.moved_at = None
+        self.revision += 1
+
+    def _take(self, topic: Topic, info: TopicInfo, view: GraphView, now: float) -> None:
+        before = topic.facts()
+        topic.heard_since = _heard_since(topic, info, now)
+        topic.msg_type, topic.codec = info.msg_type, info.codec
+        topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
+        topic.publisher_nodes = _names(info, view)
+        topic.gone_since = topic.gone_s = None
+        self._past.discard(topic.name)
+        _take_figures(topic, info, now)
+        if topic.facts() != before:
+            self.revision += 1
+
+
+def _renew(topics: Iterable[Topic], view: GraphView, now: float) -> None:
+    find = view.topics.get
+    for topic in topics:
+        info = find(topic.name)
+        if info is not None and info is not topic.info and topic.gone_since is None:
+            _take_figures(topic, info, now)
+
+
+def _take_figures(topic: Topic, info: TopicInfo, now: float) -> None:
+    if info.last_stamp_ns is not None and (
+        topic.info is None or info.last_stamp_ns != topic.info.last_stamp_ns
+    ):
+        topic.moved_at = now
+    topic.info = info
+    topic.rate_hz = rate_hz = info.rate_hz
+    topic.bandwidth_Bps = info.bandwidth_Bps
+    topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
+    stamp_ns, before = info.last_stamp_ns, topic.last_stamp_ns
+    if stamp_ns is not None and (before is None or stamp_ns > before):
+        topic.last_stamp_ns = stamp_ns
+    if rate_hz is not None:
+        topic.rates.append(rate_hz)
+
+
+def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
+    names = {view.nodes[p.node_id].name for p in info.publishers if p.node_id in view.nodes}
+    return tuple(sorted(names))
+
+
+def _age(topic: Topic, now: float, now_ns: int) -> float | None:
+    stamp, newest = topic.last_stamp_ns, topic.newest
+    if newest is not None and newest.stamp_ns is not None:
+        stamp = max(stamp or 0, newest.stamp_ns)
+    if stamp is not None:
+        return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
+    return now - topic.last_received if topic.last_received is not None else None
+
+
+def _heard_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
+    """Since when the publishers that are there have had a subscriber; None while they have none."""
+    if not info.publishers or not info.subscribers:
+        return None
+    before = {each.id for each in topic.info.publishers} if topic.info is not None else set()
+    anew = topic.heard_since is None or not before & {each.id for each in info.publishers}
+    return now if anew else topic.heard_since
+
+
+def _silence(topic: Topic, now: float, told_at: float) -> float | None:
+    """How long nothing came although somebody listened, on our own clock: that of the sender may be wrong.
+
+    What arrives here is known to the moment; of others only what the master told last, at ``told_at``.
+    """
+    if topic.heard_since is None or topic.moved_at is None:
+        return None
+    until = now if topic.watched else told_at
+    since = topic.moved_at if topic.moved_at >= topic.heard_since else topic.heard_since + START_S
+    silent_s = max(0.0, until - since)
+    return silent_s if topic.watched or silent_s >= FIGURES_LATE_S else 0.0
+
+
+def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:
+    """Messages a second of all topics together; None when no publisher told its rate."""
+    known = [info.rate_hz for info in topics if info.rate_hz is not None]
+    return sum(known) if known else None

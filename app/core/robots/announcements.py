@@ -1,0 +1,233 @@
+"""Who says that it is a robot: one program for each name, the one that announced it first.
+
+What others say under the same name changes nothing and is told as a claim. A robot's program is replaced only
+when the master does not list its announcement any more.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from app.core.network.mailbox import Batch
+from app.core.network.watches import Watch, Watches
+from app.errors import DescriptionError
+from app.robots.description import Robot, announced
+from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
+
+MOST_ROBOTS = 200
+MOST_CLAIMANTS = 8
+MOST_OWNERS = 4
+"""Programs of one robot whose descriptions are kept, should one of them come back."""
+READING_SHARE = 0.2
+"""So much of the window's time may go into reading descriptions in the long run, whoever sends how many."""
+READING_S = 1.0
+"""So much may be read at once after a rest: all robots of a room that come together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """Somebody says of itself what is not believed: what is wrong, and what it means."""
+
+    title: str
+    detail: str
+
+
+@dataclass(slots=True)
+class _Announced:
+    """A description topic: whose it is, and the newest description of each of its publishers.
+
+    ``owners`` are the nodes whose it was, the newest at the front. What they said is kept while they are not
+    listed: a latched message comes once, and a program that only slept comes back over the same connection.
+    """
+
+    watch: Watch | None = None
+    owner: Identity | None = None
+    owners: tuple[str, ...] = ()
+    told: dict[int, Message] = field(default_factory=dict)
+    parsed: Message | None = None
+    robot: Robot | None = None
+    wrong: Claim | None = None
+    twins: tuple[Identity, ...] = ()
+
+
+class Announcements:
+    """The descriptions on the network, each with the program that it counts from. One thread uses it."""
+
+    def __init__(
+        self, watches: Watches, senders: Senders, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """``watches`` subscribes description topics; ``senders`` learns who publishes them."""
+        self._watches, self._senders, self._clock = watches, senders, clock
+        self._may_read_s, self._looked_s = READING_S, clock()
+        self._waiting: set[str] = set()
+        self._topics: dict[str, _Announced] = {}
+        self._left_out = 0
+
+    def is_announced(self, topic: str) -> bool:
+        """Whether somebody announces a robot on this topic now."""
+        known = self._topics.get(topic)
+        return known is not None and known.watch is not None
+
+    @property
+    def robots(self) -> Iterator[tuple[str, Robot, Identity]]:
+        """Each robot that is announced now: its topic, its description, its program."""
+        for topic, known in self._topics.items():
+            if known.watch is not None and known.robot is not None and known.owner is not None:
+                yield topic, known.robot, known.owner
+
+    @property
+    def claims(self) -> Mapping[str, Claim]:
+        """What is not believed, by an id."""
+        found = {}
+        for topic, known in self._topics.items():
+            if known.watch is None:
+                continue
+            if known.twins and known.owner is not None:
+                name = known.robot.name if known.robot is not None else topic
+                others = " and ".join(twin.words for twin in known.twins[:MOST_CLAIMANTS])
+                found[topic] = Claim(
+                    f"{len(known.twins) + 1} programs say that they are {name}.",
+                    f"{known.owner.words} was first and is the robot; {others} changes nothing. Close one.",
+                )
+            elif known.wrong is not None:
+                found[topic] = known.wrong
+        if self._left_out:
+            title = f"{self._left_out} more robots than the {MOST_ROBOTS} that Studio shows are announced."
+            found["robots"] = Claim(title, "Find out which program announces them and close it.")
+        return found
+
+    def update(self, view: GraphView) -> None:
+        """Take over a new graph: who announces robots now, and whose announcement counts."""
+        there = {
+            topic: nodes
+            for topic, info in view.topics.items()
+            if info.msg_type == DESCRIPTION_TYPE and (nodes := publishing(view, topic))
+        }
+        self._senders.learn(view, there)
+        for topic, known in self._topics.items():
+            if topic not in there:
+                self._end(known)
+        self._left_out = 0
+        for topic, nodes in there.items():
+            begun = self._topics.get(topic) or self._begin(topic)
+            if begun is None:
+                self._left_out += 1
+                continue
+            known = begun
+            if known.watch is None:
+                known.watch = self._watches.open([topic])
+            if known.owner is None or known.owner.node_id not in nodes:
+                known.owner, known.robot, known.parsed = identity_of(view, nodes[0]), None, None
+                known.wrong = None
+                known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MOST_OWNERS]
+            others = (node for node in nodes if node != known.owner.node_id)
+            known.twins = tuple(identity_of(view, node) for node in others)
+            ids = {publisher.id for publisher in view.topics[topic].publishers}
+            known.told = {
+                id: message
+                for id, message in known.told.items()
+                if id in ids or self._senders.node_of(message) in known.owners
+            }
+            self._waiting.add(topic)
+        self._read()
+
+    def add(self, batches: Mapping[str, Batch]) -> bool:
+        """Take over the descriptions that arrived; whether any was read, also one that came before."""
+        for topic in batches.keys() & self._topics.keys():
+            known = self._topics[topic]
+            for message in batches[topic].messages:
+                if message.publisher is not None:
+                    known.told.pop(message.publisher, None)  # the newest stands at the end
+                    known.told[message.publisher] = message
+            while len(known.told) > MOST_CLAIMANTS:
+                self._drop_one(known)
+            self._waiting.add(topic)
+        return self._read()
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _begin(self, topic: str) -> _Announced | None:
+        """A new topic; None when there are too many. Topics that are gone make room."""
+        if len(self._topics) >= MOST_ROBOTS:
+            gone = next((name for name, known in self._topics.items() if known.watch is None), None)
+            if gone is None:
+                return None
+            del self._topics[gone]
+        return self._topics.setdefault(topic, _Announced())
+
+    def _end(self, known: _Announced) -> None:
+        """Nobody announces it any more; whose it was, and what that said, is kept: that one may come back.
+
+        After a new master, or when it only slept, it does so over the connection that it has.
+        """
+        if known.watch is not None:
+            known.watch.close()
+        known.watch, known.robot, known.parsed, known.twins = None, None, None, ()
+        known.told = {id: told for id, told in known.told.items() if self._is_owners(known, told)}
+
+    def _drop_one(self, known: _Announced) -> None:
+        """Make room among the publishers; what the robot's programs said stays, the present one's longest."""
+        for owners in (known.owners, known.owners[:1]):
+            for id, told in known.told.items():
+                if self._senders.node_of(told) not in owners:
+                    del known.told[id]
+                    return
+        del known.told[next(iter(known.told))]
+
+    def _is_owners(self, known: _Announced, message: Message) -> bool:
+        return known.owner is not None and self._senders.node_of(message) == known.owner.node_id
+
+    def _read(self) -> bool:
+        """Parse those that wait, first of who has just come, then the shortest; whether there were any.
+
+        When too much time went into them lately the rest waits: a program that changes a long description
+        again and again must not hold up the window, with its Stop.
+        """
+        now = self._clock()
+        self._may_read_s = min(READING_S, self._may_read_s + (now - self._looked_s) * READING_SHARE)
+        self._looked_s = now
+        wait = {topic: newest for topic in self._waiting if (newest := self._unread(topic)) is not None}
+        self._waiting = set(wait)
+
+        def turn(each: tuple[str, Message]) -> tuple[bool, int]:
+            return self._topics[each[0]].parsed is not None, len(each[1].data)
+
+        for topic, newest in sorted(wait.items(), key=turn):
+            if self._may_read_s <= 0:
+                break
+            began = self._clock()
+            self._parse(topic, newest)
+            self._may_read_s -= self._clock() - began
+            self._waiting.discard(topic)
+        return len(self._waiting) < len(wait)
+
+    def _unread(self, topic: str) -> Message | None:
+        """The newest description of the robot's own program, if nobody has parsed it yet."""
+        known = self._topics.get(topic)
+        if known is None or known.watch is None:
+            return None
+        newest = next((told for told in reversed(known.told.values()) if self._is_owners(known, told)), None)
+        return None if newest is known.parsed else newest
+
+    def _parse(self, topic: str, newest: Message) -> None:
+        known = self._topics[topic]
+        known.parsed, known.wrong = newest, None
+        try:
+            robot = announced(newest)
+        except NepError:
+            return  # the session's alert `message:<topic>` says so; what it said before still counts
+        except DescriptionError as error:
+            said = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
+            whose = known.owner.words if known.owner is not None else topic
+            before = "" if known.robot is None else " What it said before still counts."
+            known.wrong = Claim(said, f"It comes from {whose}, whose driver is to be mended.{before}")
+            return
+        wrong = wrong_topic(robot, topic)
+        known.robot = robot if wrong is None else None
+        if wrong is not None:
+            known.wrong = Claim(f"{wrong}.", "Find out what this program is and close it.")

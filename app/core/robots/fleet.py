@@ -1,0 +1,538 @@
+"""The robots that are there.
+
+Found by their description, watched by their sensors, tried out by their actions.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from app.core.network.mailbox import Batch
+from app.core.network.watches import Watch, Watches
+from app.core.robots.announcements import Announcements, Claim
+from app.core.robots.heartbeat import Heartbeat
+from app.core.robots.known import KnownRobots
+from app.core.robots.motion_permission import MayNotMoveError, Moving
+from app.core.robots.rize_names import RizeNames
+from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
+from app.core.robots.stop import MOST_TOPICS
+from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S
+from app.core.robots.tries import Tries
+from app.core.storage.settings import Settings
+from app.errors import AppError, RobotInputError, RobotUnknownError
+from app.robots import rize
+from app.robots.description import Robot, topic_of
+from app.robots.identity import (
+    GATEWAY,
+    Identity,
+    Senders,
+    foreign_topic,
+    hearing,
+    publishing,
+    said_of_stop,
+)
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
+
+COMMAND_TYPE = "robot/command"
+MOST_HELD = 256
+"""Answers of publishers that no master has told of yet, kept until the next graph."""
+MOST_EARLIER = 4
+
+
+class Processes(Protocol):
+    """What is needed to know about the processes of robots."""
+
+    def is_ours(self, identity: Identity) -> bool:
+        """Whether this program is a virtual robot of this person."""
+
+    def has_ended(self, identity: Identity) -> bool:
+        """Whether it is sure that this program runs no more."""
+
+
+class Believed:
+    """Believes every robot that says that it is virtual (what tests need)."""
+
+    def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
+        """All are."""
+        return True
+
+    def has_ended(self, identity: Identity) -> bool:  # noqa: ARG002
+        """Nobody knows."""
+        return False
+
+
+class Fleet:
+    """All robots, in the order in which they came. One thread uses it (the window's)."""
+
+    def __init__(
+        self,
+        watches: Watches,
+        submit: Callable[[str, Callable[[Node], None]], None],
+        clock: Callable[[], float] = time.monotonic,
+        settings: Settings | None = None,
+        processes: Processes | None = None,
+    ) -> None:
+        """``watches`` subscribes topics, ``submit`` does something with the node in the source's thread.
+
+        ``settings`` keep who may move and who was here; without them only until this ends. ``processes`` know
+        which robots are virtual; without them every robot is that says so.
+        """
+        self._watches = watches
+        self._submit = submit
+        self._clock = clock
+        self._links: dict[str, RobotLink] = {}
+        self._processes = processes if processes is not None else Believed()
+        self._senders = Senders()
+        self._announcements = Announcements(watches, self._senders, clock)
+        self._names: dict[str, str] = {}
+        self._view = GraphView(0, 0)
+        self._held: deque[tuple[str, Message]] = deque(maxlen=MOST_HELD)
+        self._taken: dict[str, Claim] = {}
+        self._notes: list[str] = []
+        self._rize = RizeNames()
+        self._rize_events: Watch | None = None
+        self._alive = Heartbeat(SENDER)
+        self.moving, self.known = Moving(settings, self._identity_of), KnownRobots(settings)
+        self._tries = Tries(self._send, self._alive.rest, clock)
+        self._chosen = ""
+        self._told = False
+        self._settled: dict[str, None] = {}
+        self.revision = 0
+
+    @property
+    def links(self) -> Sequence[RobotLink]:
+        """All robots seen since the start, also those that are away now."""
+        return tuple(self._links.values())
+
+    @property
+    def connected(self) -> tuple[RobotLink, ...]:
+        """Those that are there now."""
+        return tuple(link for link in self._links.values() if link.connected)
+
+    def is_there(self, name: str) -> bool | None:
+        """Whether a robot of this name is there now, also one that has not yet told what it can do.
+
+        None while nobody has told who is there.
+        """
+        link = self._links.get(name)
+        if (link is not None and link.connected) or self._announcements.is_announced(
+            topic_of(name, "description")
+        ):
+            return True
+        return False if self._told else None
+
+    def link(self, name: str) -> RobotLink | None:
+        """The robot of that name, or None."""
+        return self._links.get(name)
+
+    @property
+    def shown(self) -> RobotLink | None:
+        """The robot that panels of one robot show: the chosen one, else a virtual one, else the first."""
+        chosen = self._links.get(self._chosen)
+        if chosen is not None and chosen.connected:
+            return chosen
+        there = self.connected
+        return next((link for link in there if link.virtual), there[0] if there else chosen)
+
+    def choose(self, name: str) -> None:
+        """Let the panels of one robot show this one."""
+        if name != self._chosen:
+            self._chosen = name
+            self.revision += 1
+
+    # -- what a person does ----------------------------------------------------------------------------------
+
+    def look_at(self, name: str) -> Watch:
+        """A panel shows this robot: its sensors arrive until the watch is closed.
+
+        Raises RobotUnknownError.
+        """
+        return self._watches.open(topics_of(self._get(name).robot))
+
+    def invoke(self, name: str, action: str, input: Payload) -> Invocation:
+        """Try an action.
+
+        Raises RobotUnknownError, RobotInputError with a sentence for each wrong value, or MayNotMoveError
+        when a person is to be asked first: it is tried then when the answer is yes.
+        """
+        link = self._get(name)
+        described = link.robot.action(action)
+        if described is None:
+            raise RobotInputError((f"{name} can't {action}",))
+        wrong = described.check(input)
+        if wrong:
+            raise RobotInputError(tuple(wrong))
+        if not self.moving.permits([(link.robot, [action])], lambda: self._try_again(name, action, input)):
+            raise MayNotMoveError([name])
+        invocation = self._tries.begin(link, described, input)
+        if invocation.running and link.publisher is not None and link.robot.dialect == "native":
+            self._alive.beat(name, link.publisher)
+        return invocation
+
+    def _try_again(self, name: str, action: str, input: Payload) -> None:
+        """Do what was asked before a person said that the robot may move."""
+        try:
+            self.invoke(name, action, input)
+        except AppError:
+            return  # it has changed or gone meanwhile, which its panel says
+
+    def cancel(self, name: str, action: str) -> None:
+        """Cancel the action that was tried last; nothing happens when it has ended."""
+        self._tries.cancel(self._get(name), action)
+
+    def world(self, name: str, change: Payload) -> None:
+        """Change the world of a virtual robot: touch its head, move the ball, say a word.
+
+        Of one that Studio does not know to be virtual a person is asked first, as before it moves.
+        """
+        link = self._get(name)
+        actions = [action.name for action in link.robot.actions]
+        may = self.moving.permits([(link.robot, actions)], lambda: self._change_again(name, change))
+        if may and link.world is not None:
+            link.world.publish(dict(change))
+
+    def _change_again(self, name: str, change: Payload) -> None:
+        """Do what was asked before a person said that the robot may move."""
+        if name in self._links:
+            self.world(name, change)
+
+    def told_to_stop(self, names: Iterable[str]) -> None:
+        """These robots are being told to stop; `stopped` says what each did."""
+        for link in map(self._links.get, names):
+            if link is not None and link.stop_began_s is None:
+                link.stop_began_s = self._clock()
+
+    @property
+    def stopping(self) -> tuple[str, ...]:
+        """Those that were told to stop and have not answered yet."""
+        return tuple(link.name for link in self._links.values() if link.stop_began_s is not None)
+
+    def stopped(self, words: Mapping[str, str], wrong: Mapping[str, str]) -> None:
+        """These robots were told to stop; the words say what each did, by its name.
+
+        ``wrong`` says of those that are not proven to stand still why not; what they were asked ends when
+        they say so themselves.
+        """
+        for name, said in words.items():
+            link = self._links.get(name)
+            if link is None:
+                continue
+            link.last_stop, link.not_stopped = said, wrong.get(name, "")
+            link.stop_began_s, link.stopping = None, False
+            if not link.not_stopped:
+                link.left_busy = False
+                self._tries.end_all(link, "canceled")
+            self._alive.rest(name)
+
+    def stands_still(self, names: Iterable[str]) -> None:
+        """A person says that these robots stand still."""
+        for link in map(self._links.get, names):
+            if link is not None:
+                link.not_stopped, link.earlier, link.left_busy = "", (), False
+
+    def take_settled(self) -> tuple[str, ...]:
+        """The robots that were not stopped and have ended now, as they say, what would not end; once each."""
+        settled, self._settled = tuple(self._settled), {}
+        return settled
+
+    # -- what the session tells ------------------------------------------------------------------------------
+
+    def update(self, view: GraphView) -> None:
+        """Take over a new graph: robots come and go."""
+        self._told = True
+        self._view = view
+        self._announcements.update(view)
+        topics = (self._topics_that_count(link.robot) for link in self._links.values())
+        self._senders.learn(view, {rize.ANSWERS}.union(*topics))
+        self._follow_announced()
+        self._update_rize(view)
+        held, self._held = list(self._held), deque(maxlen=MOST_HELD)
+        for name, message in held:
+            link = self._links.get(name)
+            if link is not None and self._is_from(link, message):
+                self._answer(link, message)
+        for link in self._links.values():
+            if link.connected and link.publisher is None:
+                self._open_publisher(link)
+
+    def add(self, batches: Mapping[str, Batch]) -> None:
+        """Take over what arrived: descriptions, answers, sensor values."""
+        if self._announcements.add(batches):
+            self._follow_announced()
+        events = batches.get(rize.EVENTS)
+        for message in events.messages if events is not None else ():
+            name = rize.ready(_mapping(message))
+            if name is not None:
+                self._rize.tell(name)
+        for link in self._links.values():
+            self._read(link, batches)
+            began_s = link.stop_began_s
+            link.stopping = began_s is not None and self._clock() - began_s >= STOPPING_SHOWN_AFTER_S
+        self._tries.look(self._links.values())
+
+    @property
+    def claims(self) -> Mapping[str, Claim]:
+        """What programs say of themselves and is not believed, by an id."""
+        return {**self._announcements.claims, **self._taken}
+
+    def take_notes(self) -> tuple[str, ...]:
+        """What a person may want to read: a robot was started anew. Each once."""
+        notes, self._notes = tuple(self._notes), []
+        return notes
+
+    def close(self) -> None:
+        """End the heartbeat and the command publishers."""
+        self.known.saw([link.robot for link in self.connected])
+        self._alive.close()
+        for link in self._links.values():
+            for publisher in (link.publisher, link.world):
+                if publisher is not None:
+                    publisher.close()
+
+    def unwatched(self, topic: str) -> None:
+        """Nobody looks at a topic any more: what a robot told there is not known from now on."""
+        for link in self._links.values():
+            for sensor in link.robot.sensors:
+                if sensor.topic == topic:
+                    link.values.pop(sensor.name, None)
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _identity_of(self, name: str) -> Identity | None:
+        link = self._links.get(name)
+        return None if link is None else link.identity
+
+    def _get(self, name: str) -> RobotLink:
+        link = self._links.get(name)
+        if link is None:
+            raise RobotUnknownError(name)
+        return link
+
+    def _update_rize(self, view: GraphView) -> None:
+        if self._rize_events is None and rize.EVENTS in view.topics:
+            self._rize_events = self._watches.open([rize.EVENTS])
+        native = {link.name for link in self._links.values() if link.robot.dialect == "native"}
+        there = self._rize.present(view, native)
+        for name in there:
+            known = self._links.get(name)
+            if known is None or known.robot.dialect == "rize":
+                self.join(rize.robot(name), f"{rize.COMMANDS} {name}")
+        for link in self._links.values():
+            if link.robot.dialect == "rize" and link.connected and link.name not in there:
+                self._away(link)
+
+    def _follow_announced(self) -> None:
+        """Join whom the announcements name; whose program is not there any more has gone."""
+        found = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
+        for topic, name in list(self._names.items()):
+            link, now = self._links.get(name), found.get(topic)
+            if link is None or not link.connected:
+                continue
+            is_same = now is not None and now[0].name == name and now[1] == link.identity
+            if not is_same and not (now is None and self._is_unread(topic, link)):
+                self._away(link)
+        for topic in self._taken.keys() - found.keys():
+            del self._taken[topic]
+        for topic, (robot, identity) in found.items():
+            claim = self._foreign(robot)
+            if claim is None:
+                self._taken.pop(topic, None)
+                self.join(robot, topic, identity)
+                continue
+            self._taken[topic] = claim
+            link = self._links.get(robot.name)
+            if link is not None and link.connected:
+                self._away(link)
+
+    def _is_unread(self, topic: str, link: RobotLink) -> bool:
+        """Whether its program still announces it there, in words that can't be read just now."""
+        there = publishing(self._view, topic)
+        return link.identity is not None and link.identity.node_id in there
+
+    def _foreign(self, robot: Robot) -> Claim | None:
+        """Why a robot can't have the topics that it names: they are another robot's."""
+        why = foreign_topic(robot, (link.robot for link in self._links.values()))
+        if why is None:
+            return None
+        return Claim(f"{why}.", f"{robot.name} is left out. Find out what this program is and close it.")
+
+    def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
+        """A robot is there, known by ``topic``; said again it does nothing unless the robot changed."""
+        link = self._links.get(robot.name)
+        was_real = not robot.virtual or (link is not None and link.identity == identity and link.was_real)
+        if identity is not None:
+            self._names[topic] = robot.name
+            is_virtual = not was_real and self._processes.is_ours(identity)
+            robot = replace(robot, virtual=is_virtual)
+        if link is None:
+            link = self._links[robot.name] = RobotLink(robot.name, robot)
+        elif link.connected and link.robot == robot and link.identity == identity:
+            return
+        self._take_identity(link, identity)
+        link.was_real = was_real
+        before, link.robot = link.robot, robot
+        link.connected, link.gone_s = True, None
+        if before.topics != robot.topics or before.dialect != robot.dialect:
+            if before.dialect == robot.dialect:
+                link.topics_before = tuple(dict.fromkeys((before.topics, *link.topics_before)))[:MOST_TOPICS]
+            self._leave_topics(link)
+        if link.watch is None:
+            link.watch = self._watches.open([robot.topics.answer])
+        self._senders.learn(self._view, self._topics_that_count(robot))
+        self._open_publisher(link)
+        self.known.saw([robot])
+        self.revision += 1
+
+    def _take_identity(self, link: RobotLink, identity: Identity | None) -> None:
+        """It is this program now; the one before may still run somewhere and move the robot."""
+        before, link.identity = link.identity, identity
+        if before is None or identity is None or before.node_id == identity.node_id:
+            return
+        self._notes.append(f"{link.name} was started anew: it is {identity.words} now, before {before.words}")
+        goes_on, link.goes_on = link.goes_on, ""
+        if not self._processes.has_ended(before):
+            link.earlier = (before, *link.earlier)[:MOST_EARLIER]
+            link.not_stopped = link.not_stopped or goes_on
+        elif not link.earlier:
+            link.not_stopped = ""  # what did not stop runs no more
+
+    def _leave_topics(self, link: RobotLink) -> None:
+        """Its description names other topics: what was asked on the old ones has ended."""
+        self._alive.rest(link.name)
+        self._tries.end_all(link, "failed", f"{link.name} has changed; try it again")
+        if link.watch is not None:
+            link.watch.close()
+            link.watch = None
+        old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
+        link.publisher = link.world = None
+
+        def close_them(_node: Node) -> None:
+            for publisher in old:
+                publisher.close()
+
+        if old:
+            self._submit(f"leave the old topics of {link.name}", close_them)
+
+    def _open_publisher(self, link: RobotLink) -> None:
+        topics = link.robot.topics
+        if link.publisher is not None or link.is_opening:
+            return
+        link.is_opening = True
+
+        def open_them(node: Node) -> None:
+            native = link.robot.dialect == "native"
+            try:
+                if link.robot.topics != topics:
+                    return  # it has changed meanwhile, and is reached by the next graph
+                world = node.new_pub(topics.world, "json") if topics.world is not None else None
+                link.world = world
+                link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json")
+            finally:
+                link.is_opening = False
+
+        self._submit(f"reach {link.name}", open_them)
+
+    def _away(self, link: RobotLink) -> None:
+        link.connected, link.gone_s = False, self._clock()
+        link.left_busy = link.left_busy or bool(link.running)
+        if not link.virtual:  # a robot goes on when its program ends; a virtual one is its program
+            link.not_stopped = link.not_stopped or link.goes_on
+        link.goes_on = ""
+        self.known.saw([link.robot])
+        self._alive.rest(link.name)
+        if link.watch is not None:
+            link.watch.close()
+            link.watch = None
+        link.mute = False
+        if self.moving.question is not None and link.name in self.moving.question.moves:
+            self.moving.withdraw()
+        self._tries.end_all(link, "failed", f"{link.name} has gone; check that it is on")
+        self.revision += 1
+
+    def _send(self, link: RobotLink, command: Payload) -> bool:
+        if link.publisher is None or not link.connected:
+            return False
+        try:
+            link.publisher.publish(command)
+        except NepError:
+            return False
+        return True
+
+    def _topics_that_count(self, robot: Robot) -> set[str]:
+        """Where what a robot tells comes from its own program only, if that publishes there."""
+        return {robot.topics.answer, *topics_of(robot)}
+
+    def _is_from(self, link: RobotLink, message: Message) -> bool | None:
+        """Whether the robot's own program sent a message; None while that is not known.
+
+        Robots of RIZE can't be told apart: for them it is who hears their commands, or the gateway.
+        """
+        if link.identity is None and link.robot.dialect == "native":
+            return True
+        node = self._senders.node_of(message)
+        if link.robot.dialect != "native":
+            known = self._view.nodes.get(node or "")
+            is_gateway = known is None or known.generation == GATEWAY
+            return is_gateway or node in hearing(self._view, link.robot.topics.command)
+        return None if node is None or link.identity is None else node == link.identity.node_id
+
+    def _newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
+        """The newest message that counts: from the robot's own program, if that publishes the topic."""
+        if batch is None or not batch.messages:
+            return None
+        own = link.identity.node_id if link.identity is not None else ""
+        if own not in publishing(self._view, topic):
+            return _mapping(batch.messages[-1])
+        found = (message for message in reversed(batch.messages) if self._senders.node_of(message) == own)
+        newest = next(found, None)
+        return None if newest is None else _mapping(newest)
+
+    def _read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
+        answers = batches.get(link.robot.topics.answer)
+        for message in answers.messages if answers is not None else ():
+            is_own = self._is_from(link, message)
+            if is_own:
+                self._answer(link, message)
+            elif is_own is None:
+                self._held.append((link.name, message))
+        for sensor in link.robot.sensors:
+            if sensor.is_image:
+                continue
+            value = self._newest(link, batches.get(sensor.topic), sensor.topic)
+            if value is not None:
+                link.values[sensor.name] = value.get("value", value)
+        topic = link.robot.topics.state or ""
+        link.drawing = self._newest(link, batches.get(topic), topic) or link.drawing
+
+    def _answer(self, link: RobotLink, message: Message) -> None:
+        answer = _mapping(message)
+        if answer is not None and link.robot.dialect == "rize":
+            answer = rize.from_answer(answer)
+        if answer is not None:
+            self._tries.answer(link, answer)
+            self._take_life(link, answer)
+
+    def _take_life(self, link: RobotLink, answer: Payload) -> None:
+        """Take a robot's sign of life, which names the actions that it could not end."""
+        if answer.get("op") != "alive" or "not_ended" not in answer:
+            return
+        before, link.goes_on = link.goes_on, ""
+        if answer["not_ended"]:
+            link.goes_on = said_of_stop(link.name, answer.get("error") or "an action has not ended")
+        elif before and link.not_stopped:
+            self._settled[link.name] = None
+
+
+def _mapping(message: Message) -> Payload | None:
+    try:
+        value = message.payload
+    except NepError:
+        return None
+    return value if isinstance(value, Mapping) else None

@@ -1,0 +1,255 @@
+"""Looks for what a person should know: data that can't be read, robots that fell silent, names used twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass
+
+from app.core.alerts import Alerts
+from app.core.network.decode_checks import Checked
+from app.core.network.topics import Topics
+from app.core.robots.fleet import Fleet
+from app.core.robots.robot_link import RobotLink
+from nep.protocol.graph_view import GraphView
+
+SILENT_S = 3.0
+CURE_S = 1.0
+AWAY_S = 5.0
+"""A driver that is started again is back by then."""
+ASK_DOCTOR = "Open the connection doctor"
+GIVES_UP = "leaving"
+
+REAL = "Check that it is on and in the same Wi-Fi."
+VIRTUAL = "Start the virtual robot again."
+
+
+@dataclass(slots=True)
+class _Bad:
+    """A topic that sends what can't be read: how many, how many were not tried, when the last one came."""
+
+    count: int = 0
+    unchecked: int = 0
+    since: float = 0.0
+    is_well: bool = False
+
+
+class Health:
+    """Puts alerts and cures them. One thread uses it (the window's)."""
+
+    def __init__(self, topics: Topics, fleet: Fleet, alerts: Alerts, clock: Callable[[], float]) -> None:
+        """Look at these; ``clock`` gives monotonic seconds."""
+        self._topics, self._fleet, self._alerts, self._clock = topics, fleet, alerts, clock
+        self._from_graph: set[str] = set()
+        self._claims: set[str] = set()
+        self._unreachable: set[str] = set()
+        self._bad: dict[str, _Bad] = {}
+        self._away: dict[str, float] = {}
+
+    def look(self, found: Mapping[str, Checked]) -> None:
+        """Tell which topics send what can't be read: one alert each, with the exact count.
+
+        `check` cures it when only good messages came for a second: a topic that mixes both is one alert.
+        """
+        for topic, checked in found.items():
+            bad = self._bad.get(topic)
+            if bad is None and checked.bad:
+                bad = self._bad[topic] = _Bad()
+            if bad is None:
+                continue
+            bad.is_well = checked.last_good
+            bad.unchecked += checked.unchecked
+            if checked.bad:
+                bad.since = self._clock()
+                bad.count += checked.bad
+                self._tell(topic, bad, checked)
+
+    def forget(self, topic: str) -> None:
+        """Nobody looks at a topic any more, or it is well again."""
+        self._bad.pop(topic, None)
+        self._alerts.cure(f"message:{topic}")
+
+    def check(self, used: Container[str] = (), started: Container[str] = ()) -> None:
+        """Once a second: which topics are well again, which robots' pictures have stopped, who has gone.
+
+        ``used`` are the names of the robots that a program uses, ``started`` those of the virtual robots
+        whose processes were started here and still run.
+        """
+        now = self._clock()
+        for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= CURE_S]:
+            self.forget(topic)
+        self._check_claims()
+        for link in self._fleet.links:
+            self._check_camera(link)
+            self._check_motion(link)
+            if link.connected:
+                self._away.pop(link.name, None)
+                self._alerts.cure(f"robot:{link.name}")
+            elif link.name in used:
+                self._alerts.put(
+                    f"robot:{link.name}",
+                    "error",
+                    f"{link.name} does not answer.",
+                    f"The behaviour uses it. {VIRTUAL if link.virtual else REAL}",
+                    button="Stop",
+                    action="run.stop",
+                    count=0,
+                )
+            else:
+                self._check_presence(link, now, runs_here=link.name in started)
+
+    def journal(self, sentence: str | None) -> None:
+        """Whether unsaved work is kept: the sentence that says why not, or None."""
+        if sentence is None:
+            self._alerts.cure("journal")
+            self._alerts.cure(GIVES_UP)
+            return
+        self._alerts.put(
+            "journal",
+            "error",
+            "Your unsaved work is not kept.",
+            f"{sentence[0].upper()}{sentence[1:]}.",
+            button="Save",
+            action="file.save",
+            count=0,
+        )
+
+    def gives_up(self, name: str, sentence: str) -> bool:
+        """Whether a person closes the window though the work of ``name`` can't be kept, and has been told so.
+
+        ``sentence`` says why it can't be kept. The first time an alert tells it, and what to do.
+        """
+        if self._alerts.has(GIVES_UP):
+            return True
+        self._alerts.cure("journal")  # it comes again, behind this one
+        self._alerts.put(
+            GIVES_UP,
+            "error",
+            f"Studio stays open: the unsaved work in {name} would be lost.",
+            f"{sentence[0].upper()}{sentence[1:]}. Closing once more gives it up.",
+            button="Save somewhere else",
+            action="file.save_as",
+            count=0,
+        )
+        return False
+
+    def settings(self, sentence: str | None) -> None:
+        """Whether what a person chooses is kept: the sentence that says why not, or None."""
+        if sentence is None:
+            self._alerts.cure("settings")
+            return
+        self._alerts.put(
+            "settings",
+            "warn",
+            "What you choose now is forgotten when Studio ends.",
+            f"{sentence[0].upper()}{sentence[1:]}.",
+            count=0,
+        )
+
+    def graph_alerts(self, view: GraphView) -> None:
+        """Take over what the master noticed (a name used twice, types that differ, a port that is taken)."""
+        ids = set()
+        for found in view.alerts:
+            ids.add(found.id)
+            helps = found.id.startswith("port:")
+            self._alerts.put(
+                found.id,
+                "warn",
+                found.sentence,
+                found.hint,
+                button=ASK_DOCTOR if helps else None,
+                action="help.doctor" if helps else None,
+                count=0,
+            )
+        for gone in self._from_graph - ids:
+            self._alerts.cure(gone)
+        self._from_graph = ids
+
+    def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
+        messages = "1 message" if bad.count == 1 else f"{bad.count} messages"
+        why = f"{checked.sentence[:1].upper()}{checked.sentence[1:]}."
+        more = f" {bad.unchecked} more came too fast to be tried." if bad.unchecked else ""
+        self._alerts.put(
+            f"message:{topic}",
+            "warn",
+            f"{topic} sends what can't be read ({messages}).",
+            f"{why} Look at the raw bytes in the Inspector.{more}",
+            button="Look at it",
+            action=f"inspect:{topic}",
+            count=checked.bad,
+        )
+
+    def _check_presence(self, link: RobotLink, now: float, *, runs_here: bool) -> None:
+        """Tell of a robot that was there and is no more: a real one, or a virtual one that hangs."""
+        since = self._away.setdefault(link.name, now)
+        if now - since < AWAY_S or (link.virtual and not runs_here):
+            self._alerts.cure(f"robot:{link.name}")
+            return
+        self._alerts.put(
+            f"robot:{link.name}",
+            "warn",
+            f"{link.name} does not answer." if link.virtual else f"{link.name} has gone.",
+            VIRTUAL if link.virtual else REAL,
+            button="Start it again" if link.virtual else ASK_DOCTOR,
+            action=f"connect:{link.name}" if link.virtual else "help.doctor",
+            count=0,
+        )
+
+    def _check_claims(self) -> None:
+        """Tell of programs that say that they are a robot and are not believed."""
+        claims = self._fleet.claims
+        for id in self._claims - claims.keys():
+            self._alerts.cure(f"claim:{id}")
+        for id, claim in claims.items():
+            self._alerts.put(f"claim:{id}", "error", claim.title, claim.detail, count=0)
+        self._claims = set(claims)
+
+    def unreachable(self, problems: Mapping[str, str]) -> None:
+        """Tell of robots that a stop can't reach, by their names, and why."""
+        for name in self._unreachable - problems.keys():
+            self._alerts.cure(f"stop:{name}")
+        for name, why in problems.items():
+            said = f"{why[:1].upper()}{why[1:]}. It is tried again each second."
+            self._alerts.put(f"stop:{name}", "error", f"Stop can't reach {name}.", said, count=0)
+        self._unreachable = set(problems)
+
+    def _check_motion(self, link: RobotLink) -> None:
+        """Tell of a robot that says itself that it could not end an action."""
+        if not (link.connected and link.goes_on):
+            self._alerts.cure(f"moving:{link.name}")
+            return
+        said = "Switch it off by hand if it does not stand still."
+        self._alerts.put(
+            f"moving:{link.name}",
+            "error",
+            f"{link.goes_on}.",
+            said,
+            button="Stop",
+            action="run.stop",
+            count=0,
+        )
+
+    def _check_camera(self, link: RobotLink) -> None:
+        id = f"camera:{link.name}"
+        camera = next((sensor for sensor in link.robot.sensors if sensor.is_image), None)
+        topic = self._topics.get(camera.topic) if camera is not None else None
+        silent = (
+            link.connected
+            and topic is not None
+            and topic.gone_since is None
+            and topic.silent_s is not None
+            and topic.silent_s > SILENT_S
+        )
+        if not silent or topic is None or topic.silent_s is None:
+            link.silent = None
+            self._alerts.cure(id)
+            return
+        link.silent = "camera silent"
+        self._alerts.put(
+            id,
+            "error",
+            f"The camera of {link.name} has been silent for {int(topic.silent_s)} s.",
+            "What needs its picture waits.",
+            button=ASK_DOCTOR,
+            action="help.doctor",
+            count=0,
+        )

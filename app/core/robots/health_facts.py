@@ -1,0 +1,189 @@
+"""How one robot is, fact by fact in plain words: what answers, what it tells of itself, how it stops.
+
+A fact that is to be looked at says so with its status; what is not known yet is said to be so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeGuard
+
+from app.core.network.topics import Topic, Topics
+from app.core.robots.robot_link import RobotLink
+from app.robots.description import Sensor
+
+SILENT_S = 3.0
+MISSED = 5
+"""So many messages in a row that did not come are a silence."""
+LOW_PERCENT = 20
+WARM_C = 60
+"""From here on motors of small robots begin to lose their strength."""
+
+TOLD = frozenset({"Battery", "Temperature", "Camera", "Sensors"})
+
+AgeWords = Callable[[float], str]
+
+
+@dataclass(frozen=True, slots=True)
+class HealthFact:
+    """One line: ``status`` is ok, warn, error, or off for what is not there or not known yet."""
+
+    title: str
+    status: str
+    words: str
+
+    @property
+    def to_look_at(self) -> bool:
+        """Whether a person should do something about it."""
+        return self.status in ("warn", "error")
+
+
+def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -> tuple[HealthFact, ...]:
+    """Everything that is known about a robot, what is to be looked at first.
+
+    ``now`` is the clock of the robot's answers (monotonic seconds), ``age_words`` says a time: "14 s".
+    """
+    facts = [_connection(link, now, age_words)]
+    if link.connected:
+        facts += [*_battery(link), *_temperature(link)]
+    facts.append(_stop(link))
+    if link.connected:
+        facts += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
+    facts += [_left_alone(link), *_life(link)]
+    return tuple(sorted(facts, key=lambda fact: not fact.to_look_at))
+
+
+def has_told(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
+    """Whether anything that a robot said or sent speaks for it; of others only their description is known."""
+    return link.answered_s is not None or any(fact.title in TOLD and fact.status == "ok" for fact in facts)
+
+
+def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
+    age = age_words(now - link.answered_s) if link.answered_s is not None else ""
+    if not link.connected:
+        since = f" for {age_words(now - link.gone_s)}" if link.gone_s is not None else ""
+        return HealthFact("Connection", "warn", f"gone{since}; {_next_step(link)}")
+    if link.mute:
+        last = f"; its last answer is {age} old" if age else ""
+        return HealthFact("Connection", "error", f"does not answer{last}; {_next_step(link)}")
+    return HealthFact("Connection", "ok", f"last answer {age} ago" if age else "connected; not asked yet")
+
+
+def _next_step(link: RobotLink) -> str:
+    return "start it again" if link.virtual else "check that it is on"
+
+
+def _battery(link: RobotLink) -> Iterable[HealthFact]:
+    for sensor in link.robot.sensors:
+        if "battery" not in f"{sensor.name} {sensor.title}".casefold() or sensor.unit != "%":
+            continue
+        value = link.values.get(sensor.name)
+        if not _is_number(value):
+            yield HealthFact("Battery", "off", "not told yet")
+        elif value < LOW_PERCENT:
+            yield HealthFact("Battery", "warn", f"{value:.0f} %; charge it soon")
+        else:
+            yield HealthFact("Battery", "ok", f"{value:.0f} %")
+        return
+
+
+def _temperature(link: RobotLink) -> Iterable[HealthFact]:
+    told = [found for sensor in link.robot.sensors for found in _degrees(sensor, link.values)]
+    if told:
+        value, what = max(told)
+        if value >= WARM_C:
+            yield HealthFact("Temperature", "warn", f"{what} warm, {value:.0f} °C; let it rest")
+        else:
+            yield HealthFact("Temperature", "ok", f"{what} {value:.0f} °C")
+
+
+def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[float, str]]:
+    value = values.get(sensor.name)
+    if sensor.unit == "°C" and _is_number(value):
+        yield float(value), sensor.title
+    for field in sensor.fields:
+        inner = value.get(field.name) if isinstance(value, Mapping) else None
+        if field.unit == "°C" and _is_number(inner):
+            yield float(inner), field.title
+
+
+def _stop(link: RobotLink) -> HealthFact:
+    if link.goes_on:
+        return HealthFact("Stop", "error", link.goes_on)
+    if link.stopping:
+        return HealthFact("Stop", "off", "told to stop; its answer is waited for")
+    if link.last_stop is not None:
+        kinds = {"answered": "ok", "sent": "off"}
+        return HealthFact("Stop", kinds.get(link.last_stop.partition(" ")[0], "error"), link.last_stop)
+    said = "not used yet" if link.can_confirm_stop else "not used yet; this robot cannot confirm"
+    return HealthFact("Stop", "off", said)
+
+
+def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
+    camera = next((sensor for sensor in link.robot.sensors if sensor.is_image), None)
+    if camera is None:
+        return
+    topic = topics.get(camera.topic)
+    if link.silent is not None and topic is not None and topic.silent_s is not None:
+        yield HealthFact("Camera", "error", f"silent for {age_words(topic.silent_s)}")
+    elif topic is not None and topic.rate_hz:
+        yield HealthFact("Camera", "ok", f"sends {topic.rate_hz:.0f} pictures a second")
+    elif topic is not None and topic.gone_s is None and topic.heard_since is None:
+        yield HealthFact("Camera", "off", "ready; nobody looks")
+    else:
+        yield HealthFact("Camera", "off", "no picture yet")
+
+
+def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
+    felt = [sensor for sensor in link.robot.sensors if not sensor.is_image]
+    silent = [(sensor, topic) for sensor in felt if _is_silent(sensor, topic := topics.get(sensor.topic))]
+    if not felt:
+        return
+    if silent:
+        age = age_words(max(topic.silent_s or 0.0 for _, topic in silent if topic is not None))
+        yield HealthFact("Sensors", "warn", f"{_listed([each.title for each, _ in silent])} silent for {age}")
+        return
+    sent = sum(1 for sensor in felt if _has_sent(topics.get(sensor.topic)))
+    if not sent:
+        words = "has sent nothing yet" if len(felt) == 1 else f"none of {len(felt)} has sent anything yet"
+        yield HealthFact("Sensors", "off", words)
+    elif sent < len(felt):
+        yield HealthFact("Sensors", "ok", f"{sent} of {len(felt)} have sent something")
+    else:
+        yield HealthFact("Sensors", "ok", "1 sensor sends" if len(felt) == 1 else f"all {len(felt)} send")
+
+
+def _has_sent(topic: Topic | None) -> bool:
+    """Whether anything was ever sent on a topic that is there."""
+    return topic is not None and topic.gone_s is None and topic.age_s is not None
+
+
+def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
+    """Whether one that tells its value all the time has stopped; others may have nothing new to tell."""
+    if sensor.rate_hz is None or topic is None or topic.silent_s is None or topic.gone_s is not None:
+        return False
+    return topic.silent_s > max(SILENT_S, MISSED / sensor.rate_hz)
+
+
+def _left_alone(link: RobotLink) -> HealthFact:
+    after = link.robot.safe_stop.watchdog_s
+    if after is None:
+        return HealthFact("Left alone", "off", "does not stop by itself; stay near its switch")
+    return HealthFact("Left alone", "ok", f"stops by itself after {after:g} s")
+
+
+def _life(link: RobotLink) -> Iterable[HealthFact]:
+    every = link.robot.beat_s
+    if every is not None:
+        yield HealthFact("Sign of life", "ok", f"every {every:g} s while it works")
+    elif link.robot.dialect == "native":
+        yield HealthFact("Sign of life", "off", "none while it works")
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{words[0]} and {len(words) - 1} more"
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

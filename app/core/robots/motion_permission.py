@@ -1,0 +1,185 @@
+"""Which real robots may move: a person is asked once for each robot, before it moves for the first time.
+
+A virtual robot may always, if Studio knows the program that it is (`app.core.robots.own_processes`).
+Everything that makes a robot act comes through here: the forms, the palette, keys and programs, also those
+that publish on a robot's topics. Stop does not. A yes counts for the program that the robot is now, *always*
+for its name, model, program and computer.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from app.errors import AppError
+from app.robots.description import Robot
+from app.robots.identity import Identity
+
+ALWAYS = "robots.may_move"
+MOST_NAMED = 4
+
+
+class Keeps(Protocol):
+    """What is needed of the settings."""
+
+    def get(self, key: str, default: list[str]) -> list[str]:
+        """A list that was kept."""
+
+    def set(self, key: str, value: object) -> None:
+        """Keep it."""
+
+
+class MayNotMoveError(AppError):
+    """Nobody has said yet that these robots may move; the question stands."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Make the sentence from the robots' names."""
+        self.names = tuple(names)
+        super().__init__(f"{' and '.join(names)} may not move yet; answer the question above first")
+
+
+@dataclass(frozen=True)
+class Question:
+    """May these robots move? ``moves`` names for each what it would do, in the words of its description."""
+
+    moves: Mapping[str, tuple[str, ...]]
+    go_on: Callable[[], None]
+
+    @property
+    def title(self) -> str:
+        """In bold: "Let Rover move?"."""
+        return f"Let {_listed(list(self.moves))} move?"
+
+    @property
+    def sentence(self) -> str:
+        """What would move, and how it is stopped."""
+        told = [
+            f"{_listed(list(actions))} {'moves' if len(actions) == 1 else 'move'} {name}."
+            for name, actions in self.moves.items()
+        ]
+        return f"{' '.join(told)} See that nobody stands in the way. Stop is F12, at any time."
+
+
+class Moving:
+    """Who may move. One thread uses it (the window's)."""
+
+    def __init__(
+        self,
+        settings: Keeps | None = None,
+        identity_of: Callable[[str], Identity | None] = lambda _name: None,
+    ) -> None:
+        """`settings` keep the robots that may always; `identity_of` tells the program that a robot is."""
+        self._settings, self._identity_of = settings, identity_of
+        self._allowed: set[str] = set()
+        self._asked: tuple[tuple[str, str], ...] = ()
+        self.question: Question | None = None
+        """What a person is to answer now."""
+        self.revision = 0
+
+    def allowed(self, robot: Robot) -> bool:
+        """Whether this robot may move without being asked for."""
+        return robot.virtual or self._now(robot) in self._allowed or self._key(robot) in self._always()
+
+    def permits(self, wanted: Iterable[tuple[Robot, Sequence[str]]], go_on: Callable[[], None]) -> bool:
+        """Whether these robots may do these actions now.
+
+        If not, the question stands, and `go_on` is called when the answer is yes.
+        """
+        asked = [(robot, risky(robot, actions)) for robot, actions in wanted if not self.allowed(robot)]
+        open_ = [(robot, moves) for robot, moves in asked if moves]
+        if not open_:
+            return True
+        self._asked = tuple((self._now(robot), self._key(robot)) for robot, _ in open_)
+        self.question = Question({robot.name: moves for robot, moves in open_}, go_on)
+        self.revision += 1
+        return False
+
+    def answer(self, *, let: bool, always: bool = False) -> None:
+        """The person has answered; a yes goes on with what was wanted. SettingsError if it can't be kept."""
+        question, self.question = self.question, None
+        self.revision += 1
+        if question is None or not let:
+            return
+        self._allowed.update(now for now, _ in self._asked)
+        try:
+            if always and self._settings is not None:
+                self._settings.set(ALWAYS, sorted({*self._always(), *(key for _, key in self._asked)}))
+        finally:
+            question.go_on()
+
+    def withdraw(self) -> None:
+        """What was asked is not wanted any more (Stop was pressed, the robot has gone)."""
+        if self.question is not None:
+            self.question = None
+            self.revision += 1
+
+    def forget(self) -> None:
+        """Ask again before any robot moves."""
+        self._allowed.clear()
+        if self._settings is not None:
+            self._settings.set(ALWAYS, [])
+
+    def _key(self, robot: Robot) -> str:
+        """What *always* is kept for: who announces another robot under this name is not meant."""
+        identity = self._identity_of(robot.name)
+        return f"{robot.name} ({robot.model})" + (f", {identity.words}" if identity is not None else "")
+
+    def _now(self, robot: Robot) -> str:
+        """What a yes counts for: this very program, until it is started anew."""
+        identity = self._identity_of(robot.name)
+        return f"{self._key(robot)} {identity.node_id if identity is not None else ''}"
+
+    def _always(self) -> list[str]:
+        return self._settings.get(ALWAYS, []) if self._settings is not None else []
+
+
+def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
+    """The titles of those actions that move the robot, each once; of many only the first."""
+    found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
+    titles = [f"“{title}”" for title in dict.fromkeys(found)]
+    return (*titles[:MOST_NAMED], "more") if len(titles) > MOST_NAMED else tuple(titles)
+
+
+def actions_of(runnable: str) -> dict[str, tuple[str, ...]] | None:
+    """What a program asks of each robot; None when that can't be told from it: then it may be anything."""
+    found: dict[str, dict[str, None]] = {}
+    for call in ast.walk(ast.parse(runnable)):
+        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute)):
+            continue
+        if call.func.attr not in ("do", "ask"):
+            continue
+        robot, action = _literal(_argument(call.func.value)), _literal(_argument(call))
+        if robot is None or action is None:
+            return None
+        found.setdefault(robot, {})[action] = None
+    return {robot: tuple(actions) for robot, actions in found.items()}
+
+
+def wanted_by(
+    runnable: str, robots: Iterable[Robot], moves: Collection[str] = ()
+) -> list[tuple[Robot, Sequence[str]]]:
+    """The robots of a program with what it asks of each; of those that it `moves` by publishing anything."""
+    asked = actions_of(runnable)
+    return [
+        (
+            robot,
+            [action.name for action in robot.actions]
+            if asked is None or robot.name in moves
+            else asked.get(robot.name, ()),
+        )
+        for robot in robots
+    ]
+
+
+def _argument(node: ast.expr) -> ast.expr | None:
+    return node.args[0] if isinstance(node, ast.Call) and node.args else None
+
+
+def _literal(node: ast.expr | None) -> str | None:
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

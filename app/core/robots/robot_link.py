@@ -1,0 +1,160 @@
+"""One robot as Studio sees it now, and what a person tried with it."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from app.core.network.watches import Watch
+from app.robots.description import Robot, Topics
+from app.robots.identity import Identity
+from nep.nodes.publisher import Publisher
+
+SENDER = "studio"
+"""Who the commands of try-outs are from."""
+TRIES_KEPT = 40
+NOT_STOPPED = "not stopped"
+STOPPING = "stopping"
+MAY_MOVE = "may still move"
+FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
+
+Payload = Mapping[str, object]
+
+
+@dataclass(slots=True, eq=False)
+class Invocation:
+    """One action that a person tried: its state is a robot's answer (``sent`` until the first one).
+
+    While it is ``accepted`` it may wait for the actions ``waits_for``; it ended those of ``replaces``.
+    ``timeout_s`` counts from the moment in which the robot began. ``at_s`` is the time of day (epoch).
+    """
+
+    id: str
+    action: str
+    state: str = "sent"
+    feedback: Payload = field(default_factory=dict)
+    output: Payload = field(default_factory=dict)
+    error: str | None = None
+    started_s: float = 0.0
+    ended_s: float | None = None
+    clock: Callable[[], float] = time.monotonic
+    given: Payload = field(default_factory=dict)
+    timeout_s: float | None = None
+    begun_s: float | None = None
+    waits_for: tuple[str, ...] = ()
+    replaces: tuple[str, ...] = ()
+    at_s: float = 0.0
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds until it takes too long; None when it has no limit or has not begun."""
+        if self.timeout_s is None or self.begun_s is None:
+            return None
+        return self.begun_s + self.timeout_s - self.clock()
+
+    @property
+    def running(self) -> bool:
+        """Whether the robot has not finished it."""
+        return self.state not in FINAL_STATES
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since it was sent, at most until it ended."""
+        return (self.ended_s if self.ended_s is not None else self.clock()) - self.started_s
+
+
+@dataclass(slots=True, eq=False)
+class RobotLink:
+    """One robot as Studio sees it now.
+
+    ``values`` has the newest value of each sensor while somebody looks. ``tried`` are the last tries, the
+    newest at the end. ``mute`` says that it did not answer a command; ``heard_s`` is when it last answered
+    anything or was asked, ``answered_s`` when it last answered, ``gone_s`` since when it is away.
+    ``not_stopped`` says why the last stop is not proven ("Arm may still move: the brake does not answer"),
+    ``goes_on`` what it says itself about actions that it could not end; both are empty when all is well.
+    ``stop_began_s`` is since when the answer to a stop is waited for, ``stopping`` whether that is long
+    enough to be said.
+    ``identity`` is the program that it is; ``earlier`` are programs of its name that went away and may still
+    move it, ``topics_before`` those of its earlier descriptions. ``was_real`` says that it has not always
+    been virtual, ``left_busy`` that it did something for a person when it went away.
+    """
+
+    name: str
+    robot: Robot
+    connected: bool = True
+    silent: str | None = None
+    values: dict[str, object] = field(default_factory=dict)
+    drawing: Payload | None = None
+    invocations: dict[str, Invocation] = field(default_factory=dict)
+    tried: deque[Invocation] = field(default_factory=lambda: deque(maxlen=TRIES_KEPT))
+    mute: bool = False
+    heard_s: float = 0.0
+    answered_s: float | None = None
+    gone_s: float | None = None
+    last_stop: str | None = None
+    not_stopped: str = ""
+    goes_on: str = ""
+    stop_began_s: float | None = None
+    stopping: bool = False
+    identity: Identity | None = None
+    earlier: tuple[Identity, ...] = ()
+    topics_before: tuple[Topics, ...] = ()
+    is_opening: bool = False
+    was_real: bool = False
+    left_busy: bool = False
+    publisher: Publisher | None = None
+    world: Publisher | None = None
+    watch: Watch | None = None
+
+    @property
+    def virtual(self) -> bool:
+        """Whether it exists only on this computer."""
+        return self.robot.virtual
+
+    @property
+    def can_confirm_stop(self) -> bool:
+        """Whether it answers a stop; robots of RIZE do not."""
+        return self.robot.safe_stop.confirmed
+
+    @property
+    def state(self) -> str:
+        """``not stopped``, ``stopping``, ``away``, ``silent``, ``busy`` or ``ready``.
+
+        One that has not stopped, or has not answered yet, may still move when it is away.
+        """
+        if self.not_stopped or (self.connected and self.goes_on):
+            return NOT_STOPPED
+        if self.stopping:
+            return STOPPING
+        if not self.connected:
+            return "away"
+        if self.silent is not None or self.mute:
+            return "silent"
+        return "busy" if self.running else "ready"
+
+    @property
+    def running(self) -> tuple[Invocation, ...]:
+        """The tries that have not ended."""
+        known = {made.id: made for made in (*self.tried, *self.invocations.values())}
+        return tuple(made for made in known.values() if made.running)
+
+    @property
+    def chip(self) -> str:
+        """The words of its chip: ``virtual, ready``."""
+        words = self.state
+        if words == NOT_STOPPED and MAY_MOVE in f"{self.goes_on} {self.not_stopped}":
+            words = MAY_MOVE
+        if self.connected and words == "silent":
+            words = "does not answer" if self.mute else self.silent or words
+        return f"virtual, {words}" if self.virtual else words
+
+
+def topics_of(robot: Robot) -> list[str]:
+    """Where it tells what happens to it: its sensors, events and state, no pictures."""
+    topics = [sensor.topic for sensor in robot.sensors if sensor.topic and not sensor.is_image]
+    topics += [event.topic for event in robot.events if event.topic]
+    if robot.topics.state is not None:
+        topics.append(robot.topics.state)
+    return list(dict.fromkeys(topics))

@@ -1,0 +1,564 @@
+"""Stop is proven: every robot is told to stop, and its own program answers, or it is named.
+
+The publishers exist before anything runs, because a connection that is made in the moment of need may be
+late. One that could not be made is tried again, and its robot is named until it can.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from app.core.robots.stop_report import RobotStop, StopReport
+from app.robots import rize
+from app.robots.description import Robot, Topics
+from app.robots.identity import (
+    Identity,
+    Senders,
+    first_to_announce,
+    hearing,
+    identity_of,
+    publishing,
+    said_of_stop,
+)
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
+
+RIZE = "rize"
+MOST_TOPICS = 8
+"""So many command topics of one robot are kept, of earlier descriptions too."""
+LATE_S = 120.0
+"""How long an answer that comes too late is still taken."""
+LATE_KEPT = 64
+UNKNOWN_KEPT = 32
+MOST_SERVING = 32
+"""So many programs that serve one robot are waited for, and so many that only listen are named:"""
+MOST_LISTENING = 4
+LOOK_S = 0.1
+"""How often the master is asked at most while an answer of an unknown publisher waits."""
+GRAPH_S = 0.3
+
+STOP_TIMEOUT_S = 1.0
+"""How long a robot may take to answer a stop, if its description does not say that it needs longer."""
+MARGIN_S = 0.5
+LONGEST_STOP_S = 10.0
+
+
+def patience_s(robots: Iterable[Robot]) -> float:
+    """How long these robots are waited for: longer than their drivers wait for what they stop."""
+    needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
+    return min(LONGEST_STOP_S, max(STOP_TIMEOUT_S, needed_s))
+
+
+class Publisher(Protocol):
+    """What is needed of NEP's publisher."""
+
+    def publish(self, payload: object) -> None:
+        """Send one message."""
+        ...
+
+    def close(self) -> None:
+        """Stop publishing."""
+        ...
+
+
+class Subscriber(Protocol):
+    """What is needed of NEP's subscriber."""
+
+    def close(self) -> None:
+        """Stop subscribing."""
+        ...
+
+
+class Node(Protocol):
+    """What is needed of NEP's node."""
+
+    id: str
+
+    def new_pub(self, topic: str, msg_type: str = "json") -> Publisher:
+        """A publisher."""
+        ...
+
+    def new_sub(
+        self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
+    ) -> Subscriber:
+        """A subscriber whose messages go to `sink`, in the node's thread."""
+        ...
+
+    def graph(self, timeout_s: float = 2.0) -> GraphView:
+        """Who publishes what."""
+        ...
+
+
+@dataclass(frozen=True)
+class StopTarget:
+    """A robot that is to be stopped.
+
+    ``identity`` is the program that it is (None: whoever announced it first), ``earlier`` are programs of
+    this name that may still run and move it, ``topics`` those of its earlier descriptions.
+    """
+
+    robot: Robot
+    identity: Identity | None = None
+    earlier: tuple[Identity, ...] = ()
+    topics: tuple[Topics, ...] = ()
+
+    @property
+    def ways(self) -> tuple[Topics, ...]:
+        """Where it is told to stop: the topics of its description first, then those that it had before."""
+        return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MOST_TOPICS]
+
+
+@dataclass
+class _Way:
+    """Where one robot is told to stop, and where it answers."""
+
+    publisher: Publisher
+    subscriber: Subscriber | None
+
+    def close(self) -> None:
+        self.publisher.close()
+        if self.subscriber is not None:
+            self.subscriber.close()
+
+
+@dataclass
+class _Line:
+    """The ways to one robot; ``error`` says why one of them is missing."""
+
+    target: StopTarget
+    ways: dict[Topics, _Way] = field(default_factory=dict)
+    error: str = ""
+
+    @property
+    def name(self) -> str:
+        return self.target.robot.name
+
+    @property
+    def is_whole(self) -> bool:
+        return self.ways.keys() >= set(self.target.ways)
+
+
+@dataclass
+class _Asked:
+    """A stop of one robot that is under way: what is known of each program that serves it, by node.
+
+    `serving` is empty until it is known who they are. `unknown` are answers of publishers that no master has
+    told of yet.
+    """
+
+    line: _Line
+    id: str
+    sent_s: float
+    late: Callable[[RobotStop], object] | None
+    error: str = ""
+    serving: dict[str, RobotStop | None] = field(default_factory=dict)
+    programs: dict[str, str] = field(default_factory=dict)
+    strangers: dict[str, str] = field(default_factory=dict)
+    unknown: deque[Message] = field(default_factory=lambda: deque(maxlen=UNKNOWN_KEPT))
+    is_over: bool = False
+
+    @property
+    def is_settled(self) -> bool:
+        return bool(self.error) or (bool(self.serving) and None not in self.serving.values())
+
+    def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
+        """What has been said and was not told on yet, by node."""
+        found, waits = self.serving.items(), None in self.serving.values()
+        said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
+        return [(node, replace(each, waits=waits)) for node, each in said]
+
+    def results(self) -> list[RobotStop]:
+        """A line for each program; those that have said nothing did not answer."""
+        if not self.serving:
+            return [RobotStop(self.line.name, False, None, error=self.error)]
+        name, found = self.line.name, self.serving.items()
+        return [
+            each or RobotStop(name, False, None, error=self.error, program=self.programs.get(node, ""))
+            for node, each in found
+        ]
+
+
+class RobotStopper:
+    """Keeps a way to each robot and stops them. Its methods may be called from any thread."""
+
+    def __init__(self, node: Node, clock: Callable[[], float] = time.monotonic) -> None:
+        """No robots yet: `set_robots`."""
+        self._node = node
+        self._clock = clock
+        self._sender = f"stopper-{uuid.uuid4().hex[:8]}"
+        self._changed = threading.Condition()
+        self._making = threading.Lock()  # one thread at a time makes ways
+        self._makers: list[threading.Thread] = []
+        self._lines: dict[str, _Line] = {}
+        self._asked: dict[str, _Asked] = {}
+        self._view: GraphView | None = None
+        self._looked_s = 0.0
+        self._senders = Senders()
+
+    def see(self, view: GraphView) -> None:
+        """Who is there now: whose answer counts, and who serves a robot's commands."""
+        with self._changed:
+            self._view = view
+            targets = [line.target for line in self._lines.values()]
+            self._senders.learn(view, {way.answer for target in targets for way in target.ways})
+            late = [said for asked in self._asked.values() for said in self._judge_again(asked)]
+            self._changed.notify_all()
+        for tell, said in late:
+            tell(said)
+
+    def expect(self, targets: Iterable[StopTarget]) -> None:
+        """These are the programs of the robots now; it takes no time, `set_robots` does the rest."""
+        with self._changed:
+            for target in targets:
+                line = self._lines.get(target.robot.name)
+                if line is not None:
+                    line.target = target
+
+    def set_robots(self, robots: Iterable[Robot | StopTarget]) -> None:
+        """Keep a way to exactly these robots; connects to new ones, lets go of others.
+
+        Why one can't be reached is in `problems`; said again, it is tried again.
+        """
+        made = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
+        wanted = {target.robot.name: target for target in made}
+        left: list[_Way] = []
+        with self._changed:
+            for name in self._lines.keys() - wanted.keys():
+                left += self._lines.pop(name).ways.values()
+            for name, target in wanted.items():
+                line = self._lines.setdefault(name, _Line(target))
+                left += [line.ways.pop(topics) for topics in line.ways.keys() - set(target.ways)]
+                line.target = target
+            lines = list(self._lines.values())
+        for way in left:
+            way.close()
+        with self._making:
+            for line in lines:
+                self._make(line)
+        with self._changed:
+            view = self._view
+        if view is not None:
+            self.see(view)
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The names of the robots that can be stopped."""
+        with self._changed:
+            return tuple(name for name, line in self._lines.items() if line.is_whole)
+
+    @property
+    def problems(self) -> Mapping[str, str]:
+        """Why robots can't be told to stop, by their names."""
+        with self._changed:
+            return {name: line.error for name, line in self._lines.items() if line.error}
+
+    def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
+        """Tell the robots to stop and do not wait.
+
+        `ends` is the key of a program (`app.robots.identity`): robots refuse what it still sends. A robot
+        that can't (RIZE) must be told again when the program is gone.
+        """
+        for line in self._chosen(names):
+            self._tell(line, _id(), ends)
+
+    def stop_all(
+        self,
+        names: Iterable[str] | None = None,
+        timeout_s: float | None = None,
+        on_answer: Callable[[RobotStop], object] | None = None,
+        ends: str | None = None,
+        on_late: Callable[[RobotStop], object] | None = None,
+    ) -> StopReport:
+        """Tell the robots (`names`, or all) to stop and wait until each has answered, `timeout_s` at most.
+
+        By default it waits as long as their descriptions say that they need, and a second at least. The
+        report has a line for each of `names`, also for one that could not be told. `on_answer` is called in
+        this thread for each robot as it answers, and at the end for each that did not. `on_late` is called in
+        the node's thread, or in that of `see`, when one answers later than that, or says at last that it
+        stands still. `ends` as in `send_stop`.
+        """
+        names = None if names is None else tuple(names)
+        began = self._clock()
+        lines = self._chosen(names)
+        asked = [self._ask(line, ends, on_late) for line in lines]
+        self._make_missing(asked, ends)
+        told: set[tuple[str, str]] = set()
+        until = began + (
+            timeout_s if timeout_s is not None else patience_s(line.target.robot for line in lines)
+        )
+        while True:
+            self._look_for(asked)
+            with self._changed:
+                now = self._clock()
+                pause_s = min(until - now, LOOK_S if any(each.unknown for each in asked) else until - now)
+                self._changed.wait_for(lambda: self._is_news(asked, told), max(0.0, pause_s))
+                news = [(each, node, said) for each in asked for node, said in each.news(told)]
+            for each, node, said in news:
+                told.add((each.id, node))
+                if on_answer is not None:
+                    on_answer(said)
+            if all(each.is_settled for each in asked) or self._clock() >= until:
+                break
+        elapsed_ms = (self._clock() - began) * 1000
+        return self._report(asked, told, elapsed_ms, on_answer).with_asked(names or ())
+
+    def close(self) -> None:
+        """Let go of all robots; they are not told."""
+        self.set_robots(())
+        for maker in self._makers:
+            maker.join(timeout=5)
+        with self._changed:
+            self._asked.clear()
+
+    # ---- inside
+
+    def _make(self, line: _Line) -> None:
+        """Make the ways of a line that are missing; what goes wrong is its error. Under `_making`."""
+        error = ""
+        for topics in line.target.ways:
+            with self._changed:
+                is_there = topics in line.ways or self._lines.get(line.name) is not line
+            if is_there:
+                continue
+            try:
+                way = self._connect(line.target.robot, topics)
+            except NepError as failed:
+                error = f"{failed}"
+                continue
+            with self._changed:
+                is_wanted = self._lines.get(line.name) is line and topics in line.target.ways
+                if is_wanted:
+                    line.ways[topics] = way
+            if not is_wanted:
+                way.close()
+        with self._changed:
+            line.error = error
+
+    def _connect(self, robot: Robot, topics: Topics) -> _Way:
+        if robot.dialect == RIZE:
+            return _Way(self._node.new_pub(topics.command, "json"), None)
+        publisher = self._node.new_pub(topics.command, "robot/command")
+        try:
+            return _Way(publisher, self._node.new_sub(topics.answer, "robot/answer", sink=self._answers))
+        except NepError:
+            publisher.close()
+            raise
+
+    def _make_missing(self, asked: Sequence[_Asked], ends: str | None) -> None:
+        """Try once more, beside the stop, to reach those that could not be reached."""
+        missing = [each for each in asked if not each.line.is_whole]
+        if not missing:
+            return
+
+        def make() -> None:
+            for each in missing:
+                before = set(each.line.ways)
+                with self._making:
+                    self._make(each.line)
+                new = each.line.ways.keys() - before
+                error = self._tell(each.line, each.id, ends, new) if new else _untold(each.line)
+                with self._changed:
+                    each.error = error if not before else each.error
+                    self._changed.notify_all()
+
+        for each in missing:
+            each.error = "" if not each.line.ways else each.error
+        self._makers = [thread for thread in self._makers if thread.is_alive()]
+        self._makers.append(threading.Thread(target=make, name="studio-stop-line", daemon=True))
+        self._makers[-1].start()
+
+    def _chosen(self, names: Iterable[str] | None) -> list[_Line]:
+        with self._changed:
+            if names is None:
+                return list(self._lines.values())
+            return [self._lines[name] for name in dict.fromkeys(names) if name in self._lines]
+
+    def _ask(self, line: _Line, ends: str | None, late: Callable[[RobotStop], object] | None) -> _Asked:
+        asked = _Asked(line, _id(), self._clock(), late)
+        with self._changed:
+            self._forget_old()
+            self._asked[asked.id] = asked
+        asked.error = self._tell(line, asked.id, ends)
+        return asked
+
+    def _tell(self, line: _Line, id: str, ends: str | None, only: Iterable[Topics] | None = None) -> str:
+        """Send a stop on every topic of a robot; the sentence when it went out on none, or nothing."""
+        robot = line.target.robot
+        stop = robot.safe_stop.action
+        if robot.dialect == RIZE:
+            command = rize.to_command(robot, stop, {}, id)
+        else:
+            command = {"id": id, "op": "stop", "from": self._sender, "action": stop, "input": {}}
+            if ends is not None:
+                command["ends"] = ends
+        with self._changed:
+            ways = [way for topics, way in line.ways.items() if only is None or topics in only]
+        sent, error = False, _untold(line)
+        for way in ways:
+            try:
+                way.publisher.publish(command)
+                sent = True
+            except NepError as failed:
+                error = f"{robot.name} can't be told: {failed}"
+        return "" if sent else error
+
+    # ---- who must answer, and who did
+
+    def _is_news(self, asked: Sequence[_Asked], told: set[tuple[str, str]]) -> bool:
+        """Whether there is something to tell, or to ask the master for."""
+        if any(each.news(told) for each in asked) or all(each.is_settled for each in asked):
+            return True
+        return any(each.unknown for each in asked) and self._clock() - self._looked_s >= LOOK_S
+
+    def _look_for(self, asked: Sequence[_Asked]) -> None:
+        """Find out who serves the robots, and ask the master who answered when that is not known."""
+        with self._changed:
+            waits = self._view is None or any(each.unknown for each in asked)
+            now = self._clock()
+            looks = waits and (self._view is None or now - self._looked_s >= LOOK_S)
+            if looks:
+                self._looked_s = now
+        if looks:
+            with suppress(NepError):  # then what was known before counts; who is unknown proves nothing
+                self.see(self._node.graph(GRAPH_S))
+        with self._changed:
+            for each in asked:
+                if not each.serving:
+                    each.serving |= self._serving(each)
+                    self._judge_again(each)  # none of it is late: they are asked just now
+
+    def _serving(self, asked: _Asked) -> dict[str, RobotStop | None]:
+        """Who must answer: the robot's own program first, then whoever else serves its commands, by node.
+
+        Programs that hear its commands and could not answer are named.
+        """
+        target, view = asked.line.target, self._view or GraphView(0, 0)
+        if target.robot.dialect == RIZE:
+            # It never answers; one that could not even be told is none of those.
+            return {} if asked.error else {"": RobotStop(asked.line.name, False, None, can_confirm=False)}
+        identity = target.identity or first_to_announce(view, target.robot.topics.description)
+        own = identity.node_id if identity is not None else "nobody"
+        found: dict[str, RobotStop | None] = {own: None}
+        answering = {node for way in target.ways for node in publishing(view, way.answer)}
+        heard = dict.fromkeys(node for way in target.ways for node in hearing(view, way.command))
+        others = [node for node in heard if node not in (own, self._node.id)]
+        for node in [node for node in others if node in answering][:MOST_SERVING]:
+            asked.programs[node] = identity_of(view, node).node or node
+            found[node] = None
+        listening = [node for node in others if node not in answering]
+        programs = [identity_of(view, node).node or node for node in listening[:MOST_LISTENING]]
+        if len(listening) > MOST_LISTENING:
+            programs = [f"{len(listening)} programs"]
+        for node, program in zip(listening, programs, strict=False):
+            found[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
+        for before in target.earlier:
+            if before.node_id not in found:
+                asked.programs[before.node_id] = before.node or before.node_id
+                found[before.node_id] = None
+        return found
+
+    def _answers(self, messages: Sequence[Message]) -> None:
+        for message in messages:
+            told = _stop_answer(message)
+            if told is None:
+                continue
+            late = None
+            with self._changed:
+                asked = self._asked.get(str(told.get("id")))
+                if asked is not None:
+                    late = self._judge(asked, message)
+                    self._changed.notify_all()
+            if asked is not None and late is not None and asked.late is not None:
+                asked.late(late)
+
+    def _judge_again(self, asked: _Asked) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
+        """Look again at answers whose publishers were not known; what comes too late, and whom to tell.
+
+        The lock is held here: whoever is told may need it.
+        """
+        waiting, asked.unknown = list(asked.unknown), deque(maxlen=UNKNOWN_KEPT)
+        late = [self._judge(asked, message) for message in waiting]
+        return [(asked.late, said) for said in late if said is not None and asked.late is not None]
+
+    def _judge(self, asked: _Asked, message: Message) -> RobotStop | None:
+        """Take an answer if it is of a program that must give one; what it says when it comes too late.
+
+        One that answers for another proves nothing. A refusal may be followed by the word that it stands
+        still after all, nothing else is taken back.
+        """
+        told = _stop_answer(message)
+        topics = {way.answer for way in asked.line.target.ways}
+        if told is None or told.get("state") not in ("succeeded", "failed") or message.topic not in topics:
+            return None
+        node = self._senders.node_of(message)
+        if node is None or not asked.serving:
+            asked.unknown.append(message)
+            return None
+        if node not in asked.serving:
+            view = self._view or GraphView(0, 0)
+            asked.strangers[node] = identity_of(view, node).node or node
+            return None
+        before, is_still = asked.serving[node], told["state"] == "succeeded"
+        if before is not None and (before.answered or not is_still):
+            return None
+        name, program = asked.line.name, asked.programs.get(node, "")
+        elapsed_ms = (self._clock() - asked.sent_s) * 1000
+        error = "" if is_still else said_of_stop(name, told.get("error"))
+        said = RobotStop(name, is_still, elapsed_ms, error=error, refused=not is_still, program=program)
+        asked.serving[node] = said
+        return said if asked.is_over else None
+
+    def _report(
+        self,
+        asked: Sequence[_Asked],
+        told: set[tuple[str, str]],
+        elapsed_ms: float,
+        on_answer: Callable[[RobotStop], object] | None,
+    ) -> StopReport:
+        with self._changed:
+            for each in asked:
+                each.is_over = True
+            results = [result for each in asked for result in each.results()]
+            untold = [
+                result
+                for each in asked
+                for node, result in zip(each.serving or {"": None}, each.results(), strict=True)
+                if (each.id, node) not in told
+            ]
+            strangers = [(each.line.name, program) for each in asked for program in each.strangers.values()]
+        for result in untold:
+            if on_answer is not None:
+                on_answer(result)
+        return StopReport(tuple(results), elapsed_ms, tuple(dict.fromkeys(strangers)))
+
+    def _forget_old(self) -> None:
+        """Let go of stops that are long over: nothing late is taken of them any more."""
+        now = self._clock()
+        over = [id for id, each in self._asked.items() if each.is_over]
+        for place, id in enumerate(over):
+            if place < len(over) - LATE_KEPT or now - self._asked[id].sent_s > LATE_S:
+                del self._asked[id]
+
+
+def _stop_answer(message: Message) -> Mapping[str, object] | None:
+    try:
+        payload = message.payload
+    except NepError:
+        return None
+    return payload if isinstance(payload, Mapping) and payload.get("op") == "stop" else None
+
+
+def _untold(line: _Line) -> str:
+    return f"{line.name} can't be told: {line.error or 'there is no way to it yet; press Stop again'}"
+
+
+def _id() -> str:
+    return f"stop-{uuid.uuid4().hex[:12]}"

@@ -1,0 +1,139 @@
+"""What a person tries with robots: each try is begun, watched over, and ends with one result."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Iterable, Mapping
+
+from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink
+from app.robots import rize
+from app.robots.description import Action, Robot
+from app.robots.identity import said
+
+FIRST_ANSWER_S = 3.0
+"""How long a robot may take to say anything to a command."""
+GRACE_S = 0.5
+"""The robot itself ends what took too long; this much later Studio does."""
+BEATS_MISSED = 4
+SHORTEST_SILENCE_S = 2.0
+
+
+class Tries:
+    """Begins tries and follows them. One thread uses it (the window's)."""
+
+    def __init__(
+        self,
+        send: Callable[[RobotLink, Payload], bool],
+        rest: Callable[[str], None],
+        clock: Callable[[], float],
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        """``send`` gives a command to a robot; ``rest`` is called with its name when it has nothing to do."""
+        self._send, self._rest, self._clock, self._wall = send, rest, clock, wall
+
+    def begin(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
+        """Send it; a robot that can't be reached fails it at once."""
+        made = Invocation(
+            uuid.uuid4().hex,
+            action.name,
+            started_s=self._clock(),
+            clock=self._clock,
+            given=dict(input),
+            timeout_s=action.timeout_s,
+            at_s=self._wall(),
+        )
+        link.invocations[action.name] = made
+        link.tried.append(made)
+        link.heard_s = self._clock()
+        if not self._send(link, command_of(link.robot, made, input)):
+            self._end(link, made, "failed", f"{link.name} can't be reached; check that it is on")
+        return made
+
+    def cancel(self, link: RobotLink, action: str) -> None:
+        """Cancel the try of an action; nothing happens when it has ended."""
+        made = link.invocations.get(action)
+        if made is not None and made.running:
+            self._send_cancel(link, made)
+
+    def answer(self, link: RobotLink, answer: Payload) -> None:
+        """Take over one of the robot's answers; those to others only say that it lives."""
+        link.heard_s = link.answered_s = self._clock()
+        link.mute = False
+        for made in link.running:
+            if made.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
+                continue
+            self._take(link, made, answer)
+
+    def _take(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
+        state = str(answer.get("state"))
+        if state not in FINAL_STATES and state not in ("accepted", "running"):
+            return  # no word of a robot
+        made.feedback = _object(answer.get("feedback")) or made.feedback
+        made.output = _object(answer.get("output")) or made.output
+        made.waits_for = _names(answer.get("waits_for")) or made.waits_for
+        made.replaces = _names(answer.get("replaces")) or made.replaces
+        error = answer.get("error")
+        if state in FINAL_STATES:
+            self._end(link, made, state, said(error) if error else None)
+            return
+        made.state = state
+        if state == "running" and made.begun_s is None:
+            made.begun_s = self._clock()
+
+    def look(self, links: Iterable[RobotLink]) -> None:
+        """End the tries of robots that fell silent, and those that took too long."""
+        now = self._clock()
+        for link in links:
+            for made in link.running:
+                self._look_at(link, made, now)
+
+    def _look_at(self, link: RobotLink, made: Invocation, now: float) -> None:
+        robot = link.robot
+        if robot.dialect == "native" and made.state == "sent":
+            if now - made.started_s > FIRST_ANSWER_S:
+                self._mute(link, made, f"{link.name} does not answer. Check that it is on.")
+            return
+        silence = max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
+        if silence is not None and now - link.heard_s > silence:
+            said = f"{link.name} has stopped answering. Check that it is on; Stop tells it to stand still."
+            self._mute(link, made, said)
+            return
+        left_s = made.left_s
+        if left_s is not None and left_s < -GRACE_S:
+            self._send_cancel(link, made)
+            self._end(link, made, "failed", f"{made.action} took longer than {made.timeout_s:g} s")
+
+    def _mute(self, link: RobotLink, made: Invocation, sentence: str) -> None:
+        link.mute = True
+        self._send_cancel(link, made)  # should it wake up again, it is not to go on
+        self._end(link, made, "failed", sentence)
+
+    def end_all(self, link: RobotLink, state: str, error: str | None = None) -> None:
+        """Everything that runs there has ended so."""
+        for made in link.running:
+            self._end(link, made, state, error)
+
+    def _end(self, link: RobotLink, made: Invocation, state: str, error: str | None) -> None:
+        made.state, made.error, made.ended_s = state, error, self._clock()
+        if not link.running:
+            self._rest(link.name)
+
+    def _send_cancel(self, link: RobotLink, made: Invocation) -> None:
+        if link.robot.dialect == "native":
+            self._send(link, {"id": made.id, "op": "cancel", "from": SENDER, "action": made.action})
+
+
+def command_of(robot: Robot, made: Invocation, input: Payload) -> Payload:
+    """The message that asks a robot to do it."""
+    if robot.dialect == "rize":
+        return rize.to_command(robot, made.action, input, made.id)
+    return {"id": made.id, "op": "invoke", "from": SENDER, "action": made.action, "input": dict(input)}
+
+
+def _names(value: object) -> tuple[str, ...]:
+    return tuple(str(name) for name in value) if isinstance(value, (list, tuple)) else ()
+
+
+def _object(value: object) -> Payload | None:
+    return value if isinstance(value, Mapping) else None

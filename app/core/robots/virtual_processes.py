@@ -1,0 +1,216 @@
+"""The processes that Studio starts beside itself: the master, when there is none, and virtual robots."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import IO
+
+from app.core.network.master_start import MasterStart
+from nep.masters.process import NO_CONSOLE
+
+END_WAIT_S = 2.0
+VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
+"""The module of each model of virtual robot."""
+TAIL_BYTES = 2000
+KNOWN_WITHIN_S = 3.0
+"""How long a start waits until it is known who is there: a robot of that name may be."""
+WISH_KEPT_S = 4.0
+"""How long a wish is kept for a robot that is there: it may have died, which is noticed within 3.3 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """A person wants a virtual robot of this model; until when that is kept (monotonic seconds)."""
+
+    model: str
+    known_until: float
+    until: float
+
+
+@dataclass(frozen=True, slots=True)
+class CompanionFailed:
+    """A process did not start or ended by itself; ``detail`` is the end of what it said."""
+
+    what: str
+    sentence: str
+    detail: str
+    is_robot: bool = True
+
+
+def module_command(module: str) -> list[str]:
+    """The command that runs one of our modules as a process of its own, also from a frozen build."""
+    if getattr(sys, "frozen", False):
+        return [sys.executable, "--module", module]
+    return [sys.executable, "-m", module]
+
+
+class Companions:
+    """Starts processes, notices when one ends, ends them with the window."""
+
+    def __init__(
+        self,
+        address: str,
+        post_event: Callable[[object], None],
+        is_there: Callable[[str], bool | None] = lambda _name: False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``address`` is the master's; failures are posted as `CompanionFailed`.
+
+        ``is_there`` tells whether a robot of a name is there, whoever started it; None while that is not
+        known yet. ``clock`` gives monotonic seconds.
+        """
+        self._address = address
+        self._is_there = is_there
+        self._clock = clock
+        self._wishes: dict[str, _Wish] = {}
+        self._post_event = post_event
+        self._lock = threading.Lock()
+        self._robots: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+        self.ended: frozenset[str] = frozenset()
+        """The virtual robots started here whose processes have ended by themselves."""
+        self._master = MasterStart(
+            address,
+            lambda why: post_event(CompanionFailed("master", "The master can't be started.", why, False)),
+        )
+
+    @property
+    def virtual_robots(self) -> tuple[str, ...]:
+        """The names of the virtual robots that run because Studio started them."""
+        with self._lock:
+            return tuple(name for name, (process, _) in self._robots.items() if process.poll() is None)
+
+    @property
+    def process_ids(self) -> tuple[int, ...]:
+        """The processes of the virtual robots that were started here and run."""
+        with self._lock:
+            return tuple(process.pid for process, _ in self._robots.values() if process.poll() is None)
+
+    @property
+    def started_master(self) -> bool:
+        """Whether the master that runs was started here."""
+        return self._master.runs
+
+    def ensure_master(self) -> None:
+        """Join the master that runs, or start one; returns at once, a failure is posted."""
+        self._master.ensure()
+
+    def keep_master(self) -> None:
+        """The same, to be said again and again while there is none: after a failure it takes its time."""
+        self._master.keep()
+
+    def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
+        """Start a virtual robot of that name and model.
+
+        One of that name that is there is used, also one that another Studio started. The wish is kept for
+        some seconds: `follow` starts a robot as soon as it is known that there is none, or none any more.
+        Where the master is started here, nobody can be there yet.
+        """
+        now = self._clock()
+        self._wishes[name] = _Wish(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
+        self.follow()
+
+    def follow(self) -> None:
+        """Start the robots that were wished and are not there (called by each of the session's ticks)."""
+        if not self._wishes:
+            return
+        now = self._clock()
+        for name, wish in list(self._wishes.items()):
+            there = self._is_there(name)
+            if there is None and (self._master.first or now >= wish.known_until):
+                there = False
+            if there is False:
+                del self._wishes[name]
+                self._start_robot(name, wish.model)
+            elif now >= wish.until:
+                del self._wishes[name]
+
+    def _start_robot(self, name: str, model: str) -> None:
+        with self._lock:
+            held = self._robots.get(name)
+            if held is not None and held[0].poll() is None:
+                return
+            log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  open while the process writes
+            command = [
+                *module_command(VIRTUAL_ROBOTS[model]),
+                "--name",
+                name,
+                "--owner-pid",
+                str(os.getpid()),
+            ]
+            environment = {**os.environ, "NEP_MASTER": self._address}
+            try:
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=log,
+                    env=environment,
+                    creationflags=NO_CONSOLE,
+                )
+            except OSError as error:
+                log.close()
+                self._post_event(
+                    CompanionFailed(name, f"The virtual robot {name} can't be started.", str(error))
+                )
+                return
+            self._robots[name] = (process, log)
+            self.ended -= {name}
+
+    def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
+        """Start it anew; a process of it that still lives but hangs is killed."""
+        self._wishes.pop(name, None)
+        with self._lock:
+            held = self._robots.pop(name, None)
+        if held is not None:
+            held[0].kill()
+            held[0].wait()
+            held[1].close()
+        self._start_robot(name, model)
+
+    def stop_virtual_robot(self, name: str) -> None:
+        """End a virtual robot that was started here; it is not wished any more."""
+        self._wishes.pop(name, None)
+        with self._lock:
+            held = self._robots.pop(name, None)
+        if held is not None:
+            _end(held[0])
+            held[1].close()
+
+    def check(self) -> None:
+        """Notice processes that ended by themselves (called once in a while by the session's tick)."""
+        with self._lock:
+            ended = [name for name, (process, _) in self._robots.items() if process.poll() is not None]
+            for name in ended:
+                _, log = self._robots.pop(name)
+                self.ended |= {name}
+                self._post_event(CompanionFailed(name, f"The virtual robot {name} has ended.", _tail(log)))
+                log.close()
+
+    def close(self) -> None:
+        """End the virtual robots. The master lives on while programs that are not ours are registered."""
+        self._wishes.clear()
+        for name in list(self._robots):
+            self.stop_virtual_robot(name)
+        self._master.close()
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(timeout=END_WAIT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _tail(log: IO[bytes]) -> str:
+    log.seek(0, os.SEEK_END)
+    log.seek(max(0, log.tell() - TAIL_BYTES))
+    return log.read().decode("utf-8", "replace").strip()

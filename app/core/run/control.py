@@ -1,0 +1,445 @@
+"""Run, Pause, Step and Stop: the program's process and the robots' answers."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+
+from app.blocks.publishing import guarded
+from app.core.alerts import Alerts
+from app.core.console import Console
+from app.core.documents.document import Document
+from app.core.faults import survived, words_of
+from app.core.robots.fleet import Fleet
+from app.core.robots.motion_permission import wanted_by
+from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
+from app.core.robots.stop import RobotStopper
+from app.core.robots.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.run.run_needs import Behaviours, Network
+from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.view import (
+    RunState,
+    RunView,
+    clock_words,
+    place_of,
+    result_words,
+    stop_words,
+    stops_by_name,
+    view_of,
+)
+from app.core.run.view import unanswered_words as unanswered_words_of
+from app.errors import AppError
+from app.robots.description import Robot
+
+CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
+NO_NETWORK = "there is no connection to the network yet"
+
+_log = logging.getLogger("studio")
+
+
+class Runs:
+    """The behaviour's runs. One thread uses it (the window's); the stop itself happens beside it."""
+
+    def __init__(
+        self,
+        documents: Behaviours,
+        fleet: Fleet,
+        network: Network,
+        *,
+        alerts: Alerts,
+        console: Console,
+        post_event: Callable[[object], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Nothing runs yet."""
+        self._documents, self._fleet, self._network = documents, fleet, network
+        self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
+        self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
+        self.pace_s = 0.0
+        self._runner: Runner | None = None
+        self._used: tuple[str, ...] = ()
+        self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
+        self.kept: frozenset[str] = frozenset()  # robots it used, until proven still; a stop reaches them
+        self._labels: Mapping[str, str] = {}
+        self._wanted: list[tuple[Robot, Sequence[str]]] = []  # what the program asks of its robots
+        self._told_owners: Mapping[str, str] = {}  # the programs that its robots are, as it knows them
+        self._robots_told = -1
+        self._run = RunState()
+        self._stop_number = 0
+        self._asked_again: set[str] = set()
+        self._stop_thread: threading.Thread | None = None
+        self.running_blocks: tuple[str, ...] = ()
+        self.stopped_blocks: tuple[str, ...] = ()
+        self.block_errors: Mapping[str, str] = {}
+        self.blocks_revision = 0
+
+    # -- what a person does ------------------------------------------------------------------------------
+
+    @property
+    def active(self) -> bool:
+        """Whether a program runs or is paused."""
+        return self._run.state in {"running", "paused"}
+
+    def view(self) -> RunView:
+        """What the run bar says now."""
+        names = [link.name for link in self._fleet.connected]
+        if self._run.nothing_in and self._run.nothing_in is not self._documents.current.newest():
+            self._run.nothing_in = None  # another behaviour shows, or this one was edited
+        elsewhere = self.document not in {None, self._documents.current}
+        return view_of(self._run, names, self._clock(), elsewhere=elsewhere, slow=self.pace_s > 0)
+
+    def run(self) -> None:
+        """Run the behaviour as it is now; while paused, go on. Problems are told on their blocks."""
+        if self._run.state == "paused":
+            self.go_on()
+        elif self._run.state in {"ready", "proven"}:
+            self._begin(paused=False)
+
+    def step(self) -> None:
+        """Run one block: of a paused program the next, of none the first; a running one is paused."""
+        if self._run.state in {"ready", "proven"}:
+            self._begin(paused=True)
+        elif self._run.state == "running":
+            self.pause()
+        elif self._run.state == "paused" and self._runner is not None:
+            self._runner.step()
+
+    def set_pace(self, seconds: float) -> None:
+        """Slow motion, also of the program that runs: each block waits so long before it is done."""
+        self.pace_s = seconds
+        if self._runner is not None:
+            self._runner.set_pace(seconds)
+
+    def pause(self) -> None:
+        """Hold the program; its robots stand still (docs/adr/0006), its clock stands."""
+        if self._run.state == "running" and self._runner is not None:
+            self._runner.pause()
+
+    def go_on(self) -> None:
+        """Let a paused program go on."""
+        run = self._run
+        if run.state == "paused" and self._runner is not None:
+            self._runner.go_on()
+            if run.pause_began_s is not None:
+                run.held_s += self._clock() - run.pause_began_s
+                run.pause_began_s = None
+            run.state = "running"
+            self._mark(stopped=())
+
+    def stop(self) -> None:
+        """End the program and stop every robot; what they answer is the run bar's result."""
+        self._asked_again.clear()
+        self._stop(None)
+        self._fleet.moving.withdraw()
+
+    def stop_robot(self, name: str) -> None:
+        """Stop one robot; while a program runs this is `stop`, because it would move the robot again."""
+        if self.active:
+            self.stop()
+            return
+        self._asked_again.discard(name)
+        self._stop_one(name)
+
+    def _stop_one(self, name: str) -> None:
+        stopper, post = self._network.stopper, self._post_event
+        self._fleet.told_to_stop([name])
+
+        def stop_it() -> None:
+            post(OneStopped(_asked(stopper, (name,), on_late=lambda late: post(LateAnswer(None, late)))))
+
+        threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
+
+    def stop_again(self, name: str) -> None:
+        """A robot that was not stopped says that it could end what went on: it is asked to prove it.
+
+        Once after a person's Stop: one whose stop takes longer each time than it may is not stopped for ever.
+        """
+        report, state = self._run.report, self._run.state
+        if name in self._asked_again:
+            return
+        if state == "unanswered" and report is not None and name in report.silent:
+            self._asked_again.add(name)
+            self._stop(self._run.asked)
+        elif state in {"ready", "proven"}:
+            self._asked_again.add(name)
+            self._stop_one(name)
+
+    def follow_robots(self) -> None:
+        """Robots came, or were started anew: the program is told, of what moves after the question."""
+        if self._runner is None or not self.active or self._fleet.revision == self._robots_told:
+            return
+        self._robots_told, owners = self._fleet.revision, self._owners()
+        links = [self._fleet.link(robot.name) for robot, _ in self._wanted]
+        asked = {robot.name: actions for robot, actions in self._wanted}
+        anew = [
+            link
+            for link in links
+            if link is not None
+            and link.name in owners
+            and owners[link.name] != self._told_owners.get(link.name)
+        ]
+        if self._fleet.moving.permits([(link.robot, asked[link.name]) for link in anew], self._tell_robots):
+            self._tell_robots()
+        else:
+            self._tell_robots(without=[link.name for link in anew])
+
+    def _tell_robots(self, without: Collection[str] = ()) -> None:
+        if self._runner is None:
+            return
+        owners = {name: id for name, id in self._owners().items() if name not in without}
+        self._told_owners = {**self._told_owners, **owners}
+        self._runner.set_robots(owners, guarded(link.robot for link in self._fleet.connected))
+
+    def _owners(self) -> dict[str, str]:
+        """The nodes that the connected robots are."""
+        there = self._fleet.connected
+        return {link.name: link.identity.node_id for link in there if link.identity is not None}
+
+    def confirm_still(self) -> None:
+        """A person says that the robot that did not answer stands still."""
+        if self._run.state == "unanswered":
+            self._run.state, self._run.report = "ready", None
+            self._fleet.stands_still(self.kept)
+            self.kept = frozenset()
+            self._alerts.cure("stop")
+
+    def close(self) -> None:
+        """The window closes: end the program; its robots are told by its end."""
+        if self._runner is not None:
+            self._runner.stop()
+        if self._stop_thread is not None:
+            self._stop_thread.join(timeout=CLOSE_WAIT_S)
+
+    # -- what the session tells --------------------------------------------------------------------------
+
+    def on_runner(self, event: RunnerEvent) -> None:
+        """Take over what the program's process said; what an earlier run still says is ignored."""
+        if self._runner is None or event.run != self._runner.run:
+            return
+        run = self._run
+        match event.kind:
+            case "running" if run.state in {"running", "paused"}:
+                if event.says and event.says != run.says:
+                    run.says = event.says
+                    self._console.add("info", run.name, event.says)
+                self._mark(running=event.blocks, stopped=self.stopped_blocks)
+            case "paused" if run.state in {"running", "paused"}:
+                run.state, run.paused_at = "paused", place_of(event.says, event.blocks, self._labels)
+                run.pause_began_s, run.warning = run.pause_began_s or self._clock(), event.text
+                self._mark(stopped=event.blocks)
+            case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
+                self._on_error(event)
+            case "print":
+                self._console.add("info", run.name, event.text)
+            case "ended":
+                self._on_end(event)
+
+    def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
+        """Take over what robots answered to the newest stop."""
+        run = self._run
+        if isinstance(event, OneStopped):
+            self._tell_fleet(event.report)
+            self._tell_person(event.report, "stop")
+        elif isinstance(event, LateAnswer):
+            self._on_late(event)
+        elif event.number == self._stop_number:
+            if isinstance(event, RobotAnswered):
+                run.answered.append(event.robot)
+                if event.robot.wrong or not event.robot.waits:
+                    same = [robot for robot in run.answered if robot.name == event.robot.name]
+                    self._tell_fleet(StopReport(tuple(same), 0.0))
+            else:
+                run.dashed = bool(self.stopped_blocks)
+                self._take_report(event.report)
+
+    def _take_report(self, report: StopReport) -> None:
+        """How it stands is taken over before any words are made: no fault in them leaves it "stopping"."""
+        run = self._run
+        run.state, run.report = "proven" if report.proven else "unanswered", report
+        self.kept = frozenset(report.silent)
+        self._tell_fleet(report)
+        run.last_words, _ = result_words(report)
+        self._tell_person(report, run.name or "stop")
+
+    def _on_late(self, event: LateAnswer) -> None:
+        """A robot answered too late: what it says now counts, if nothing else has happened since."""
+        run = self._run
+        if event.number is None:
+            self.on_stop(OneStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0)))
+        elif event.number == self._stop_number and run.state == "unanswered" and run.report is not None:
+            self._take_report(run.report.with_late(event.robot))
+
+    # -- inside ------------------------------------------------------------------------------------------
+
+    def _begin(self, *, paused: bool) -> None:
+        document = self.document = self._documents.current
+        self._alerts.cure("program")
+        self._set_errors({})
+        self._mark()
+        try:
+            program = document.program()
+            wrong = {p.block_id: p.sentence for p in program.problems if p.severity == "error" and p.block_id}
+            if wrong:
+                self._set_errors(wrong)
+                return
+            if not program.starts:
+                self._run = RunState(nothing_in=program, last_words=self._run.last_words)
+                return
+            used = [link.robot for link in self._fleet.connected if link.name in program.robots]
+            wanted = wanted_by(program.runnable, used, program.moves)
+            if not self._fleet.moving.permits(wanted, self.step if paused else self.run):
+                return  # a person is asked first; the question stands in the window
+            runner = Runner(self._post_event)
+            robots = [link.robot.source for link in self._fleet.connected]
+            owners = self._owners()
+            runner.start(
+                program,
+                robots,
+                self._network.address,
+                name=document.name,
+                paused=paused,
+                pace_s=self.pace_s,
+                owners=owners,
+            )
+        except AppError as error:
+            self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
+            return
+        self._runner, self._used, self._labels = runner, program.robots, program.labels
+        self._wanted, self._told_owners, self._robots_told = wanted, owners, self._fleet.revision
+        self.kept, self._program_key = frozenset(program.robots), runner.program_key
+        self._console.leave_out(runner.pid)
+        last = self._run.last_words
+        self._run = RunState("running", document.name, started_s=self._clock(), last_words=last)
+        self._console.add("info", self._run.name, "started")
+
+    def _on_error(self, event: RunnerEvent) -> None:
+        self._console.add("error", self._run.name, event.text)
+        if event.blocks:
+            self._set_errors({event.blocks[0]: event.text})
+        else:
+            self._alerts.put("program", "error", "The behaviour was stopped.", event.text)
+
+    def _on_end(self, event: RunnerEvent) -> None:
+        self._runner = None
+        if not self.active:
+            return  # Stop was first
+        finished = event.ok and not self.block_errors
+        if finished:
+            self._mark()
+        # the end of a program is a stop like any other: every robot that it used is told and must answer
+        self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
+        self._run.finished = finished
+        if not event.ok and not self.block_errors:
+            self._alerts.put("program", "error", "The behaviour ended by itself.", event.text)
+
+    def _stop(self, names: tuple[str, ...] | None) -> None:
+        """Stop these robots, or all."""
+        run = self._run
+        run.pressed_s = self._clock()
+        run.again = run.state == "unanswered" or (run.state == "stopping" and run.again)
+        if self.active:
+            run.elapsed_s = run.elapsed(run.pressed_s)
+        elif run.state not in {"stopping", "unanswered"}:
+            run.elapsed_s = None
+        run.state, run.report, run.answered, run.finished = "stopping", None, [], False
+        everybody = tuple(
+            link.name
+            for link in self._fleet.links
+            if link.connected or link.not_stopped or link.name in self.kept
+        )
+        # those that an earlier stop has told and that have not answered: its own report is not waited for
+        run.asked = tuple(
+            dict.fromkeys((*(names if names is not None else everybody), *self._fleet.stopping))
+        )
+        self._fleet.told_to_stop(run.asked)
+        self._mark(stopped=self.running_blocks or self.stopped_blocks)
+        self._stop_number += 1
+        work = partial(
+            self._stop_all,
+            self._stop_number,
+            self._runner,
+            self._network.stopper,
+            run.asked,
+            self._program_key,
+        )
+        self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
+        self._stop_thread.start()
+
+    def _stop_all(
+        self,
+        number: int,
+        runner: Runner | None,
+        stopper: RobotStopper | None,
+        names: tuple[str, ...],
+        ends: str | None,
+    ) -> None:
+        def answered(robot: RobotStop) -> None:
+            self._post_event(RobotAnswered(number, robot))
+
+        def late(robot: RobotStop) -> None:
+            self._post_event(LateAnswer(number, robot))
+
+        if runner is not None:
+            if stopper is not None:
+                with survived(
+                    "tell the robots at once"
+                ):  # they are told again below, also those without `ends`
+                    stopper.send_stop(ends=ends)
+            with survived("end the program"):
+                runner.stop()
+        self._post_event(
+            StopDone(number, _asked(stopper, names, on_answer=answered, ends=ends, on_late=late))
+        )
+
+    def _tell_person(self, report: StopReport, origin: str) -> None:
+        for name, program in report.strangers:
+            said = f"“{program}” answered Stop in the name of {name}; that does not count"
+            self._console.add("error", origin, said)
+            detail = "Find out what this program is and close it."
+            self._alerts.put(f"stranger:{name}", "error", f"{said}.", detail)
+        words, good = result_words(report)
+        if good:
+            self._console.add("info", origin, words)
+            self._alerts.cure("stop")
+        else:
+            title, detail, _, _ = unanswered_words_of(report)
+            self._console.add("error", origin, f"{words}: {title}")
+            self._alerts.put("stop", "error", f"{title}.", detail, button="Stop again", action="run.stop")
+
+    def _tell_fleet(self, report: StopReport) -> None:
+        clock, stops = clock_words(time.localtime()), stops_by_name(report)
+        self._fleet.stopped(
+            {name: stop_words(robot, clock) for name, robot in stops.items()},
+            {name: robot.wrong for name, robot in stops.items()},
+        )
+
+    def _set_errors(self, errors: Mapping[str, str]) -> None:
+        self.block_errors = self._run.errors = errors
+        self.blocks_revision += 1
+
+    def _mark(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
+        self.running_blocks, self.stopped_blocks = running, stopped
+        self.blocks_revision += 1
+
+
+def _asked(
+    stopper: RobotStopper | None,
+    names: tuple[str, ...],
+    *,
+    on_late: Callable[[RobotStop], object],
+    on_answer: Callable[[RobotStop], object] | None = None,
+    ends: str | None = None,
+) -> StopReport:
+    """Stop these robots. There is a report whatever happens: without one the run would stay "stopping"."""
+    why = NO_NETWORK
+    if stopper is not None:
+        try:
+            return stopper.stop_all(names, on_answer=on_answer, ends=ends, on_late=on_late)
+        except Exception as error:  # noqa: BLE001  whatever it is: these robots are not proven to stand still
+            _log.exception("can't stop the robots")
+            why = words_of(error)
+    return StopReport((), 0.0).with_asked(names, why)

@@ -1,0 +1,300 @@
+"""Runner: a program in a process of its own, which can be paused, stepped, and always ended."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import queue
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal
+
+from app.blocks.program import Program
+from app.core.run.child_output import Gate, Output, text_of, texts
+from app.core.run.child_process import MOST_BYTES, ChildProcess, home
+from app.core.run.child_process import child_command as child_command
+from app.core.run.runner_event import RunnerEvent as RunnerEvent
+from app.errors import RunnerError
+from app.robots.identity import program_of
+
+State = Literal["ready", "running", "paused", "stopping", "ended"]
+
+ASK_S = 0.04
+"""How long a stopped program may take to end by itself; then it is killed. Together well below 100 ms."""
+END_S = 2.0
+"""How long a process whose program has ended may take to end."""
+LOOK_S = 0.1
+"""How often its memory is looked at."""
+PIPE_S = 0.5
+"""How long its pipes may go on after it has gone: somebody that it has started may hold them."""
+EVENTS_PER_S = 300
+MOST_BLOCKS = 100
+WORTH_TELLING = 10_000
+LONGEST_ERROR = 100_000
+ERRORS_KEPT = 40
+
+_runs = itertools.count(1)
+
+
+class Runner:
+    """Runs one program. `on_event` is called in threads of its own; "ended" comes exactly once, and last.
+
+    A program that floods Studio, takes too much memory or leaves processes behind is bounded, and told about.
+    """
+
+    def __init__(
+        self,
+        on_event: Callable[[RunnerEvent], object],
+        *,
+        command: Sequence[str] | None = None,
+        most_bytes: int = MOST_BYTES,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`command` starts the child, by default this Python or this frozen Studio."""
+        self.run = next(_runs)
+        self.program_key = uuid.uuid4().hex
+        """A stop with it ends the program: nothing it sent moves a robot later. Not told before."""
+        self.program_id = program_of(self.program_key)
+        """Who the robots' commands are from."""
+        self.state: State = "ready"
+        self._on_event = on_event
+        self._command = tuple(command) if command is not None else child_command()
+        self._clock, self._most_bytes = clock, most_bytes
+        self._child: ChildProcess | None = None
+        self._threads: list[threading.Thread] = []
+        self._errors: deque[str] = deque(maxlen=ERRORS_KEPT)
+        self._orders: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
+        self._began_s = 0.0
+        self._ended, self._output_over = threading.Event(), threading.Event()
+        self._last: RunnerEvent | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """The child's process id, None before `start`."""
+        return None if self._child is None else self._child.popen.pid
+
+    def start(
+        self,
+        program: Program,
+        robots: Sequence[Mapping[str, object]],
+        master: str | None,
+        *,
+        name: str | None = None,
+        paused: bool = False,
+        pace_s: float = 0.0,
+        owners: Mapping[str, str] | None = None,
+    ) -> None:
+        """Start the program; `robots` are the descriptions of those that are connected.
+
+        `owners` are the ids of the nodes that they are, by their names: only what these say counts. `pace_s`
+        is slow motion (`set_pace`). RunnerError if its process can't be started.
+        """
+        if self._child is not None:
+            raise RunnerError("this runner has run its program; make another one")
+        self._child = child = ChildProcess(self._command, home(), most_bytes=self._most_bytes)
+        self._began_s = self._clock()
+        self.state = "paused" if paused else "running"
+        kept = program.to_json() | ({} if name is None else {"name": name})
+        self._orders.put(
+            {
+                "do": "start",
+                "id": self.program_id,
+                "program": kept,
+                "robots": list(robots),
+                "owners": dict(owners or {}),
+                "master": master,
+                "paused": paused,
+                "pace_s": pace_s,
+            }
+        )
+        self._thread(self._write, "input")
+        errors = self._thread(lambda: self._read_errors(child), "errors")
+        reader = self._thread(lambda: self._read(child), "output")
+        self._thread(lambda: self._watch(child, reader, errors), "watch")  # last: it waits for the others
+
+    def _thread(self, work: Callable[[], None], label: str) -> threading.Thread:
+        thread = threading.Thread(target=work, name=f"runner {label}", daemon=True)
+        self._threads.append(thread)
+        thread.start()
+        return thread
+
+    def set_pace(self, seconds: float) -> None:
+        """Slow motion: how long each script stays at a block before it is done; 0 for none."""
+        self._orders.put({"do": "pace", "pace_s": seconds})
+
+    def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
+        """Robots have come, or were started anew: the nodes that they are, and the topics that move them."""
+        topics = {topic: list(names) for topic, names in guarded.items()}
+        self._orders.put({"do": "robots", "owners": dict(owners), "guarded": topics})
+
+    def pause(self) -> None:
+        """Hold the program, and what its robots do; the event "paused" says when all stand still."""
+        self._orders.put({"do": "pause"})
+
+    def go_on(self) -> None:
+        """Let a paused program go on."""
+        if self.state == "paused":
+            self.state = "running"
+        self._orders.put({"do": "go"})
+
+    def step(self) -> None:
+        """Run one block of a paused program."""
+        self._orders.put({"do": "step"})
+
+    def stop(self) -> None:
+        """End the program: it is asked, and killed if it has not ended at once. It is gone within 100 ms.
+
+        Works in every state and from any thread. Its robots are another matter: `app.core.robots.stop`.
+        """
+        child = self._child
+        if child is None:
+            return
+        if self.state != "ended":
+            self.state = "stopping"
+        self._orders.put({"do": "stop"})
+        self._orders.put(None)
+        if not child.wait(ASK_S):
+            child.kill()
+            child.wait(END_S)
+
+    def wait(self, timeout_s: float | None = None) -> bool:
+        """Wait until the program has ended and its last event was told; whether it has."""
+        return self._ended.wait(timeout_s)
+
+    def close(self) -> None:
+        """End the program and the threads."""
+        self.stop()
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join(timeout=END_S)
+
+    # ---- inside
+
+    def _write(self) -> None:
+        """Send orders; a thread of its own, because a child that hangs does not read."""
+        child = self._child
+        if child is None or child.popen.stdin is None:
+            return
+        try:
+            with child.popen.stdin as stream:
+                while (order := self._orders.get()) is not None:
+                    stream.write(json.dumps(order).encode() + b"\n")
+                    stream.flush()
+        except (OSError, ValueError):
+            return  # it has ended; the reader tells
+
+    def _read(self, child: ChildProcess) -> None:
+        """Tell what the child says, until its last word or the end of its pipe."""
+        if child.popen.stdout is None:
+            return
+        output, gate = Output(child.popen.stdout, self._ended, self._clock), Gate(EVENTS_PER_S, self._clock)
+        for line in output:
+            event = self._event(line)
+            if event is None:
+                output.strange_bytes += len(line)
+            elif event.kind == "ended":
+                self._last = event
+                break
+            elif event.kind == "ready" or gate.passes():
+                self._tell(event, gate)
+        self._left_out(gate.kept_back, output.strange_bytes)
+        child.popen.stdout.close()
+        self._output_over.set()
+
+    def _tell(self, event: RunnerEvent, gate: Gate) -> None:
+        if event.kind in ("running", "paused") and self.state in ("running", "paused"):
+            self.state = "paused" if event.kind == "paused" else "running"
+        missed = gate.take_kept_back()
+        if missed:
+            self._left_out(missed, 0)
+        self._on_event(event)
+
+    def _left_out(self, events: int, strange_bytes: int) -> None:
+        """Say how much was not shown."""
+        if events:
+            text = f"{events} lines were left out: too many at once"
+            self._on_event(RunnerEvent("print", self.run, text=text))
+        if strange_bytes >= WORTH_TELLING:
+            text = f"{strange_bytes / 1e6:.1f} MB that no block wrote were left out"
+            self._on_event(RunnerEvent("print", self.run, text=text))
+
+    def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
+        """Look after the child until it has gone, then tell its end."""
+        while not child.ended and not self._output_over.wait(LOOK_S):
+            child.look()
+        self._orders.put(None)  # its input ends, and with it a child that still waits for orders
+        hung = not child.wait(END_S)
+        if hung:
+            child.kill()
+            child.wait(END_S)
+        child.end_family()  # what it has left behind would hold its pipes open
+        reader.join(timeout=PIPE_S)
+        errors.join(timeout=PIPE_S)  # its last words
+        was_stopped = self.state == "stopping"
+        self.state = "ended"
+        last = self._last
+        if last is None:
+            text = "" if was_stopped else self._why(child, hung=hung)
+            last = RunnerEvent("ended", self.run, text=text, ok=was_stopped, elapsed_s=self._elapsed())
+        self._on_event(last)
+        self._ended.set()
+
+    def _elapsed(self) -> float:
+        return round(self._clock() - self._began_s, 3)
+
+    def _why(self, child: ChildProcess, *, hung: bool) -> str:
+        """Why a process ended that did not say so."""
+        if child.too_large:
+            return f"The program used more than {self._most_bytes / 1e9:g} GB of memory and was ended."
+        if hung:
+            return "The program closed its line to Studio and was ended."
+        code = child.popen.returncode
+        words = next((line for line in reversed(self._errors) if line.strip()), "")
+        how = f"was killed (signal {-code})" if code < 0 else f"ended with code {code}"
+        return f"The program's process {how}{': ' + words.strip() if words else ''}."
+
+    def _read_errors(self, child: ChildProcess) -> None:
+        """Keep the last lines of what went wrong; a line without an end is cut."""
+        stream = child.popen.stderr
+        if stream is None:
+            return
+        try:
+            for line in iter(lambda: stream.readline(LONGEST_ERROR), b""):
+                self._errors.append(line.decode("utf-8", "replace")[:500].rstrip())
+        finally:
+            stream.close()
+
+    def _event(self, line: bytes) -> RunnerEvent | None:
+        """The event of a line; None for what the child's protocol does not know."""
+        try:
+            said = json.loads(line)
+        except (ValueError, RecursionError):
+            return None
+        if not isinstance(said, Mapping):
+            return None
+        kind = said.get("is")
+        block = said.get("block")
+        first = (block,) if isinstance(block, str) else ()
+        blocks = (*first, *(each for each in texts(said.get("blocks"))[:MOST_BLOCKS] if each not in first))
+        if kind == "ready":
+            return RunnerEvent("ready", self.run)
+        if kind in ("running", "paused"):
+            says, text = text_of(said, "says"), text_of(said, "warning")
+            return RunnerEvent(kind, self.run, blocks=blocks, says=says, text=text)
+        if kind == "error":
+            return RunnerEvent("error", self.run, blocks=first, text=text_of(said, "sentence"), ok=False)
+        if kind == "print":
+            return RunnerEvent("print", self.run, text=text_of(said, "text"))
+        if kind == "ended":
+            elapsed_s = said.get("elapsed_s")
+            return RunnerEvent(
+                "ended",
+                self.run,
+                ok=said.get("ok") is True,
+                elapsed_s=float(elapsed_s) if isinstance(elapsed_s, (int, float)) else self._elapsed(),
+                silent=texts(said.get("silent")),
+            )
+        return None

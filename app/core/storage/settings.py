@@ -1,0 +1,154 @@
+"""What a person chose, kept between starts: one JSON file in the user's configuration folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import platformdirs
+
+from app.core.storage.atomic_file import make_private, read_whole, write_atomically
+from app.core.storage.file_lock import locked
+from app.errors import SettingsError
+from nep.system.replace_file import replace_file
+
+RECENT_LIMIT = 12
+T = TypeVar("T")
+
+
+def home() -> Path:
+    """Studio's own folder: ``$NEP_STUDIO_HOME``, else the system's place for configuration."""
+    chosen = os.environ.get("NEP_STUDIO_HOME")
+    return Path(chosen) if chosen else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
+
+
+def data_home() -> Path:
+    """Where Studio keeps what is large: ``$NEP_STUDIO_HOME``, else the system's place for data."""
+    chosen = os.environ.get("NEP_STUDIO_HOME")
+    return Path(chosen) if chosen else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
+
+
+@dataclass(frozen=True, slots=True)
+class RecentFile:
+    """A file that was opened or saved, and when (epoch seconds)."""
+
+    path: Path
+    name: str
+    opened_s: float
+    there: bool = True
+
+
+class Settings:
+    """Chosen values by name. A damaged file is kept beside (``settings.damaged.json``), never lost."""
+
+    def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
+        """Read ``settings.json`` in ``folder`` (default: `home`); none yet is fine."""
+        self.path = (folder if folder is not None else home()) / "settings.json"
+        self.damaged: Path | None = None
+        self.not_kept: str | None = None
+        """Why the file could not be written last, as a sentence; None when it could."""
+        self._unwritten: dict[str, object] = {}
+        self._clock = clock
+        make_private(self.path.parent, "settings*.json")
+        self._values: dict[str, object] = self._read()
+
+    def get(self, key: str, default: T) -> T:
+        """The value of ``key``; ``default`` when there is none or it is of another type."""
+        value = self._values.get(key, default)
+        if default is None or isinstance(value, type(default)):
+            return value  # type: ignore[return-value]  # checked on the line above
+        return default
+
+    def set(self, key: str, value: object) -> None:
+        """Keep ``value`` (anything JSON can say) and write the file. Raises SettingsError.
+
+        Raises TypeError or ValueError for what JSON can't say: not kept, as nothing else could be written
+        beside it. What another Studio on this computer has kept meanwhile stays, but for this key. What could
+        not be written stays here, and is written with the next value.
+        """
+        if key in self._values and self._values[key] == value and self.not_kept is None:
+            return
+        json.dumps(value)
+        self._values[key] = self._unwritten[key] = value
+        with locked(self.path):
+            self._values = self._of_others()
+            self._write()
+
+    @property
+    def recent(self) -> list[RecentFile]:
+        """Files opened lately, newest first; those that are gone are left out."""
+        return [file for file in self.recent_known if file.there]
+
+    @property
+    def recent_known(self) -> list[RecentFile]:
+        """Files opened lately, newest first; those that are gone say so."""
+        found = []
+        entries: list[object] = self.get("recent", [])
+        for entry in entries:
+            if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
+                path, when = Path(entry["path"]), entry.get("opened_s", 0)
+                opened_s = float(when) if isinstance(when, int | float) else 0.0
+                found.append(RecentFile(path, str(entry.get("name", path.stem)), opened_s, path.is_file()))
+        return found
+
+    def add_recent(self, path: Path, name: str | None = None) -> None:
+        """Put ``path`` first among the recent files. Raises SettingsError."""
+        path = path.resolve()
+        self._values = self._of_others()
+        kept = [file for file in self.recent_known if file.path != path]
+        self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
+
+    def set_recent(self, files: Sequence[RecentFile]) -> None:
+        """Remember these files and no others, newest first. Raises SettingsError."""
+        told = [
+            {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
+            for file in files[:RECENT_LIMIT]
+        ]
+        self.set("recent", told)
+
+    def _read(self) -> dict[str, object]:
+        try:
+            text = read_whole(self.path).decode("utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            return {}
+        except (OSError, UnicodeDecodeError):
+            return self._set_aside()
+        try:
+            values = json.loads(text)
+        except (ValueError, RecursionError):
+            return self._set_aside()
+        return values if isinstance(values, dict) else self._set_aside()
+
+    def _of_others(self) -> dict[str, object]:
+        """What the file says now, with what is not written yet; what is known here if it can't be read."""
+        try:
+            values = json.loads(read_whole(self.path))
+        except (OSError, ValueError, RecursionError):
+            return self._values
+        return {**values, **self._unwritten} if isinstance(values, dict) else self._values
+
+    def _set_aside(self) -> dict[str, object]:
+        self.damaged = self.path.with_name("settings.damaged.json")
+        try:
+            replace_file(self.path, self.damaged)
+        except OSError:
+            self.damaged = None
+        return {}
+
+    def _write(self) -> None:
+        text = json.dumps(self._values, indent=1, ensure_ascii=False, sort_keys=True)
+        # A file's name that is no UTF-8 has lone surrogates: JSON has them as backslash, u and four digits.
+        data = text.encode("utf-8", "backslashreplace")
+        try:
+            write_atomically(self.path, data, durable=False, private=True)
+        except OSError as error:
+            failed = SettingsError(self.path, error.strerror or str(error))
+            self.not_kept = str(failed)
+            raise failed from error
+        self.not_kept = None
+        self._unwritten.clear()
