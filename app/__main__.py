@@ -21,7 +21,7 @@ from nep.system.descriptors import allow_many
 from nep.system.streams import close_streams, prepare_streams, words_given
 from nep.version import __version__
 
-PROCESSES = ("app.blocks.child", "app.robots.simulated", "app.robots.turtle", "nep")
+PROCESSES = ("app.blocks.runtime.child", "app.robots.simulated", "app.robots.turtle", "nep")
 
 
 def window_parser() -> argparse.ArgumentParser:
@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(given: Sequence[str]) -> int:
     if given[:1] == ["--child"]:
-        return hand_over("app.blocks.child", given[1:])
+        return hand_over("app.blocks.runtime.child", given[1:])
     if given[:1] == ["--module"] and len(given) > 1:
         return hand_over(given[1], given[2:])
     if given[:1] == ["run"]:

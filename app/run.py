@@ -18,10 +18,10 @@ from typing import TextIO
 
 import nep
 from app.blocks import Program, compile_behaviour
-from app.blocks.fleet_search import Found, find_robots
-from app.blocks.publishing import guarded
-from app.blocks.undisturbed import undisturbed
-from app.blocks.workspace import Workspace, parse_workspace
+from app.blocks.model.workspace import Workspace, parse_workspace
+from app.blocks.runtime.find_robots import Found, find_robots
+from app.blocks.runtime.publishing import guarded
+from app.blocks.runtime.uninterrupted import undisturbed
 from app.core.documents.document import read
 from app.core.robots.motion_permission import risky, wanted_by
 from app.core.robots.own_processes import Processes

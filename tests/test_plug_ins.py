@@ -14,7 +14,7 @@ import pytest
 
 import nep
 from app.blocks import compile_behaviour, editor_definitions
-from app.blocks.catalogue import categories
+from app.blocks.toolbox.catalogue import categories
 from app.robots.description import parse, td_for
 from app.robots.kit import Driver
 from nep.masters.master import Master
@@ -66,8 +66,8 @@ def test_a_category_is_in_the_toolbox_and_its_block_compiles(write: Write) -> No
         "app.blocks.categories",
         "greetings",
         """
-        from app.blocks.block import Block
-        from app.blocks.category import Category
+        from app.blocks.model.block import Block
+        from app.blocks.model.category import Category
 
         CATEGORY = Category(
             name="greetings", title="Greetings", style="messages", icon="hand", order=99,

@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from app.blocks.block import Block  # noqa: E402
-from app.blocks.catalogue import categories  # noqa: E402
-from app.blocks.examples import EXAMPLES  # noqa: E402
+from app.blocks.model.block import Block  # noqa: E402
+from app.blocks.toolbox.catalogue import categories  # noqa: E402
+from app.blocks.toolbox.examples import EXAMPLES  # noqa: E402
 
 PAGE = ROOT / "docs" / "blocks.md"
 BEGIN, END = "<!-- blocks: made by tools/blocks_page.py -->", "<!-- end of blocks -->"

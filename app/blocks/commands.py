@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import sys
 
-from app.blocks import calls, lists, values
-from app.blocks.fleet_search import find_robots
-from app.blocks.network import Network
-from app.blocks.runtime import Runtime
-from app.blocks.undisturbed import undisturbed
+from app.blocks.runtime import calls, lists, values
+from app.blocks.runtime.find_robots import find_robots
+from app.blocks.runtime.network import Network
+from app.blocks.runtime.runtime import Runtime
+from app.blocks.runtime.uninterrupted import undisturbed
 from nep import node as new_node
 from nep.system.streams import prepare_streams
 

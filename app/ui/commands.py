@@ -157,7 +157,7 @@ class Commands:
         """Do a command by its name; False when there is none.
 
         ``panel:topics`` shows a panel, ``inspect:/faces`` a topic, ``block:ID`` a block; a problem's
-        ``mend_action`` changes the blocks (`app.blocks.mend`).
+        ``mend_action`` changes the blocks (`app.blocks.fixes.fixes`).
         """
         if name in self.actions:
             return self.actions.run(name)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from app.blocks.mend import mend
+from app.blocks.fixes.fixes import mend
 from app.core.documents.document import Document
 from app.core.documents.file_format import SUFFIX
 from app.core.documents.journal import Unsaved

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from app.blocks.compiler import compile_behaviour
-from app.blocks.link import Call
-from app.blocks.program import Program
-from app.blocks.runtime import Runtime
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.model.program import Program
+from app.blocks.runtime.link import Call
+from app.blocks.runtime.runtime import Runtime
 from app.robots.description import Robot
 from tests.blocks.samples import robot
 

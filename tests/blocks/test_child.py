@@ -9,8 +9,8 @@ import threading
 
 import pytest
 
-from app.blocks import child
-from app.blocks.compiler import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime import child
 from tests.blocks.samples import block, number, say, stack, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
 

@@ -4,9 +4,9 @@ import ast
 
 import pytest
 
-from app.blocks.compiler import compile_behaviour
-from app.blocks.program import Program
-from app.blocks.workspace import parse_workspace
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.model.program import Program
+from app.blocks.model.workspace import parse_workspace
 from tests.blocks.fakes import play
 from tests.blocks.samples import (
     block,

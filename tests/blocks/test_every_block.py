@@ -6,9 +6,9 @@ import ast
 
 import pytest
 
-from app.blocks.catalogue import Catalogue, categories
-from app.blocks.compiler import COMMANDS, compile_behaviour
-from app.blocks.fields import StatementInput, ValueInput
+from app.blocks.compiler.compiler import COMMANDS, compile_behaviour
+from app.blocks.model.fields import StatementInput, ValueInput
+from app.blocks.toolbox.catalogue import Catalogue, categories
 from tests.blocks.fakes import FakeLink, Play, until
 from tests.blocks.samples import (
     block,

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.blocks.compiler import compile_behaviour
-from app.blocks.explain import BehaviourError
-from app.blocks.runtime import Runtime
-from app.blocks.values import text as as_text
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.runtime import Runtime
+from app.blocks.runtime.values import text as as_text
 from tests.blocks.samples import block, boolean, list_of, number, started, text, workspace, write
 
 ARITHMETIC = {

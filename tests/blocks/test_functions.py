@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.blocks.compiler import compile_behaviour
-from app.blocks.mend import mend
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.fixes.fixes import mend
 from tests.blocks.fakes import Play, play, until
 from tests.blocks.samples import (
     block,

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 import pytest
 
-from app.blocks.going import Going
-from app.blocks.link import Call
-from app.blocks.scheduler import Stopped
+from app.blocks.runtime.link import Call
+from app.blocks.runtime.motions import Going
+from app.blocks.runtime.scheduler import Stopped
 from app.robots.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from app.blocks.catalogue import Catalogue, categories
-from app.blocks.examples import EXAMPLES
-from app.blocks.helping import help_of
+from app.blocks.toolbox.catalogue import Catalogue, categories
+from app.blocks.toolbox.examples import EXAMPLES
+from app.blocks.toolbox.help import help_of
 from tests.blocks.samples import robot
 
 CATALOGUE = Catalogue([robot()])

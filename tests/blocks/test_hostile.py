@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.blocks import editor_definitions
-from app.blocks.catalogue import Catalogue
-from app.blocks.compiler import COMMANDS, compile_behaviour
-from app.blocks.fields import StatementInput, ValueInput, VariableField
+from app.blocks.compiler.compiler import COMMANDS, compile_behaviour
+from app.blocks.model.fields import StatementInput, ValueInput, VariableField
+from app.blocks.toolbox.catalogue import Catalogue
 from app.errors import DescriptionError
 from app.robots.description import parse, td_for
 from tests.blocks.samples import MODEL, block, robot, stack, started, workspace

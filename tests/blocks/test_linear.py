@@ -10,9 +10,9 @@ from types import FrameType
 
 import pytest
 
-from app.blocks.compiler import compile_behaviour
-from app.blocks.names import Names
-from app.blocks.workspace import parse_workspace
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.model.names import Names
+from app.blocks.model.workspace import parse_workspace
 from app.core.documents.problems import listed
 from tests.blocks.samples import block, call, define, number, robot, say, started, workspace
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.blocks import lists
-from app.blocks.explain import BehaviourError
-from app.blocks.values import LONGEST_TEXT
+from app.blocks.runtime import lists
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.values import LONGEST_TEXT
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, get, list_of, number, started, text, workspace, write
 

@@ -4,9 +4,9 @@ import copy
 
 import pytest
 
-from app.blocks.compiler import compile_behaviour
-from app.blocks.mend import mend
-from app.blocks.robot_mend import asked_of, blocks_of, can_do
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.replace_robot import asked_of, blocks_of, can_do
 from tests.blocks.samples import block, robot, say, started, workspace
 
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 import nep
-from app.blocks.fleet_search import find_robots
-from app.blocks.network import Network
+from app.blocks.runtime.find_robots import find_robots
+from app.blocks.runtime.network import Network
 from tests.blocks.fakes import until
 from tests.blocks.wire_robot import RizeRobot, WireRobot
 

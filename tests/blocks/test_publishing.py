@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 
 import nep
-from app.blocks.compiler import compile_behaviour
-from app.blocks.explain import BehaviourError
-from app.blocks.network import Network
-from app.blocks.program import Program
-from app.blocks.publishing import PublishGuard, guarded, moved_by
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.model.program import Program
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.network import Network
+from app.blocks.runtime.publishing import PublishGuard, guarded, moved_by
 from app.robots import rize
 from nep.masters.master import Master
 from tests.blocks.samples import block, robot, started, text, workspace

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.blocks.compiler import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from tests.blocks.fakes import FakeLink, Play, play, until
 from tests.blocks.samples import (
     block,
@@ -87,7 +87,7 @@ def test_a_canceled_action_is_no_error():
 
 
 def test_a_robot_that_does_not_answer_is_named(monkeypatch):
-    monkeypatch.setattr("app.blocks.robot_handle.FIRST_ANSWER_S", 0.05)
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.FIRST_ANSWER_S", 0.05)
     link = FakeLink()
     link.answers = {"say": ("sent", {}, "")}
     run = play(workspace(started(say("Hi") | {"id": "x"})), link)
@@ -97,7 +97,7 @@ def test_a_robot_that_does_not_answer_is_named(monkeypatch):
 
 
 def test_an_action_that_never_ends_is_canceled(monkeypatch):
-    monkeypatch.setattr("app.blocks.robot_handle.MARGIN_S", -29.95)
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.MARGIN_S", -29.95)
     link = FakeLink()
     link.held = {"say"}
     run = play(workspace(started(say("Hi"))), link)

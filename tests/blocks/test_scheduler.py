@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from app.blocks.scheduler import Scheduler
+from app.blocks.runtime.scheduler import Scheduler
 from tests.blocks.fakes import until
 
 

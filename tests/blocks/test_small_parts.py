@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.blocks import values
-from app.blocks.explain import BehaviourError, explain
-from app.blocks.fields import ChoiceField, ColourField, FieldError, NumberField, PathField, TopicField
-from app.blocks.hats import Hat, PassGate, changes, event_matches
-from app.blocks.names import Names
-from app.blocks.robot_handle import sentence
-from app.blocks.robot_text import TextParts
-from app.blocks.workspace import parse_workspace
+from app.blocks.model.fields import ChoiceField, ColourField, FieldError, NumberField, PathField, TopicField
+from app.blocks.model.names import Names
+from app.blocks.model.robot_text import TextParts
+from app.blocks.model.workspace import parse_workspace
+from app.blocks.runtime import values
+from app.blocks.runtime.errors import BehaviourError, explain
+from app.blocks.runtime.robot_handle import sentence
+from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
 from tests.blocks.samples import robot
 
 

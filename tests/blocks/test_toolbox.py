@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from app.blocks import editor_definitions
-from app.blocks.catalogue import categories
+from app.blocks.toolbox.catalogue import categories
 from tests.blocks.samples import nao, robot
 from tools.blocks_page import page
 

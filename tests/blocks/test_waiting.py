@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from app.blocks.compiler import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from tests.blocks.fakes import FakeLink, Play, until
 from tests.blocks.samples import robot, say, started, text, workspace, write
 
@@ -27,7 +27,7 @@ class Queued(FakeLink):
 
 
 def test_what_waits_says_for_what_and_then_what_it_does(monkeypatch) -> None:
-    monkeypatch.setattr("app.blocks.robot_handle.MARGIN_S", -29.5)  # the limit: half a second
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.MARGIN_S", -29.5)  # the limit: half a second
     link = Queued()
     run = begin(link)
     until(lambda: bool(link.calls))
@@ -44,7 +44,7 @@ def test_what_waits_says_for_what_and_then_what_it_does(monkeypatch) -> None:
 
 
 def test_a_robot_that_stops_telling_that_it_lives_is_an_error_at_the_block(monkeypatch) -> None:
-    monkeypatch.setattr("app.blocks.robot_handle.SHORTEST_SILENCE_S", 0.3)
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.SHORTEST_SILENCE_S", 0.3)
     link = FakeLink()
     link.held = {"say"}
     run = begin(link, beat_s=0.05)

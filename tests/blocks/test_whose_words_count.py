@@ -9,8 +9,8 @@ from typing import cast
 import pytest
 
 import nep
-from app.blocks.fleet_search import find_robots
-from app.blocks.network import Network
+from app.blocks.runtime.find_robots import find_robots
+from app.blocks.runtime.network import Network
 from app.robots.identity import DESCRIPTION_TYPE
 from nep.masters.master import Master
 from tests.blocks.fakes import until

@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterator, Sequence
 import pytest
 
 import nep
-from app.blocks.compiler import compile_behaviour
-from app.blocks.fleet_search import find_robots
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime.find_robots import find_robots
 from app.core.run.runner import Runner
 from nep.messages.message import Message
 from tests.blocks.samples import block, number, started, workspace

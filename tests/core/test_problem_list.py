@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.blocks import compile_behaviour
-from app.blocks.robot_mend import asked_of, can_do, use_robot
+from app.blocks.fixes.replace_robot import asked_of, can_do, use_robot
 from app.core.documents.document import Document
 from app.core.documents.journal import Journal
 from app.core.documents.problems import Mend, listed

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.core.messages import reader
+from app.core.messages import reader as reader_module
 from app.core.messages.lazy_json import LazyObject
 from app.core.messages.reader import Reader, Reading, read
 from nep.messages.message import Message
@@ -48,13 +48,13 @@ def test_json_is_looked_into_and_other_messages_are_decoded() -> None:
 
 def test_it_reads_in_another_thread(reader: Reader, monkeypatch) -> None:
     threads: list[int] = []
-    before = reader.read
+    before = reader_module.read
 
     def watched(one: Message) -> Reading:
         threads.append(threading.get_ident())
         return before(one)
 
-    monkeypatch.setattr(reader, "read", watched)
+    monkeypatch.setattr(reader_module, "read", watched)
     reader.ask(message(json.dumps({"data": list(range(1000))}).encode()))
     assert len(taken(reader).value["data"]) == 1000  # type: ignore[index, arg-type]
     assert len(threads) == 1
@@ -67,7 +67,7 @@ class SlowRead:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.began, self.go_on = threading.Event(), threading.Event()
         self.seqs: list[int | None] = []
-        monkeypatch.setattr(reader, "read", self)
+        monkeypatch.setattr(reader_module, "read", self)
 
     def __call__(self, one: Message) -> Reading:
         self.seqs.append(one.seq)

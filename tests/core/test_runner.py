@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 import nep
-from app.blocks.compiler import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from app.core.run.runner import Runner, RunnerEvent, child_command
 from app.errors import RunnerError
 from tests.blocks.samples import block, number, say, started, text, workspace, write

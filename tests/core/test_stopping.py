@@ -5,7 +5,7 @@ import threading
 import pytest
 
 import nep
-from app.blocks.compiler import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from app.core.robots.stop import RobotStopper
 from app.core.robots.stop_report import RobotStop, StopReport
 from app.core.run.runner import Runner

@@ -84,7 +84,7 @@ def test_the_robot_stops_and_ends_when_studio_is_killed(
     studio.says("Pepper ready", 40)
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows")
-    mine = [*studio.children("app.robots.simulated"), *studio.children("app.blocks.child")]
+    mine = [*studio.children("app.robots.simulated"), *studio.children("app.blocks.runtime.child")]
     (master,) = studio.children("nep", "master")
     assert len(mine) == 2
     with nep.node("somebody", master=address) as node:

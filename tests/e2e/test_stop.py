@@ -46,7 +46,7 @@ def stands_still(studio: Studio) -> None:
         heard = [states.receive(30.0).payload for _ in range(4)]
     assert not any(state["moving"] for state in heard)
     assert len({state["theta_deg"] for state in heard}) == 1
-    until(lambda: not studio.children("app.blocks.child"), "the program's process has ended")
+    until(lambda: not studio.children("app.blocks.runtime.child"), "the program's process has ended")
     assert not studio.outlined("running")
 
 
@@ -125,7 +125,7 @@ def test_stop_while_something_of_a_block_is_open_or_in_the_hand(turning: Studio)
 
 
 def test_stop_ends_a_program_that_hangs(turning: Studio) -> None:
-    (program,) = turning.children("app.blocks.child")
+    (program,) = turning.children("app.blocks.runtime.child")
     program.suspend()
     turning.screen.click(*middle(turning.find(kind="StopButton")["rect"]))
     stands_still(turning)
@@ -133,7 +133,7 @@ def test_stop_ends_a_program_that_hangs(turning: Studio) -> None:
 
 
 def test_a_program_that_is_killed_leaves_no_robot_moving(turning: Studio) -> None:
-    (program,) = turning.children("app.blocks.child")
+    (program,) = turning.children("app.blocks.runtime.child")
     program.kill()
     stands_still(turning)
     turning.says("The behaviour ended by itself.")

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from app.blocks import editor_definitions
-from app.blocks.compiler import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from app.ui.blockly_view import BlocklyView
 from tests.blocks.samples import (
     block,

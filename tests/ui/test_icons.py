@@ -14,7 +14,7 @@ from PySide6.QtSvg import QSvgRenderer
 
 from app import resources
 from app.blocks import Problem
-from app.blocks.catalogue import Catalogue
+from app.blocks.toolbox.catalogue import Catalogue
 from app.core.documents.problems import Listed
 from app.ui import icons, theme_tokens
 from app.ui.actions import TABLE

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from app.blocks.block import Block
-from app.blocks.category import Category
-from app.blocks.fields import StatementInput, TextField, ValueInput
-from app.blocks.growing import InputField, Inputs
+from app.blocks.model.block import Block
+from app.blocks.model.category import Category
+from app.blocks.model.fields import StatementInput, TextField, ValueInput
+from app.blocks.model.growing import InputField, Inputs
 
 _definition = partial(Block, shape="definition", style="functions")
 _statement = partial(Block, shape="statement", style="functions")

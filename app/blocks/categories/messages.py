@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.blocks.block import Block
-from app.blocks.category import Category
-from app.blocks.fields import PathField, TextField, TopicField, ValueInput
+from app.blocks.model.block import Block
+from app.blocks.model.category import Category
+from app.blocks.model.fields import PathField, TextField, TopicField, ValueInput
 
 CATEGORY = Category(
     name="messages",

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from app.blocks.block import Block, RobotUse
-from app.blocks.category import Category, Entry, Group
-from app.blocks.fields import ChoiceField, LiveField, NumberField, robot_field
-from app.blocks.robot_text import TextParts, about, field_of, input_of, type_of
+from app.blocks.model.block import Block, RobotUse
+from app.blocks.model.category import Category, Entry, Group
+from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
+from app.blocks.model.robot_text import TextParts, about, field_of, input_of, type_of
 from app.robots.description import Action, Event, Robot, Sensor
 
 _ICONS = {

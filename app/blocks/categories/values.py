@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.blocks.block import Block
-from app.blocks.category import Category
-from app.blocks.fields import ChoiceField, NumberField, TextField, ValueInput
+from app.blocks.model.block import Block
+from app.blocks.model.category import Category
+from app.blocks.model.fields import ChoiceField, NumberField, TextField, ValueInput
 
 _NUMBERS = (ValueInput("A", "Number", 1), ValueInput("B", "Number", 1))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from app.blocks.workspace import Placed, parse_workspace
+from app.blocks.model.workspace import Placed, parse_workspace
 from app.core.storage import deep_json
 
 Workspace = Mapping[str, object]

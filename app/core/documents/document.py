@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
-from app.blocks.mend import mend
-from app.blocks.robot_mend import blocks_of, use_robot
+from app.blocks.fixes.fixes import mend
+from app.blocks.fixes.replace_robot import blocks_of, use_robot
 from app.core.documents.background_compile import Beside
 from app.core.documents.compiled import QUICK_S, Compiled, Key, compiled, is_long
 from app.core.documents.file_format import (

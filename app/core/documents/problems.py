@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from app.blocks import Problem
-from app.blocks.robot_mend import asked_of, can_do, types_of
+from app.blocks.fixes.replace_robot import asked_of, can_do, types_of
 from app.robots.description import Robot
 
 CONNECT = "connect:"

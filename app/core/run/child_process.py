@@ -106,7 +106,7 @@ def child_command() -> tuple[str, ...]:
     """How to start a program's process: this Python, or the frozen Studio as its own child."""
     if getattr(sys, "frozen", False):
         return (sys.executable, "--child")
-    return (sys.executable, "-m", "app.blocks.child")
+    return (sys.executable, "-m", "app.blocks.runtime.child")
 
 
 def home() -> Path | None:

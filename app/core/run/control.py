@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
-from app.blocks.publishing import guarded
+from app.blocks.runtime.publishing import guarded
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document

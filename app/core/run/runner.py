@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
-from app.blocks.program import Program
+from app.blocks.model.program import Program
 from app.core.run.child_output import Gate, Output, text_of, texts
 from app.core.run.child_process import MOST_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command

@@ -1,0 +1,311 @@
+"""From a workspace to a program: each block's template, its holes filled with the trees of what is in it."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from app.blocks.compiler.fragments import COMMANDS as COMMANDS
+from app.blocks.compiler.fragments import RESERVED, ending, imports, keywords, template
+from app.blocks.compiler.problems import Notes
+from app.blocks.compiler.render import instrumented, readable
+from app.blocks.compiler.shaping import END, Function, Shaping
+from app.blocks.compiler.uses import Uses, saved_value
+from app.blocks.model.block import Block
+from app.blocks.model.block_text import reading
+from app.blocks.model.fields import Field, FieldError, StatementInput, TopicField, ValueInput, VariableField
+from app.blocks.model.growing import InputField
+from app.blocks.model.names import Names
+from app.blocks.model.program import Program
+from app.blocks.model.template import expression, literal, statements
+from app.blocks.model.workspace import Placed, Workspace, parse_workspace
+from app.blocks.runtime.publishing import moved_by
+from app.blocks.toolbox.catalogue import Catalogue
+from app.robots.description import Robot
+
+
+class _Skip(Exception):  # noqa: N818 (no error: the block is left out, and its problem is noted)
+    """This block can't be compiled; whoever holds it is left out, and the problem is noted already."""
+
+
+def compile_behaviour(
+    workspace: Mapping[str, object],
+    robots: Sequence[Robot],
+    *,
+    absent: Sequence[Robot] = (),
+    name: str = "Behaviour",
+) -> Program:
+    """The program of Blockly's JSON.
+
+    `robots` are connected; blocks of others are skipped, and `absent` (as last known) only helps to name
+    them. Never raises for what a file holds: it becomes problems.
+    """
+    catalogue = Catalogue(robots, absent)
+    parsed = parse_workspace(workspace)
+    return _Compiler(catalogue, parsed, name).program()
+
+
+class _Compiler:
+    def __init__(self, catalogue: Catalogue, workspace: Workspace, name: str) -> None:
+        self._catalogue = catalogue
+        self._name = name
+        self._names = Names(RESERVED)
+        self._shaping = Shaping(workspace, catalogue, self._names)
+        self._workspace = workspace = self._shaping.workspace
+        self._function: Function | None = None  # the one that is being compiled
+        self._calls: set[str] = set()  # the blocks that run a function
+        self._variables: dict[str, str] = {}  # Blockly's id -> Python's name
+        self._marks: dict[ast.AST, str] = {}
+        self._notes = Notes(catalogue, workspace)
+        self._readings: dict[str, str] = {}
+        self._labels: dict[str, str] = {}
+        self._uses = Uses()
+        self._in_message = False
+        self._numbers: set[str] = set()  # the blocks that must give a number
+
+    def program(self) -> Program:
+        own = self._definitions()
+        functions = [
+            function for script in self._workspace.scripts if (function := self._script(script)) is not None
+        ]
+        self._notes.check_starts(len(functions))
+        body: list[ast.stmt] = [
+            *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
+            *own,
+            *functions,
+        ]
+        source, lines = readable([*imports(body), *body, *ending(self._name)], self._marks)
+        return Program(
+            name=self._name,
+            source=source,
+            runnable=instrumented(body, self._marks, self._numbers, self._calls),
+            lines=lines,
+            robots=tuple(self._uses.robots),
+            sensors=tuple(self._uses.sensors),
+            events=tuple(self._uses.events),
+            publishes=tuple(self._uses.publishes),
+            listens=tuple(self._uses.listens),
+            moves=tuple(self._uses.moves),
+            readings=self._readings,
+            labels=self._labels,
+            problems=self._notes.problems(),
+            starts=len(functions),
+            absent=self._notes.absent_blocks(),
+        )
+
+    # ---- scripts and statements
+
+    def _script(self, script: tuple[Placed, ...]) -> ast.stmt | None:
+        """The function of a script that something starts; None, with a note, for all others."""
+        first = script[0]
+        if not first.enabled:
+            return None
+        block = self._known(first)
+        if block is None or block.shape == "definition":
+            return None
+        if block.shape != "hat":
+            self._notes.unattached(first, block)
+            return None
+        if self._notes.missing(first, block) is not None:
+            return None
+        self._in_message = bool(block.parameters)
+        try:
+            expressions = self._expressions(first, block)
+        except _Skip:
+            return None
+        decorator = expression(self._template(block, first), expressions, keywords(block, expressions))
+        self._uses.remember(first, block)
+        parameters = ", ".join(block.parameters)
+        (function,) = statements(
+            f"@%DECORATOR\ndef script({parameters}):\n    %BODY",
+            {"DECORATOR": decorator},
+            {"BODY": self._statements(script[1:])},
+        )
+        if isinstance(function, ast.FunctionDef):
+            function.name = self._names.new(self._read(first), "script")
+            self._declare(function)
+        self._marks[function] = first.id
+        return function
+
+    def _definitions(self) -> list[ast.stmt]:
+        """The functions that people made."""
+        made: list[ast.stmt] = []
+        for script in self._workspace.scripts:
+            self._function = self._shaping.function(script[0])
+            if self._function is not None and self._known(script[0]) is not None:
+                made.append(self._definition(script[0], self._function))
+        self._function = None
+        return made
+
+    def _definition(self, placed: Placed, function: Function) -> ast.stmt:
+        self._in_message = False
+        self._read(placed)
+        body = self._statements(placed.inputs.get("BODY", ()))
+        if function.gives:
+            body += self._statement(replace(placed, type=f"{END}:{placed.id}"))
+        (made,) = statements("def script():\n    %BODY", {}, {"BODY": body})
+        if isinstance(made, ast.FunctionDef):
+            made.name = function.python
+            made.args.args = [ast.arg(name) for name in function.parameters.values()]
+            self._declare(made)
+        self._marks[made] = placed.id
+        return made
+
+    def _declare(self, function: ast.FunctionDef) -> None:
+        """``global`` for the variables that the function sets: all scripts share them."""
+        own = set(self._variables.values())
+        stored = {
+            node.id
+            for node in ast.walk(function)
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in own
+        }
+        if stored:
+            function.body.insert(0, ast.Global(sorted(stored)))
+
+    def _statements(self, chain: Sequence[Placed]) -> list[ast.stmt]:
+        made: list[ast.stmt] = []
+        for placed in chain:
+            if placed.enabled:
+                made += self._statement(placed)
+        return made
+
+    def _statement(self, placed: Placed) -> list[ast.stmt]:
+        block = self._known(placed)
+        if block is None:
+            return []
+        if block.shape not in ("statement", "cap") or not self._is_at_home(block):
+            self._notes.misplaced(placed, block)
+            return []
+        self._read(placed)
+        missing = self._notes.missing(placed, block)
+        if missing is not None:
+            return self._marked(statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed)
+        try:
+            expressions = self._expressions(placed, block)
+        except _Skip:
+            return []
+        self._uses.remember(placed, block)
+        self._notes.look(placed, block)
+        if block.publishes:
+            self._move(placed, block)
+        bodies = {
+            argument.name: self._statements(placed.inputs.get(argument.name, ()))
+            for argument in block.arguments
+            if isinstance(argument, StatementInput)
+        }
+        text = self._template(block, placed)
+        made = statements(text, expressions, bodies, keywords(block, expressions))
+        if block.calls and isinstance(made[0], ast.Expr):
+            self._marks[made[0].value] = placed.id
+            self._calls.add(placed.id)
+        return self._marked(made, placed)
+
+    def _move(self, placed: Placed, block: Block) -> None:
+        """A block that publishes on a robot's own topic moves that robot, like any of its blocks."""
+        topics = [argument.name for argument in block.arguments if isinstance(argument, TopicField)]
+        for topic in (str(saved_value(block, placed, name)) for name in topics):
+            names = moved_by(topic, self._catalogue.connected.values())
+            self._uses.robots |= dict.fromkeys(names)
+            self._uses.moves |= dict.fromkeys(names)
+            self._notes.moves(placed, block, topic, names)
+
+    def _is_at_home(self, block: Block) -> bool:
+        """Whether the function that is being compiled is of the kind that the block needs."""
+        if not block.needs_function:
+            return True
+        return self._function is not None and self._function.gives == (block.needs_function == "result")
+
+    def _marked(self, made: list[ast.stmt], placed: Placed) -> list[ast.stmt]:
+        self._marks[made[0]] = placed.id
+        return made
+
+    # ---- values
+
+    def _expressions(self, placed: Placed, block: Block) -> dict[str, ast.expr]:
+        """A tree for each hole; _Skip when one of them can't be had."""
+        made = {name: literal(constant) for name, constant in block.constants.items()} | dict(block.trees)
+        for argument in block.arguments:
+            if isinstance(argument, ValueInput):
+                made[argument.name] = self._value(placed, argument)
+            elif isinstance(argument, Field) and not argument.silent:
+                made[argument.name] = self._field(placed, block, argument)
+        return made
+
+    def _value(self, holder: Placed, argument: ValueInput) -> ast.expr:
+        inner = holder.inputs.get(argument.name, ())
+        if not inner or not inner[0].enabled:
+            return literal(argument.default)
+        placed = inner[0]
+        block = self._known(placed, holder)
+        if block is None:
+            raise _Skip
+        if block.shape not in ("value", "boolean"):
+            self._notes.misplaced(placed, block)
+            raise _Skip
+        if block.needs_message and not self._in_message:
+            self._notes.no_message(placed, block)
+            return literal(None)
+        self._read(placed)
+        missing = self._notes.missing(placed, block)
+        expressions = self._expressions(placed, block)
+        if missing is not None:
+            made = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
+        else:
+            self._uses.remember(placed, block)
+            made = expression(self._template(block, placed), expressions, keywords(block, expressions))
+        if block.fails or missing is not None:
+            self._marks[made] = placed.id
+            if block.check == "Number" and missing is None:
+                self._numbers.add(placed.id)
+            if block.calls:
+                self._calls.add(placed.id)
+        return made
+
+    def _field(self, placed: Placed, block: Block, field: Field) -> ast.expr:
+        try:
+            value = field.read(placed.fields.get(field.name))
+        except FieldError as error:
+            self._notes.wrong_field(placed, block, error)
+            raise _Skip from None
+        if isinstance(field, InputField):
+            return self._input(placed, block, str(value))
+        if isinstance(field, VariableField):
+            return ast.Name(self._variable(str(value)), ast.Load())
+        return literal(value)
+
+    def _input(self, placed: Placed, block: Block, id: str) -> ast.expr:
+        name = self._function.parameters.get(id) if self._function is not None else None
+        if name is None:
+            self._notes.no_input(placed, block)
+            raise _Skip
+        return ast.Name(name, ast.Load())
+
+    def _variable(self, id: str) -> str:
+        if id not in self._variables:
+            self._variables[id] = self._names.new(self._workspace.variables.get(id, id), "variable")
+        return self._variables[id]
+
+    # ---- what is known about a block
+
+    def _known(self, placed: Placed, holder: Placed | None = None) -> Block | None:
+        """The block's description; None, with a note, when nobody here can do it."""
+        if placed.too_deep:
+            self._notes.too_deep(placed)
+            return None
+        block = self._catalogue.blocks.get(placed.type)
+        if self._notes.absent(placed, block, holder):
+            return None
+        if block is not None and block.undefined:
+            self._notes.undefined(placed, block)
+        return block
+
+    def _template(self, block: Block, placed: Placed) -> str:
+        return template(block, placed, in_function=self._function is not None)
+
+    def _read(self, placed: Placed) -> str:
+        words = reading(placed, self._catalogue.blocks, self._workspace.variables)
+        self._readings[placed.id] = words
+        block = self._catalogue.blocks.get(placed.type)
+        self._labels[placed.id] = self._notes.label(placed, block)
+        return words

@@ -1,0 +1,264 @@
+"""What people should know before Run: the problems of a workspace, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from app.blocks.model.block import Block
+from app.blocks.model.block_text import label, label_of_type, reading
+from app.blocks.model.fields import Field, FieldError, TextField, ValueInput
+from app.blocks.model.program import Problem, Severity
+from app.blocks.model.workspace import Placed, Workspace
+from app.blocks.toolbox.catalogue import Catalogue
+from app.robots.description import Action
+
+_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
+_NEEDS = {
+    "Number": "a number",
+    "String": "a text",
+    "Boolean": "a condition",
+    "List": "a list",
+    None: "a value",
+}
+_LITERALS = {"values_number": "NUMBER", "values_text": "TEXT"}
+_STARTER = "events_started"
+
+
+class Notes:
+    """Collects problems while a program is compiled; each block is told of once."""
+
+    def __init__(self, catalogue: Catalogue, workspace: Workspace) -> None:
+        self._catalogue = catalogue
+        self._workspace = workspace
+        self._problems: dict[tuple[str | None, str], Problem] = {}
+
+    def problems(self) -> tuple[Problem, ...]:
+        """All problems, worst first."""
+        return tuple(sorted(self._problems.values(), key=lambda problem: _ORDER[problem.severity]))
+
+    def label(self, placed: Placed, block: Block | None) -> str:
+        """The words that name a block in a sentence."""
+        return label_of_type(placed.type) if block is None else label(placed, block)
+
+    def check_starts(self, starts: int) -> None:
+        """Nothing starts: an empty workspace is no problem, blocks without a start are."""
+        if starts or not self._workspace.scripts:
+            return
+        subject = "when started"
+        self._note(
+            "warning", None, None, subject, f"Nothing starts these blocks. Put “{subject}” above them.",
+            mend="Add “when started”", mend_action=f"add:{_STARTER}",
+        )  # fmt: skip
+
+    def unattached(self, placed: Placed, block: Block) -> None:
+        """Blocks that hang under nothing."""
+        name = self.label(placed, block)
+        self._note("info", placed, block, name, f"{name} hangs under no start, so it does not run.")
+
+    def misplaced(self, placed: Placed, block: Block) -> None:
+        """A block where it can't stand; the editor does not let this happen, a file may."""
+        name = self.label(placed, block)
+        self._note("warning", placed, block, name, f"{name} can't stand there. It is kept and skipped.")
+
+    def too_deep(self, placed: Placed) -> None:
+        """Nested too deep for Python."""
+        block = self._catalogue.blocks.get(placed.type)
+        name = self.label(placed, block)
+        self._note(
+            "error", placed, block, name,
+            f"{name} is nested too deep to run. Put inner parts into variables or scripts of their own.",
+        )  # fmt: skip
+
+    def no_message(self, placed: Placed, block: Block) -> None:
+        """The message of a script that no message starts."""
+        name = self.label(placed, block)
+        self._note(
+            "warning", placed, block, name,
+            f"{name} is known only under “when a message arrives”.",
+        )  # fmt: skip
+
+    def no_input(self, placed: Placed, block: Block) -> None:
+        """An input of a function outside of it, or one that was taken away."""
+        name = reading(placed, self._catalogue.blocks, self._workspace.variables)
+        sentence = f"“{name}” is known only inside the function that has it. It is kept and skipped."
+        self._note("warning", placed, block, name, sentence)
+
+    def undefined(self, placed: Placed, block: Block) -> None:
+        """A call of a function that nobody defined here."""
+        self._note(
+            "error", placed, block, self.label(placed, block), block.undefined,
+            mend="Define it", mend_action=f"define:{placed.id}",
+        )  # fmt: skip
+
+    def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
+        """A field with something that its block can't use."""
+        name = self.label(placed, block)
+        self._note("error", placed, block, name, f"{name} {error}. It is kept and skipped.")
+
+    def absent(self, placed: Placed, block: Block | None, holder: Placed | None) -> bool:
+        """Whether nobody here can do this block; then it is noted."""
+        robot = placed.fields.get("ROBOT")
+        name = self.label(placed, block)
+        skipped = f"{name} will be skipped"
+        if holder is not None:
+            outer = self.label(holder, self._catalogue.blocks.get(holder.type))
+            skipped = f"{outer} with {name} will be skipped"
+        if (
+            isinstance(robot, str)
+            and robot not in self._catalogue.connected
+            and placed.type.startswith("robot_")
+        ):
+            self._note(
+                "warning", placed, block, name, f"{robot} is not connected, so {skipped}.",
+                mend=f"Connect {robot}", mend_action=f"connect:{robot}", style="robot",
+            )  # fmt: skip
+            return True
+        if block is None:
+            self._note(
+                "warning", placed, None, name,
+                f"This file uses “{name}”, which no connected robot can do. It is kept and skipped.",
+                style="robot" if placed.type.startswith("robot_") else None,
+            )  # fmt: skip
+            return True
+        if isinstance(robot, str) and block.robot is not None and not self._can(robot, block):
+            self._note("warning", placed, block, name, f"{robot} can't do this, so {skipped}.")
+            return True
+        return False
+
+    def absent_blocks(self) -> tuple[str, ...]:
+        """Every block of a robot that is not connected, also in scripts and bodies that can't run."""
+        return tuple(
+            placed.id
+            for placed in self._workspace.all_blocks()
+            if placed.type.startswith("robot_")
+            and isinstance(placed.fields.get("ROBOT"), str)
+            and placed.fields["ROBOT"] not in self._catalogue.connected
+        )
+
+    def _can(self, name: str, block: Block) -> bool:
+        use = block.robot
+        robot = self._catalogue.connected[name]
+        if use is None or not use.name:
+            return True
+        known = (
+            robot.action(use.name)
+            if use.kind == "action"
+            else robot.sensor(use.name)
+            if use.kind == "sensor"
+            else robot.event(use.name)
+        )
+        return known is not None
+
+    def missing(self, placed: Placed, block: Block) -> str | None:
+        """The sentence about a gap with nothing in it, noted.
+
+        None when every gap is filled or has a default.
+        """
+        for argument in block.arguments:
+            if not isinstance(argument, ValueInput):
+                continue
+            inner = placed.inputs.get(argument.name, ())
+            if (inner and inner[0].enabled) or not argument.is_there(placed.fields):
+                continue
+            name = self.label(placed, block)
+            sentence = f"{name} needs {_NEEDS[argument.check]}. Put one into the gap."
+            self._note("error", placed, block, name, sentence)
+            return sentence
+        return None
+
+    def look(self, placed: Placed, block: Block) -> None:
+        """What is worth saying about a block that will run."""
+        if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
+            self._note(
+                "info", placed, block, "wait until",
+                f"wait until may wait for ever if {self._never(placed)}.",
+                mend="Add a time limit", mend_action=f"limit:{placed.id}",
+            )  # fmt: skip
+        robot = self._catalogue.connected.get(str(placed.fields.get("ROBOT")))
+        action = robot.action(block.robot.name) if robot and block.robot else None
+        if action is not None:
+            self._check_input(placed, block, action)
+
+    def moves(self, placed: Placed, block: Block, topic: str, robots: Sequence[str]) -> None:
+        """A block that moves robots by publishing on their topics."""
+        real = [name for name in robots if not self._catalogue.connected[name].virtual]
+        if real:
+            who, name = " and ".join(real), self.label(placed, block)
+            sentence = f"{name} on {topic} moves {who}: you are asked before it does, and Stop stops it."
+            self._note("info", placed, block, name, sentence)
+
+    def _never(self, placed: Placed) -> str:
+        condition = placed.inputs["CONDITION"][0]
+        words = reading(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
+        if any(word in words for word in ("face", "person", "people")):
+            return "nobody comes"
+        return "that never happens"
+
+    def _check_input(self, placed: Placed, block: Block, action: Action) -> None:
+        """What the robot would refuse, as far as it is written in the block."""
+        given: dict[str, object] = {}
+        for at, name in block.keywords.get("X_INPUT", ()):
+            found = _written(placed, block, at)
+            if found is not None:
+                given[name] = found
+        # What is wrong without these values too is not these values' fault: they come when the program runs.
+        without = set(action.check(action.complete({})))
+        for sentence in action.check(action.complete(given)):
+            if sentence not in without:
+                name = self.label(placed, block)
+                reason = sentence.partition(": ")[2] or sentence
+                self._note("error", placed, block, name, f"{name}: {reason}.")
+
+    def _note(
+        self,
+        severity: Severity,
+        placed: Placed | None,
+        block: Block | None,
+        subject: str,
+        sentence: str,
+        *,
+        mend: str | None = None,
+        mend_action: str | None = None,
+        style: str | None = None,
+    ) -> None:
+        id = None if placed is None else placed.id
+        self._problems.setdefault(
+            (id, sentence),
+            Problem(
+                severity=severity,
+                block_id=id,
+                category=block.style if block is not None else style,
+                subject=subject,
+                sentence=sentence,
+                mend=mend,
+                mend_action=mend_action,
+                icon=block.icon if block is not None else "circle-help",
+            ),
+        )
+
+
+def _is_literal(placed: Placed, name: str) -> bool:
+    inner = placed.inputs.get(name, ())
+    return bool(inner) and inner[0].type == "values_boolean"
+
+
+def _written(placed: Placed, block: Block, name: str) -> object:
+    """The plain value that stands in a field or gap; None when it is worked out only when it runs."""
+    argument = block.argument(name)
+    if isinstance(argument, Field):
+        try:
+            return argument.read(placed.fields.get(name))
+        except FieldError:
+            return None
+    inner = placed.inputs.get(name, ())
+    if not inner or inner[0].type not in _LITERALS:
+        return None
+    return _plain(inner[0])
+
+
+def _plain(placed: Placed) -> object:
+    name = _LITERALS[placed.type]
+    saved = placed.fields.get(name)
+    if name == "TEXT":
+        return TextField(name).read(saved)
+    return saved if isinstance(saved, (int, float)) and not isinstance(saved, bool) else None

@@ -1,0 +1,111 @@
+"""One tree, two renderings: the program that people read, and the one that runs and tells where it is."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+
+from app.blocks.model.template import literal
+
+Marks = Mapping[ast.AST, str]
+"""Which node is the beginning of which block."""
+
+
+def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str]]:
+    """The text for people, and the block of each of its lines that begins one."""
+    parts: list[str] = []
+    for before, statement in zip((None, *body[:-1]), body, strict=True):
+        ast.fix_missing_locations(statement)
+        parts += (_gap(before, statement), ast.unparse(statement).strip("\n"), "\n")
+    text = "".join(parts)
+    lines: dict[int, str] = {}
+    for ours, theirs in _together(body, ast.parse(text).body):
+        if ours in marks:
+            first = getattr(theirs, "decorator_list", None) or [theirs]
+            for line in range(first[0].lineno, theirs.lineno + 1):
+                lines.setdefault(line, marks[ours])
+    return text, lines
+
+
+def instrumented(
+    body: Sequence[ast.stmt], marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]
+) -> str:
+    """The text that runs; it changes the tree, so `readable` comes first.
+
+    `numbers` are the blocks that must give a number, `calls` those that run a function.
+    """
+    stepper = _Stepper(marks, numbers, calls)
+    steps: list[ast.stmt] = []
+    for statement in body:
+        steps += stepper.statement(statement)
+    return ast.unparse(ast.fix_missing_locations(ast.Module(steps, []))) + "\n"
+
+
+def _gap(before: ast.stmt | None, statement: ast.stmt) -> str:
+    """Blank lines between two statements of a file."""
+    if before is None or (isinstance(before, ast.Assign) and isinstance(statement, ast.Assign)):
+        return ""
+    return "\n\n" if isinstance(before, ast.FunctionDef) or isinstance(statement, ast.FunctionDef) else "\n"
+
+
+def _together(ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, ast.stmt]]:
+    """The statements of a tree beside those of its text parsed again: both have the same form."""
+    for one, other in zip(ours, theirs, strict=True):
+        yield one, other
+        for name in ("body", "orelse"):
+            inner = getattr(one, name, None)
+            if isinstance(inner, list):
+                yield from _together(inner, getattr(other, name))
+
+
+class _Stepper(ast.NodeTransformer):
+    """Puts ``step(id)`` before each block and at the end of each round of a loop, and a block around values.
+
+    The step at a loop's end shows the loop while its condition is looked at, and lets Stop into a loop that
+    is empty.
+    """
+
+    def __init__(self, marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]) -> None:
+        self._marks = marks
+        self._numbers = numbers
+        self._calls = calls
+
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:
+        id = self._marks.get(node)
+        made = node
+        self.generic_visit(made)
+        for name in ("body", "orelse"):
+            inner = getattr(made, name, None)
+            if isinstance(inner, list):
+                setattr(made, name, [step for each in inner for step in self.statement(each)])
+        if id is None or isinstance(made, ast.FunctionDef):
+            return [made]
+        if isinstance(made, (ast.While, ast.For)):
+            made.body.append(_step(id))
+        return [_step(id), made]
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        """Visit expressions only: statements inside are `statement`'s own matter."""
+        for name, value in ast.iter_fields(node):
+            if isinstance(value, list):
+                if not any(isinstance(item, ast.stmt) for item in value):
+                    value[:] = [self.visit(item) if isinstance(item, ast.AST) else item for item in value]
+            elif isinstance(value, ast.AST):
+                setattr(node, name, self.visit(value))
+        return node
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        """A value block's expression becomes ``value(id, lambda: …)``: an error in it knows its block."""
+        made = self.generic_visit(node)
+        id = self._marks.get(node)
+        if id is None or not isinstance(made, ast.expr):
+            return made
+        empty = ast.arguments([], [], None, [], [], None, [])
+        later = ast.Lambda(empty, made)
+        name = "called" if id in self._calls else "number" if id in self._numbers else "value"
+        return ast.Call(ast.Name(name, ast.Load()), [literal(id), later], [])
+
+
+def _step(id: str) -> ast.stmt:
+    return ast.Expr(ast.Call(ast.Name("step", ast.Load()), [literal(id)], []))

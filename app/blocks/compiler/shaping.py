@@ -1,0 +1,147 @@
+"""Blocks whose gaps people made themselves, as plain blocks: lists of n items, calls of functions.
+
+A workspace is rewritten once before it is compiled: each such block gets a type of its own, which the
+catalogue then describes like any other block.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from app.blocks.model.block import Block
+from app.blocks.model.fields import Argument, ValueInput
+from app.blocks.model.growing import FunctionInput, Inputs, Items, inputs_of, name_of
+from app.blocks.model.names import Names
+from app.blocks.model.workspace import Placed, Workspace
+from app.blocks.toolbox.catalogue import Catalogue
+
+PLAIN, RESULT = "functions_define", "functions_define_result"
+CALL, CALL_RESULT = "functions_call", "functions_result"
+END = "functions_end"
+_GIVES = {PLAIN: False, RESULT: True}
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of the behaviour; ``parameters`` are Python's names by the ids of its inputs."""
+
+    placed: Placed
+    name: str
+    python: str
+    parameters: Mapping[str, str]
+    inputs: tuple[FunctionInput, ...]
+    gives: bool
+
+
+class Shaping:
+    """What people made: functions, and the ``workspace`` with plain blocks only."""
+
+    def __init__(self, workspace: Workspace, catalogue: Catalogue, names: Names) -> None:
+        """Find the functions, describe their calls in the catalogue."""
+        self._catalogue = catalogue
+        self._by_id: dict[str, Function] = {}
+        for script in workspace.scripts:
+            if script[0].type in _GIVES and script[0].enabled:
+                self._by_id[script[0].id] = _function(script[0], names)
+        self._by_name = {function.name: function for function in reversed(self._by_id.values())}
+        scripts = tuple(tuple(map(self._shaped, script)) for script in workspace.scripts)
+        shown = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
+        self.workspace = Workspace(scripts, {**workspace.variables, **shown})
+
+    def function(self, definition: Placed) -> Function | None:
+        """The function that this block defines; None if it is switched off."""
+        return self._by_id.get(definition.id)
+
+    def _called(self, placed: Placed) -> Function | None:
+        """By id; a call that came from another behaviour finds a function of the same name."""
+        found = self._by_id.get(str(placed.extra.get("function")))
+        found = found or self._by_name.get(name_of(placed))
+        return None if found is None or (placed.type == CALL_RESULT and not found.gives) else found
+
+    def _shaped(self, placed: Placed) -> Placed:
+        inner = {name: tuple(map(self._shaped, chain)) for name, chain in placed.inputs.items()}
+        placed = replace(placed, inputs=inner)
+        block = self._catalogue.blocks.get(placed.type)
+        if block is None or not block.mutator:
+            return placed
+        if block.mutator == "items":
+            return self._listed(placed, block)
+        return self._call(placed, block) if block.mutator == "call" else self._defined(placed, block)
+
+    def _listed(self, placed: Placed, block: Block) -> Placed:
+        growing = next(argument for argument in block.arguments if isinstance(argument, Items))
+        gaps = growing.gaps(placed.extra)
+        holes = [f"%{gap.name}" for gap in gaps]
+        hole = f"%{growing.name}"
+        made = replace(
+            block,
+            type=f"{block.type}:{len(gaps)}",
+            text=block.text.replace(hole, " ".join(holes)),
+            python=str(block.python).replace(hole, ", ".join(holes)),
+            arguments=gaps,
+        )
+        return self._as(placed, made)
+
+    def _defined(self, placed: Placed, block: Block) -> Placed:
+        """A definition in words: “to greet name times”."""
+        shown = " ".join(each.name for each in inputs_of(placed.extra))
+        text = block.text.replace("%NAME", _plain(name_of(placed))).replace("%INPUTS", _plain(shown))
+        kept = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
+        if placed.type == RESULT:
+            result = tuple(argument for argument in kept if argument.name == "RESULT")
+            self._catalogue.blocks[f"{END}:{placed.id}"] = replace(
+                block, shape="statement", text="give back %RESULT", python="return %RESULT", arguments=result
+            )
+        return self._as(placed, replace(block, type=f"{block.type}:{placed.id}", text=text, arguments=kept))
+
+    def _call(self, placed: Placed, block: Block) -> Placed:
+        function = self._called(placed)
+        inputs = inputs_of(placed.extra) if function is None else function.inputs
+        name = _plain(name_of(placed) if function is None else function.name)
+        gaps, filled = _gaps(placed, inputs)
+        text = " ".join((name, *(f"{_plain(each.name)} %{gap.name}" for each, gap in gaps)))
+        made = replace(block, type=f"{block.type}:{placed.id}", text=text)
+        if function is None:
+            sentence = f"“{name}” has no definition in this behaviour. Make one, or take this block away."
+            made = replace(
+                made, text=name, arguments=(), python="fail(%X_SENTENCE)",
+                constants={"X_SENTENCE": sentence}, undefined=sentence,
+            )  # fmt: skip
+        else:
+            holes = ", ".join(f"%{gap.name}" for _, gap in gaps)
+            made = replace(
+                made, arguments=tuple(gap for _, gap in gaps), python=f"%X_FUNCTION({holes})",
+                trees={"X_FUNCTION": ast.Name(function.python, ast.Load())}, calls=True,
+            )  # fmt: skip
+        return self._as(replace(placed, inputs=filled), made)
+
+    def _as(self, placed: Placed, block: Block) -> Placed:
+        self._catalogue.blocks[block.type] = block
+        return replace(placed, type=block.type)
+
+
+def _function(placed: Placed, names: Names) -> Function:
+    inputs = inputs_of(placed.extra)
+    name = name_of(placed)
+    python = names.new(name, "function")
+    parameters = {each.id: names.new(each.name, "input") for each in inputs}
+    return Function(placed, name, python, parameters, inputs, _GIVES[placed.type])
+
+
+def _gaps(
+    placed: Placed, inputs: tuple[FunctionInput, ...]
+) -> tuple[list[tuple[FunctionInput, Argument]], dict[str, tuple[Placed, ...]]]:
+    """The gaps of a call under names that templates take, and what is in them."""
+    gaps: list[tuple[FunctionInput, Argument]] = []
+    filled: dict[str, tuple[Placed, ...]] = {}
+    for number, (each, gap) in enumerate(Inputs("INPUTS").gaps(inputs)):
+        gaps.append((each, ValueInput(f"G{number}")))
+        filled[f"G{number}"] = placed.inputs.get(gap.name, ())
+    return gaps, filled
+
+
+def _plain(words: str) -> str:
+    """Words of people in a block's text, where a per cent sign begins a hole."""
+    return words.replace("%", "％")  # noqa: RUF001 (looks the same, is no hole)

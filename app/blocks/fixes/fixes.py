@@ -1,0 +1,87 @@
+"""What a problem's button does to the blocks: pure functions from one workspace to the next."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+
+from app.blocks.compiler.shaping import CALL, CALL_RESULT, PLAIN, RESULT
+from app.blocks.model.growing import inputs_of, name_of
+from app.blocks.model.workspace import Placed, saved_blocks
+from app.blocks.toolbox.catalogue import categories
+
+LIMIT_S = 10
+
+
+def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
+    """The workspace after a problem's ``mend_action``; None for an action that is no matter of blocks.
+
+    ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script that
+    nothing starts, ``define:<id>`` makes the function that a block calls.
+    """
+    verb, _, object_ = action.partition(":")
+    made: dict[str, object] = copy.deepcopy(dict(workspace))
+    if verb == "limit":
+        for block in saved_blocks(made):
+            if block.get("id") == object_ and block.get("type") == "control_wait_until":
+                _limit(block)
+                return made
+    if verb == "define":
+        for block in saved_blocks(made):
+            if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
+                return _defined(made, block)
+    if verb == "add":
+        return _started(made, object_)
+    return None
+
+
+def _limit(block: dict[str, object]) -> None:
+    block["type"] = "control_wait_until_at_most"
+    inputs = block.setdefault("inputs", {})
+    if isinstance(inputs, dict):
+        inputs["SECONDS"] = {"shadow": {"type": "values_number", "fields": {"NUMBER": LIMIT_S}}}
+
+
+def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
+    """A function with the name and the inputs that the call has."""
+    extra = call.get("extraState")
+    known: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
+    placed = Placed("", "", {}, extra=known)
+    definition: dict[str, object] = {
+        "type": RESULT if call.get("type") == CALL_RESULT else PLAIN,
+        "x": 40,
+        "y": 40,
+        "fields": {"NAME": name_of(placed)},
+        "extraState": {"inputs": [{"id": each.id, "name": each.name} for each in inputs_of(known)]},
+    }
+    if isinstance(known.get("function"), str):
+        definition["id"] = known["function"]
+    blocks = workspace.get("blocks")
+    tops = blocks.get("blocks") if isinstance(blocks, dict) else None
+    if isinstance(tops, list):
+        tops.append(definition)
+    return workspace
+
+
+def _started(workspace: dict[str, object], block_type: str) -> dict[str, object]:
+    blocks = workspace.setdefault("blocks", {"languageVersion": 0, "blocks": []})
+    tops = blocks.get("blocks") if isinstance(blocks, dict) else None
+    if not isinstance(tops, list):
+        return workspace
+    starter: dict[str, object] = {"type": block_type, "x": 40, "y": 40}
+    for number, top in enumerate(tops):
+        if isinstance(top, dict) and _can_follow(str(top.get("type", ""))):
+            starter |= {name: top.pop(name) for name in ("x", "y") if name in top}
+            starter["next"] = {"block": top}
+            tops[number] = starter
+            return workspace
+    tops.append(starter)
+    return workspace
+
+
+def _can_follow(block_type: str) -> bool:
+    """Whether a block of this type hangs under others; one that nobody knows is taken for such a block."""
+    known = {block.type: block.shape for category in categories() for block in category.blocks}
+    if block_type in known:
+        return known[block_type] in ("statement", "cap")
+    return "_get_" not in block_type and "_when_" not in block_type

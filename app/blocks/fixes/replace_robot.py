@@ -1,0 +1,62 @@
+"""Let another robot do what a behaviour asks of one that is not there: its blocks, for another name."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Collection, Mapping
+
+from app.blocks.categories.robot import robot_blocks
+from app.blocks.model.robot_text import type_of
+from app.blocks.model.workspace import saved_blocks
+from app.robots.description import Robot
+
+
+def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, object], ...]:
+    """Every block that names the robot, the outermost first."""
+    return tuple(block for block in saved_blocks(workspace) if _robot_of(block) == robot)
+
+
+def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
+    """The types of the blocks that name each robot."""
+    found: dict[str, set[str]] = {}
+    for block in saved_blocks(workspace):
+        robot = _robot_of(block)
+        if isinstance(robot, str):
+            found.setdefault(robot, set()).add(str(block.get("type")))
+    return {robot: frozenset(types) for robot, types in found.items()}
+
+
+def types_of(robot: Robot) -> frozenset[str]:
+    """The types of all blocks of a robot."""
+    return frozenset(block.type for block in robot_blocks(robot, [robot]))
+
+
+def can_do(asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None) -> bool:
+    """Whether a robot can do everything that blocks of these types ask of one of this model.
+
+    `known` are the types of its own blocks, when they are at hand.
+    """
+    known = types_of(robot) if known is None else known
+    return bool(asked) and all(_translated(each, model, robot) in known for each in asked)
+
+
+def use_robot(workspace: Mapping[str, object], missing: str, model: str, robot: Robot) -> dict[str, object]:
+    """The workspace in which the robot does what the missing one was asked to do."""
+    made: dict[str, object] = copy.deepcopy(dict(workspace))
+    for block in blocks_of(made, missing):
+        block["type"] = _translated(str(block.get("type")), model, robot)
+        fields = block["fields"]
+        if isinstance(fields, dict):
+            fields["ROBOT"] = robot.name
+    return made
+
+
+def _translated(block_type: str, model: str, robot: Robot) -> str:
+    """The same block of the other robot's model."""
+    ours, theirs = (type_of(each, "", "", plain=True) for each in (model, robot.model))
+    return theirs + block_type.removeprefix(ours) if block_type.startswith(ours) else block_type
+
+
+def _robot_of(block: Mapping[str, object]) -> object:
+    fields = block.get("fields")
+    return fields.get("ROBOT") if isinstance(fields, Mapping) else None

@@ -1,0 +1,98 @@
+"""Blocks in words: "wait 2 s", "say “Touch my head.”"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from app.blocks.model.block import Block
+from app.blocks.model.fields import (
+    ChoiceField,
+    Field,
+    FieldError,
+    StatementInput,
+    TextField,
+    ValueInput,
+    VariableField,
+)
+from app.blocks.model.workspace import Placed
+
+_PLACE = re.compile(r"%([A-Z][A-Z0-9_]*)")
+_LONGEST = 80
+
+
+def reading(
+    placed: Placed, blocks: Mapping[str, Block], variables: Mapping[str, str], *, robot: bool = True
+) -> str:
+    """The block with what stands in it.
+
+    `robot` False leaves the robot's name out. One line, never too long.
+    """
+    block = blocks.get(placed.type)
+    if block is None:
+        return label_of_type(placed.type)
+
+    def place(match: re.Match[str]) -> str:
+        argument = block.argument(match[1])
+        if argument is None:
+            return match[0]
+        if match[1] == "ROBOT" and not robot:
+            return ""
+        if isinstance(argument, VariableField):
+            return variables.get(_saved_variable(argument, placed), argument.value)
+        if isinstance(argument, Field) and not argument.silent:
+            words = _field(argument, placed)
+            return f"“{words}”" if is_text and isinstance(argument, TextField) else words
+        if isinstance(argument, ValueInput):
+            if not argument.is_there(placed.fields):
+                return ""
+            inner = placed.inputs.get(argument.name, ())
+            return reading(inner[0], blocks, variables) if inner else "…"
+        return ""
+
+    is_text = block.shape == "value"
+    words = " ".join(_PLACE.sub(place, block.text).split())
+    return words if len(words) <= _LONGEST else f"{words[: _LONGEST - 1]}…"
+
+
+def label(placed: Placed, block: Block) -> str:
+    """The words that name a block: "wait until", "is below", "turn"; those before its first gap."""
+    if block.robot is not None and block.robot.kind == "action":
+        return block.robot.title
+    pieces = _PLACE.split(block.text)  # words, argument, words, argument, …, words
+    found = ""
+    for number, piece in enumerate(pieces):
+        argument = block.argument(piece) if number % 2 else None
+        if isinstance(argument, (ValueInput, StatementInput)):
+            if found.strip():
+                break
+        elif isinstance(argument, ChoiceField) and argument.name != "ROBOT":
+            found += _field(argument, placed)
+        elif argument is None:
+            found += piece
+    return " ".join(found.split()) or label_of_type(block.type)
+
+
+def label_of_type(block_type: str) -> str:
+    """The words for a block that nobody describes: ``robot_nao_do_wave`` is "wave"."""
+    for verb in ("_do_", "_get_", "_when_"):
+        if block_type.startswith("robot_") and verb in block_type:
+            return block_type.partition(verb)[2].replace("_", " ")
+    return block_type.partition("_")[2].replace("_", " ") or block_type
+
+
+def _field(argument: Field, placed: Placed) -> str:
+    try:
+        value = argument.read(placed.fields.get(argument.name))
+    except FieldError:
+        return str(placed.fields.get(argument.name))
+    if isinstance(argument, ChoiceField):
+        return argument.words(value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _saved_variable(argument: VariableField, placed: Placed) -> str:
+    try:
+        return str(argument.read(placed.fields.get(argument.name)))
+    except FieldError:
+        return ""

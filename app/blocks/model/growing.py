@@ -1,0 +1,96 @@
+"""Arguments that people add and take away on the block itself: items of a list, inputs of a function.
+
+What there is stands in the block's ``extraState``, which the editor writes: a file may hold anything there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from app.blocks.model.fields import Argument, ValueInput, VariableField
+from app.blocks.model.workspace import Placed
+
+MOST_ITEMS = 50
+MOST_INPUTS = 12
+LONGEST_NAME = 60
+
+
+@dataclass(frozen=True)
+class Items(Argument):
+    """Gaps in a row, ``<name>0``, ``<name>1``, …; their hole gets one list of all their values."""
+
+    count: int = 3
+    texts: tuple[str, ...] = ()  # what the gaps hold in the toolbox
+
+    def fillings(self) -> dict[str, object]:
+        """A text in each gap."""
+        return {
+            f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": words}}}
+            for number, words in enumerate(self.texts)
+        }
+
+    def to_blockly(self) -> dict[str, object]:
+        """A place: the editor's mutator puts the gaps there."""
+        return {"type": "input_dummy", "name": self.name}
+
+    def gaps(self, extra: Mapping[str, object]) -> tuple[ValueInput, ...]:
+        """The gaps that a block has."""
+        count = extra.get("items")
+        sound = isinstance(count, int) and not isinstance(count, bool)
+        many = min(max(int(count), 0), MOST_ITEMS) if sound and isinstance(count, int) else self.count
+        return tuple(ValueInput(f"{self.name}{number}") for number in range(many))
+
+
+@dataclass(frozen=True)
+class FunctionInput:
+    """An input of a function: its id, which stays, and its name, which people change."""
+
+    id: str
+    name: str
+
+
+def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
+    """The inputs that a definition or a call says it has; each id once."""
+    saved = extra.get("inputs")
+    found: dict[str, FunctionInput] = {}
+    for each in saved if isinstance(saved, list) else ():
+        if isinstance(each, Mapping) and isinstance(each.get("id"), str) and each["id"]:
+            name = str(each.get("name") or "input")[:LONGEST_NAME]
+            found.setdefault(str(each["id"]), FunctionInput(str(each["id"]), name))
+    return tuple(found.values())[:MOST_INPUTS]
+
+
+@dataclass(frozen=True)
+class Inputs(Argument):
+    """The inputs of a function: names on its definition, gaps ``IN_<id>`` on its calls."""
+
+    @property
+    def silent(self) -> bool:
+        """The compiler makes them parameters and arguments; no hole is theirs."""
+        return True
+
+    def to_blockly(self) -> dict[str, object]:
+        """A place: the editor's mutator puts names or gaps there."""
+        return {"type": "input_dummy", "name": self.name}
+
+    def gaps(self, inputs: tuple[FunctionInput, ...]) -> tuple[tuple[FunctionInput, ValueInput], ...]:
+        """The gap of each input on a call."""
+        return tuple((each, ValueInput(f"IN_{each.id}")) for each in inputs)
+
+
+@dataclass(frozen=True)
+class InputField(VariableField):
+    """An input of the function that the block is in; the compiler looks its name up."""
+
+    value: str = "input"
+
+    def to_blockly(self) -> dict[str, object]:
+        """Our field that shows the input's name."""
+        return {"type": "field_function_input", "name": self.name}
+
+
+def name_of(placed: Placed) -> str:
+    """The name of the function that a definition or a call names."""
+    saved = placed.fields.get("NAME", placed.extra.get("name"))
+    return " ".join(str(saved or "function").split())[:LONGEST_NAME] or "function"

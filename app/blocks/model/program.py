@@ -1,0 +1,104 @@
+"""What the compiler makes: a program, and what people should know about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Literal
+
+Severity = Literal["error", "warning", "info"]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that a person should know before Run.
+
+    ``sentence`` holds ``subject``, which is shown bold. ``category`` is the style of the block's colour,
+    ``icon`` its icon. ``mend`` are a button's words, ``mend_action`` what it does (`app.blocks.fixes.fixes`,
+    or ``connect:<robot>``). An error means: the program would stop with this sentence at that block.
+    """
+
+    severity: Severity
+    block_id: str | None
+    category: str | None
+    subject: str
+    sentence: str
+    mend: str | None = None
+    mend_action: str | None = None
+    icon: str = ""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A behaviour as a program.
+
+    ``source`` is for people, and runs as a file; ``lines`` gives the block of a line of it. ``runnable`` is
+    the same tree with a ``step`` before each block. ``robots`` are those that its blocks name and that are
+    there, and those that it moves by publishing on their topics (``moves``); ``sensors`` and ``events`` are
+    (robot, name). ``readings`` are the blocks in words ("wait 2 s"),
+    ``labels`` the words that name them ("wait").
+    """
+
+    name: str
+    source: str
+    runnable: str
+    lines: Mapping[int, str]
+    robots: tuple[str, ...] = ()
+    sensors: tuple[tuple[str, str], ...] = ()
+    events: tuple[tuple[str, str], ...] = ()
+    publishes: tuple[str, ...] = ()
+    listens: tuple[str, ...] = ()
+    moves: tuple[str, ...] = ()
+    readings: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    problems: tuple[Problem, ...] = ()
+    starts: int = 0  # how many scripts something can start
+    absent: tuple[str, ...] = ()  # the blocks of robots that are not connected, whether they would run or not
+
+    @property
+    def errors(self) -> tuple[Problem, ...]:
+        """The problems at which the program would stop."""
+        return tuple(problem for problem in self.problems if problem.severity == "error")
+
+    def to_json(self) -> dict[str, object]:
+        """What a child process needs to run it, as JSON can hold it."""
+        kept = asdict(self)
+        for name in ("source", "lines", "problems", "absent"):
+            del kept[name]
+        return kept
+
+    @classmethod
+    def from_json(cls, saved: Mapping[str, object]) -> Program:
+        """The program that `to_json` wrote; KeyError or TypeError if something else wrote it."""
+        return cls(
+            name=str(saved["name"]),
+            source="",
+            runnable=str(saved["runnable"]),
+            lines={},
+            robots=_texts(saved["robots"]),
+            sensors=_pairs(saved["sensors"]),
+            events=_pairs(saved["events"]),
+            publishes=_texts(saved["publishes"]),
+            listens=_texts(saved["listens"]),
+            moves=_texts(saved.get("moves", ())),
+            readings=_table(saved["readings"]),
+            labels=_table(saved["labels"]),
+        )
+
+
+def _texts(saved: object) -> tuple[str, ...]:
+    if not isinstance(saved, (list, tuple)):
+        raise TypeError("not a list")
+    return tuple(str(item) for item in saved)
+
+
+def _pairs(saved: object) -> tuple[tuple[str, str], ...]:
+    if not isinstance(saved, (list, tuple)):
+        raise TypeError("not a list")
+    return tuple((str(first), str(second)) for first, second in saved)
+
+
+def _table(saved: object) -> dict[str, str]:
+    if not isinstance(saved, Mapping):
+        raise TypeError("not a table")
+    return {str(key): str(value) for key, value in saved.items()}

@@ -1,0 +1,131 @@
+"""From the words of a robot's description to the parts of a block."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from app.blocks.model.fields import (
+    Argument,
+    ChoiceField,
+    ColourField,
+    Field,
+    NumberField,
+    TextField,
+    ValueInput,
+)
+from app.robots.description import Parameter
+from app.robots.inputs import pretty_number, pretty_unit, to_words
+
+_PLACE = re.compile(r"%([A-Za-z_]\w*)")
+_RESERVED = ("ROBOT", "LIVE", "FIELD", "SENSOR", "SIDE", "LIMIT", "X_NAME", "X_INPUT", "X_FIELD", "ICON")
+_NUMBERS = ("number", "integer", "angle")
+
+
+class TextParts:
+    """A description's text with the names of a block's arguments in it.
+
+    ``arguments`` gives the block's name for each parameter, ``shown`` are the parameters that the text has.
+    """
+
+    def __init__(self, text: str, parameters: Sequence[str]) -> None:
+        """Take "%robot say %text" apart."""
+        self.arguments: dict[str, str] = {}
+        taken = set(_RESERVED)
+        for name in parameters:
+            self.arguments[name] = _argument_name(name, taken)
+        self.shown: frozenset[str] = frozenset(
+            name for name in _PLACE.findall(text) if name in self.arguments
+        )
+        self._placed: set[str] = set()
+        self.text = _PLACE.sub(self._place, text)
+        if "%ROBOT" not in self.text:
+            self.text = f"%ROBOT {self.text}"
+
+    def _place(self, match: re.Match[str]) -> str:
+        name = "ROBOT" if match[1] == "robot" else self.arguments.get(match[1])
+        # An unknown place is left out, it would read as an argument of ours; so is one that comes twice.
+        if name is None or name in self._placed:
+            return ""
+        self._placed.add(name)
+        return f"%{name}"
+
+
+def type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
+    """The block type: ``robot_pepper_do_say``.
+
+    A plain one, ``robot_pepper_changes``, is no part of a robot's.
+    """
+    middle = "" if plain else f"{verb}_"
+    return f"robot_{_word(model)}_{middle}{_word(name)}"
+
+
+def input_of(parameter: Parameter, name: str) -> Argument:
+    """The gap or field for an action's parameter."""
+    default = parameter.default
+    if parameter.kind in _NUMBERS:
+        number = default if isinstance(default, (int, float)) else (parameter.minimum or 0)
+        return ValueInput(name, "Number", number, unit=parameter.unit or "")
+    if parameter.kind in ("choice", "boolean", "colour"):
+        return field_of(parameter, name)
+    if isinstance(default, (list, tuple, Mapping)):
+        return ValueInput(name, None, to_words(default))
+    text = default if isinstance(default, str) else ""
+    # Whatever is put in becomes text: a number, the newest value of a topic.
+    return ValueInput(name, None, text)
+
+
+def field_of(parameter: Parameter | None, name: str) -> Field:
+    """The field for a parameter whose values are known, or for an event's filter."""
+    if parameter is None:
+        return TextField(name)
+    default = parameter.default
+    if parameter.kind == "choice":
+        options = [(choice.title, choice.value) for choice in parameter.choices]
+        options.sort(key=lambda option: option[1] != default)
+        return ChoiceField(name, tuple(options))
+    if parameter.kind == "boolean":
+        yes, no = _yes_no(parameter.title or parameter.name)
+        options_yes = (yes, True), (no, False)
+        return ChoiceField(name, options_yes if default is not False else options_yes[::-1])
+    if parameter.kind == "colour":
+        return ColourField(name, default if isinstance(default, str) else "#37b6ff")
+    if parameter.kind in _NUMBERS:
+        number = default if isinstance(default, (int, float)) else 0
+        return NumberField(name, number, parameter.minimum, parameter.maximum)
+    return TextField(name, default if isinstance(default, str) else "hello")
+
+
+def about(parameter: Parameter) -> str:
+    """More about a parameter than its kind: its limits, its unit."""
+    unit = f" {pretty_unit(parameter.unit)}" if parameter.unit else ""
+    low = None if parameter.minimum is None else pretty_number(parameter.minimum)
+    high = None if parameter.maximum is None else pretty_number(parameter.maximum)
+    if low is not None and high is not None:
+        return f"from {low} to {high}{unit}"
+    if low is not None:
+        return f"at least {low}{unit}"
+    if high is not None:
+        return f"at most {high}{unit}"
+    return f"in{unit}" if unit else ""
+
+
+def _yes_no(title: str) -> tuple[str, str]:
+    if title.startswith("with "):
+        return title, f"without {title[5:]}"
+    return f"{title}: yes", f"{title}: no"
+
+
+def _argument_name(name: str, taken: set[str]) -> str:
+    plain = re.sub(r"[^A-Z0-9_]", "_", name.upper())
+    if not plain[:1].isalpha():
+        plain = f"P_{plain}"
+    made, number = plain, 2
+    while made in taken:
+        made, number = f"{plain}_{number}", number + 1
+    taken.add(made)
+    return made
+
+
+def _word(name: str) -> str:
+    return re.sub(r"\W+", "_", name.lower()).strip("_") or "x"

@@ -1,0 +1,304 @@
+"""The process of a program: ``python -m app.blocks.runtime.child``. It talks JSON lines with the runner.
+
+In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node's id},
+"master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
+"stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), or ``{"do": "robots", "owners": …,
+"guarded": {topic: [robots]}}`` when robots came or were started anew. Out: ``{"is": "ready" | "running" |
+"paused" | "error" | "print" | "ended", …}``. When its input ends, the program ends, and its robots are told.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import TextIO
+
+import nep
+from app.blocks.model.program import Program
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.network import Network
+from app.blocks.runtime.publishing import PublishGuard, guarded
+from app.blocks.runtime.runtime import Runtime
+from app.errors import AppError
+from app.robots.description import Robot, parse
+from nep.errors import NepError
+
+SAMPLE_S = 1 / 30
+STOP_ANSWER_S = 1.0
+FLUSH_S = 0.03
+LONGEST_LINE = 2000
+MOST_LINES = 10_000
+LINES_PER_SAMPLE = 50
+
+
+class Out:
+    """The lines to the runner. What the program prints is bounded: long lines are cut, too many left out."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._lock = threading.Lock()
+        self._printed: queue.Queue[str] = queue.Queue(LINES_PER_SAMPLE)
+        self._left = MOST_LINES
+        self.told: Callable[[str], object] = lambda _line: None
+        """Is given each line that the program prints."""
+        self._dropped = 0
+
+    def send(self, kind: str, **content: object) -> None:
+        """One line; when nobody reads any more, nothing."""
+        line = json.dumps({"is": kind, **content}, default=str)
+        with self._lock:
+            try:
+                self._stream.write(line + "\n")
+                self._stream.flush()
+            except (OSError, ValueError):
+                return
+
+    def print(self, text: str) -> None:
+        """Keep a line of the program until the next sample."""
+        for line in text[: LONGEST_LINE * 4].splitlines() or [""]:
+            try:
+                self._printed.put_nowait(line[:LONGEST_LINE])
+            except queue.Full:
+                self._dropped += 1
+            self.told(line[:LONGEST_LINE])
+
+    def send_printed(self) -> None:
+        """Send what was kept."""
+        while self._left > 0:
+            try:
+                self.send("print", text=self._printed.get_nowait())
+            except queue.Empty:
+                break
+            self._left -= 1
+            if self._left == 0:
+                self.send("print", text=f"nothing more is shown: {MOST_LINES} lines are enough")
+        if self._dropped:
+            self.send("print", text=f"{self._dropped} lines were left out: too many at once")
+            self._dropped = 0
+
+
+class Printed(io.TextIOBase):
+    """What the program prints, as lines of the protocol."""
+
+    def __init__(self, out: Out) -> None:
+        self._out = out
+
+    def write(self, text: str) -> int:
+        """One line, without its end."""
+        if text.strip("\n"):
+            self._out.print(text.strip("\n"))
+        return len(text)
+
+
+class Run:
+    """One program from start to end."""
+
+    def __init__(self, order: Mapping[str, object], out: Out) -> None:
+        """Parse the order; KeyError, TypeError or AppError if it is none."""
+        program = order["program"]
+        robots = order["robots"]
+        if not isinstance(program, Mapping) or not isinstance(robots, list):
+            raise TypeError("a start needs a program and robots")
+        self._program = Program.from_json(program)
+        everybody = tuple(map(parse, robots))
+        self._robots: tuple[Robot, ...] = tuple(
+            robot for robot in everybody if robot.name in self._program.robots
+        )
+        self._owners = _table(order.get("owners"))
+        self._guard = PublishGuard(guarded(everybody), self._program.moves)
+        self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
+        self._master = None if order.get("master") is None else str(order["master"])
+        self._out = out
+        self._runtime = Runtime(out.print, labels=self._program.labels, readings=self._program.readings)
+        self._network: Network | None = None
+        self._began = time.monotonic()
+        self._stop_answer_s = STOP_ANSWER_S
+        self.set_pace(order)
+        self._begins_paused = order.get("paused") is True
+        if self._begins_paused:
+            self._runtime.scheduler.pause()
+
+    def orders(self) -> dict[str, Callable[[], None]]:
+        """What can be asked of it while it runs."""
+        scheduler = self._runtime.scheduler
+        return {
+            "pause": self.pause,
+            "go": self.go_on,
+            "step": scheduler.step_once,
+            "stop": self.stop,
+        }
+
+    def pause(self) -> None:
+        """Hold the scripts, what they wait for, and what robots were left doing."""
+        self._runtime.scheduler.pause()
+        if self._network is not None:
+            self._network.rest()
+
+    def go_on(self) -> None:
+        """Go on with all of it."""
+        if self._network is not None:
+            self._network.go_on()
+        self._runtime.scheduler.go_on()
+
+    def set_pace(self, order: Mapping[str, object]) -> None:
+        """Slow motion, or none."""
+        pace_s = order.get("pace_s")
+        if isinstance(pace_s, (int, float)):
+            self._runtime.scheduler.set_pace(pace_s)
+
+    def know(self, order: Mapping[str, object]) -> None:
+        """Robots have come, or were started anew and may be moved."""
+        topics = order.get("guarded")
+        if isinstance(topics, Mapping):
+            self._guard.know({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
+        if self._network is not None:
+            self._network.know(_table(order.get("owners")))
+
+    def stop(self) -> None:
+        """End the scripts; `run` then ends at once: who asked for it waits for the robots' answers."""
+        self._stop_answer_s = 0.0
+        self._runtime.scheduler.stop()
+        self._runtime.finished.set()
+
+    def run(self) -> bool:
+        """Run to the end, also the robots' end; whether no block failed."""
+        with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
+            self._out.told = partial(node.log.info, "%s")
+            silent = self._run_on(node)
+            error = self._runtime.error
+            if error is not None:
+                node.log.error("%s", error.sentence)
+                self._out.send("error", block=error.block, sentence=error.sentence)
+            self._out.send_printed()
+            elapsed_s = round(time.monotonic() - self._began, 3)
+            self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent)
+            node.close(FLUSH_S if self._stop_answer_s == 0.0 else 2 * STOP_ANSWER_S)
+        return error is None
+
+    def _run_on(self, node: nep.Node) -> tuple[str, ...]:
+        """Run, then tell the robots to stop; the names of those that did not answer."""
+        network = Network(
+            node,
+            self._id,
+            self._robots,
+            sensors=self._program.sensors,
+            events=self._program.events,
+            publishes=self._program.publishes,
+            listens=self._program.listens,
+            owners=self._owners,
+        )
+        network.guard = self._guard
+        self._network = network
+        if self._begins_paused:
+            network.rest()
+        try:
+            self._begin(network)
+            self._watch()
+        finally:
+            self._runtime.scheduler.stop()
+            silent = network.stop_robots(self._stop_answer_s)
+            network.close()
+        return silent if self._stop_answer_s else ()
+
+    def _begin(self, network: Network) -> None:
+        names = self._runtime.namespace() | {"step": partial(self._step, network)}
+        code = compile(self._program.runnable, "<behaviour>", "exec")
+        exec(code, names)  # noqa: S102 (the compiler's own tree: no text of a file is in it but as a literal)
+        self._began = time.monotonic()
+        self._runtime.start(network, self._robots)
+
+    def _step(self, network: Network, block: str) -> None:
+        """A block begins; in slow motion robots do not drive on while it waits for its turn."""
+        if self._runtime.scheduler.pace_s:
+            with network.slow():
+                self._runtime.step(block)
+        else:
+            self._runtime.step(block)
+
+    def _watch(self) -> None:
+        """Tell 30 times a second what runs, when it changed."""
+        runtime, saying, before = self._runtime, self._runtime.saying, None
+        while not runtime.finished.wait(SAMPLE_S):
+            now = runtime.scheduler.snapshot()
+            words, warning = saying.says(now.blocks), saying.warns(now.blocks)
+            self._out.send_printed()
+            if (now, words, warning) == before:
+                continue
+            before = (now, words, warning)
+            if now.paused:
+                reading = saying.reading(now.next_block)
+                self._out.send(
+                    "paused", block=now.next_block, blocks=now.blocks, says=reading, warning=warning
+                )
+            else:
+                self._out.send("running", blocks=now.blocks, says=words)
+
+
+def _table(told: object) -> dict[str, str]:
+    """A table of texts; what is none is empty."""
+    return {str(key): str(value) for key, value in told.items()} if isinstance(told, Mapping) else {}
+
+
+def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
+    """The runner's orders until its end of the pipe closes; what is none is left out."""
+    for line in stream:
+        try:
+            order = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(order, Mapping):
+            yield order
+
+
+def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
+    """Run one program; 0 if it ended well, 1 if not."""
+    out = Out(stdout or sys.stdout)
+    incoming = orders(stdin or sys.stdin)
+    sys.stdout = Printed(out)
+    out.send("ready")
+    order = next((order for order in incoming if order.get("do") == "start"), None)
+    if order is None:
+        return 0
+    try:
+        run = Run(order, out)
+        threading.Thread(target=_obey, args=(run, incoming), name="orders", daemon=True).start()
+        return 0 if run.run() else 1
+    except BehaviourError as error:
+        out.send("error", block=error.block, sentence=error.sentence)
+    except (AppError, NepError) as error:
+        out.send("error", block=None, sentence=f"The program can't begin: {error}.")
+    except (KeyError, TypeError, ValueError, SyntaxError) as error:
+        out.send("error", block=None, sentence=f"The program can't be read: {error}.")
+    out.send("ended", ok=False, elapsed_s=0.0, silent=[])
+    return 1
+
+
+def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
+    obeyed = run.orders()
+    for order in incoming:
+        if order.get("do") == "pace":
+            run.set_pace(order)
+        elif order.get("do") == "robots":
+            run.know(order)
+        do = obeyed.get(str(order.get("do")))
+        if do is not None:
+            do()
+    run.stop()  # the runner is gone, or wants us gone
+
+
+if __name__ == "__main__":
+    # Ctrl+C in a terminal reaches us too; what it means is for the runner to decide.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    code = main()
+    # Scripts may still hang in something of their own; nothing of them is worth waiting for.
+    sys.stderr.flush()
+    os._exit(code)

@@ -1,0 +1,180 @@
+"""What programs do with lists: pure functions, called by the blocks of the category "Lists".
+
+Items are numbered from 1, as people count. A list holds at most `MOST_ITEMS` items, those of lists inside it
+too; what is put in is copied, so no list is inside itself.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+
+from app.blocks.runtime.errors import BehaviourError, kind
+from app.blocks.runtime.values import LONGEST_TEXT, number, text
+
+MOST_ITEMS = 10_000
+FIRST, LAST, RANDOM = "first", "last", "random"
+
+
+def new_list(*items: object) -> list[object]:
+    """A list of these."""
+    return _own_list(items)
+
+
+def item(of: object, where: object) -> object:
+    """The item at a place: its number, "first", "last" or "random"."""
+    items = _read(of)
+    return items[_index(items, where)]
+
+
+def set_item(of: object, where: object, value: object) -> None:
+    """Put a value in the place of an item."""
+    items = _changed(of)
+    place = _index(items, where)
+    items[place] = _fitting(items, value)
+
+
+def insert_item(of: object, where: object, value: object) -> None:
+    """Put a value before the item at a place, or as the last; the next number after the last is fine too."""
+    items = _changed(of)
+    if where == LAST or (where != FIRST and where == len(items) + 1):
+        place = len(items)
+    elif where == FIRST:
+        place = 0
+    else:
+        place = _index(items, where)
+    items.insert(place, _fitting(items, value))
+
+
+def add_item(of: object, value: object) -> None:
+    """Put a value at the end."""
+    items = _changed(of)
+    items.append(_fitting(items, value))
+
+
+def remove_item(of: object, where: object) -> object:
+    """Take an item out; it is given back."""
+    items = _changed(of)
+    return items.pop(_index(items, where))
+
+
+def contains(where: object, value: object) -> bool:
+    """Whether a list has such an item, or a text has these words in it."""
+    if isinstance(where, str):
+        return text(value) in where
+    return any(_same(each, value) for each in _read(where))
+
+
+def position(of: object, value: object) -> int:
+    """The number of the first such item; 0 when there is none."""
+    return next((place for place, each in enumerate(_read(of), 1) if _same(each, value)), 0)
+
+
+def each(of: object) -> list[object]:
+    """The items as they are now: a loop over them is not disturbed when the list changes."""
+    return list(_read(of))
+
+
+def join_items(of: object, between: object) -> str:
+    """All items as one text, with this between them."""
+    joint, pieces, size = text(between), [], 0
+    for one in _read(of):
+        pieces.append(text(one))
+        size += len(pieces[-1]) + len(joint)
+        if size > LONGEST_TEXT:
+            raise BehaviourError(f"This text is too long: more than {LONGEST_TEXT} characters.")
+    return joint.join(pieces)
+
+
+def split_text(words: object, at: object) -> list[object]:
+    """The pieces of a text between these characters; its single characters when there are none."""
+    whole, joint = text(words), text(at)
+    pieces = whole.split(joint) if joint else list(whole)
+    if len(pieces) > MOST_ITEMS:
+        raise _full()
+    return [*pieces]
+
+
+def _read(of: object) -> Sequence[object]:
+    if isinstance(of, (list, tuple)):
+        return of
+    if of is None:
+        raise BehaviourError("This list is not known yet.", unknown=True)
+    hint = " Set the variable to an empty list first." if of == 0 and isinstance(of, int) else ""
+    raise BehaviourError(f"This needs a list, not {kind(of)}.{hint}")
+
+
+def _changed(of: object) -> list[object]:
+    items = _read(of)
+    if not isinstance(items, list):
+        raise BehaviourError("This list can't be changed.")
+    return items
+
+
+def _index(items: Sequence[object], where: object) -> int:
+    if not items:
+        raise BehaviourError("The list is empty.")
+    if where == FIRST:
+        return 0
+    if where == LAST:
+        return len(items) - 1
+    if where == RANDOM:
+        return random.randrange(len(items))  # noqa: S311 (a game, no secret)
+    place = number(where, "“item number”")
+    if place != int(place):
+        raise BehaviourError(f"“item number” needs a whole number, not {text(place)}.")
+    if not 1 <= place <= len(items):
+        raise BehaviourError(f"The list has {_many(len(items))}; there is no item {text(place)}.")
+    return int(place) - 1
+
+
+def _many(count: int) -> str:
+    return "1 item" if count == 1 else f"{count} items"
+
+
+def _same(one: object, other: object) -> bool:
+    """As "is" compares them; true is not 1."""
+    return one == other and isinstance(one, bool) == isinstance(other, bool)
+
+
+def _fitting(items: list[object], value: object) -> object:
+    """A value that goes into a list: a list as a copy. BehaviourError when there is no room."""
+    if len(items) >= MOST_ITEMS:
+        raise _full()
+    if not isinstance(value, (list, tuple)):
+        return value
+    room = MOST_ITEMS - _size(items, MOST_ITEMS)
+    if room <= 0 or _size(value, room) > room:
+        raise _full()
+    return _own(value)
+
+
+def _own_list(items: Sequence[object]) -> list[object]:
+    room = MOST_ITEMS - len(items)
+    for one in items:
+        room -= _size(one, MOST_ITEMS)
+        if room < 0:
+            raise _full()
+    return [_own(one) for one in items]
+
+
+def _own(value: object) -> object:
+    if isinstance(value, (list, tuple)):
+        return [_own(each) for each in value]
+    return value
+
+
+def _size(value: object, enough: int) -> int:
+    """How many items are in a value, those of lists inside it too; counted no further than ``enough``."""
+    if not isinstance(value, (list, tuple)):
+        return 0
+    found, waiting = 0, [value]
+    while waiting and found <= enough:
+        here = waiting.pop()
+        found += len(here)
+        waiting += [each for each in here if isinstance(each, (list, tuple)) and each]
+    return found
+
+
+def _full() -> BehaviourError:
+    return BehaviourError(f"The list is full: it has room for {MOST_ITEMS} items.")

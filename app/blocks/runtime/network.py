@@ -1,0 +1,432 @@
+"""Robots and topics of a running program, over NEP. Only a program's own process imports this."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
+
+from app.blocks.runtime.link import LAST_STATES, STATES, Call
+from app.blocks.runtime.motions import Going
+from app.blocks.runtime.publishing import PublishGuard
+from app.blocks.runtime.wire import Node, Publisher, new_id, payload_of, value_of
+from app.robots import rize
+from app.robots.description import Robot
+from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
+
+ALIVE_S = 0.2
+LOOK_S = 0.2
+"""The master is asked so often at most who sent what came from an unknown publisher."""
+MOST_UNKNOWN = 256
+
+Told = Callable[[object], None]
+
+
+class Network:
+    """The link of a program. All publishers and subscribers that it needs exist when the constructor returns.
+
+    `sensors` and `events` are (robot, name), `publishes` and `listens` are topics; others are made at first
+    use. `owners` are the nodes that the robots are, by their names (else who announced one first is it): only
+    what these say counts.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        program: str,
+        robots: Sequence[Robot],
+        *,
+        sensors: Iterable[tuple[str, str]] = (),
+        events: Iterable[tuple[str, str]] = (),
+        publishes: Iterable[str] = (),
+        listens: Iterable[str] = (),
+        owners: Mapping[str, str] | None = None,
+    ) -> None:
+        self._node = node
+        self.guard = PublishGuard({}, ())
+        """Where the program may not publish."""
+        self._owners = dict(owners or {})
+        self._senders = Senders()
+        self._view = GraphView(0, 0)
+        self._judging = threading.Lock()  # answers are taken one after the other
+        self._unknown: deque[Message] = deque(maxlen=MOST_UNKNOWN)
+        self._asks = threading.Event()
+        self._finder: threading.Thread | None = None
+        self._refused: dict[str, str] = {}
+        self._program = program
+        self._robots = {robot.name: robot for robot in robots}
+        self._robot_of = {sensor.topic: robot.name for robot in robots for sensor in robot.sensors}
+        self._robot_of |= {event.topic: robot.name for robot in robots for event in robot.events}
+        self._lock = threading.RLock()
+        self._calls: dict[str, Call] = {}
+        self._stops: dict[
+            str, tuple[str, set[str]]
+        ] = {}  # stop's id -> robot, and the nodes that must answer
+        self._own_stops: set[str] = set()
+        self._newest: dict[str, Message] = {}
+        self._told: dict[str, list[Told]] = {}
+        self._subscribed: set[str] = set()
+        self._publishers: dict[str, Publisher] = {}
+        self._poke: Callable[[], None] = _nothing
+        self._stopped_outside: Callable[[str], None] = _ignore
+        self._arrived = threading.Condition()
+        self._closed = threading.Event()
+        self._ending = False
+        self._going = Going(self._rest, self._stand, self.invoke)
+        for robot in robots:
+            self._meet(robot)
+        for name, sensor in (*sensors, *events):
+            self._subscribe(self._topic(name, sensor))
+        for topic in publishes:
+            self._publisher(topic)
+        for topic in listens:
+            self._subscribe(topic)
+        with suppress(NepError):  # the master has gone since: what is not known yet is looked for later
+            self._look()
+        self._alive = threading.Thread(target=self._beat, name="program alive", daemon=True)
+        self._alive.start()
+
+    def _meet(self, robot: Robot) -> None:
+        self._publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
+        type_ = "json" if robot.dialect == "rize" else "robot/answer"
+        with self._lock:
+            topic = robot.topics.answer
+            if topic not in self._subscribed:
+                self._subscribed.add(topic)
+                self._node.new_sub(topic, type_, sink=self._answers)
+
+    def close(self) -> None:
+        """End the heartbeat; the node is closed by who made it."""
+        self._closed.set()
+        self._asks.set()
+        self._alive.join(timeout=1.0)
+        if self._finder is not None:
+            self._finder.join(timeout=3.0)
+
+    def know(self, owners: Mapping[str, str]) -> None:
+        """A robot was started anew and may move: these nodes are the robots now."""
+        with self._judging:
+            self._owners |= owners
+
+    # ---- Link
+
+    def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
+        """Tell of every answer and message, and of stops that are not ours."""
+        self._poke, self._stopped_outside = poke, stopped_outside
+
+    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> Call:
+        """Send a command; the call changes as answers arrive."""
+        described = self._robots[robot]
+        call = Call(new_id("cmd"), robot, action)
+        with self._lock:
+            self._calls[call.id] = call
+        self._going.asked(call, described, input)
+        if described.dialect == "rize":
+            self._send(described, rize.to_command(described, action, input, call.id))
+        else:
+            self._send(described, self._command(call.id, "invoke", action, input))
+        return call
+
+    def cancel(self, call: Call) -> None:
+        """Take a command back; RIZE robots know no such thing."""
+        described = self._robots[call.robot]
+        if described.dialect != "rize":
+            self._send(described, self._command(call.id, "cancel", call.action))
+
+    def sensor(self, robot: str, name: str) -> object:
+        """The newest value, of a property's ``{"value": …}`` or the object itself."""
+        topic = self._topic(robot, name)
+        self._subscribe(topic)
+        message = self._newest.get(topic)
+        return None if message is None else value_of(payload_of(message))
+
+    def newest(self, topic: str) -> object:
+        """The newest message, decoded only now."""
+        self._subscribe(topic)
+        message = self._newest.get(topic)
+        return None if message is None else payload_of(message)
+
+    def publish(self, topic: str, payload: object) -> None:
+        """Send a message as JSON; BehaviourError where that moves a robot that nobody was asked about."""
+        self.guard.check(topic)
+        self._publisher(topic).publish(payload)
+
+    def on_sensor(self, robot: str, name: str, told: Told) -> None:
+        """Tell each value of a sensor."""
+        self.on_message(self._topic(robot, name), lambda payload: told(value_of(payload)))
+
+    def on_event(self, robot: str, name: str, told: Told) -> None:
+        """Tell the data of each event."""
+        self.on_message(self._topic(robot, name), told)
+
+    def on_message(self, topic: str, told: Told) -> None:
+        """Tell each message."""
+        with self._lock:
+            self._told.setdefault(topic, []).append(told)
+        self._subscribe(topic)
+
+    # ---- stopping
+
+    def rest(self) -> None:
+        """The program is paused: robots that it left in motion (a speed) stand still until `go_on`."""
+        self._going.rest()
+
+    def go_on(self) -> None:
+        """The pause is over: what was in motion is asked for again."""
+        self._going.go_on()
+
+    def slow(self) -> AbstractContextManager[None]:
+        """While the calling script stays at a block in slow motion: what it left in motion stands still."""
+        return self._going.slow()
+
+    def _stand(self, robot: Robot) -> None:
+        """Stop a robot that drives; not while it does something else, which a stop would end as well."""
+        busy = [call for call in list(self._calls.values()) if call.robot == robot.name]
+        if all(self._going.is_motion(call) for call in busy):
+            self._tell_stop(robot)
+
+    def _rest(self, robot: Robot) -> None:
+        """Stop one robot; what else it does ends as if the pause had taken it back."""
+        for call in list(self._calls.values()):
+            call.held = call.held or call.robot == robot.name
+        self._tell_stop(robot)
+
+    def _tell_stop(self, robot: Robot) -> None:
+        id = new_id("stop")
+        with self._arrived:
+            self._own_stops.add(id)
+            self._stops[id] = (robot.name, self._serving(robot))
+        self._send(robot, self._command(id, "stop", robot.safe_stop.action))
+
+    def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
+        """Tell every robot to stop and wait; the names of those that are not proven still (RIZE's can't).
+
+        `stop_words` says what is wrong with each.
+        """
+        self._ending = True
+        if timeout_s:
+            with suppress(NepError):
+                self._look()
+        for robot in self._robots.values():
+            if robot.dialect == "rize":
+                continue
+            self._tell_stop(robot)
+        with self._arrived:
+            waiting = self._stops
+            self._arrived.wait_for(
+                lambda: all(name in self._refused for name, _ in waiting.values()), timeout_s
+            )
+            return tuple(dict.fromkeys(name for name, _ in waiting.values()))
+
+    def stop_words(self, name: str) -> str:
+        """What is wrong with the stop of a robot: its own words when it refused, without a full stop."""
+        return self._refused.get(name) or f"{name} did not answer"
+
+    def _serving(self, robot: Robot) -> set[str]:
+        """The nodes that must answer a stop: the robot's own, and others that answer its commands."""
+        heard = set(hearing(self._view, robot.topics.command))
+        others = heard & set(publishing(self._view, robot.topics.answer))
+        owner = self._owners.get(robot.name)
+        return {owner or "", *others}
+
+    # ---- inside
+
+    def _topic(self, robot: str, name: str) -> str:
+        described = self._robots[robot]
+        found = described.sensor(name) or described.event(name)
+        if found is None:
+            raise KeyError(name)
+        return found.topic
+
+    def _publisher(self, topic: str, msg_type: str = "json") -> Publisher:
+        with self._lock:
+            if topic not in self._publishers:
+                self._publishers[topic] = self._node.new_pub(topic, msg_type)
+            return self._publishers[topic]
+
+    def _subscribe(self, topic: str) -> None:
+        with self._lock:
+            if topic in self._subscribed:
+                return
+            self._subscribed.add(topic)
+        self._node.new_sub(topic, sink=self._messages)
+
+    def _look(self) -> None:
+        """Ask the master who is there: whose words count. Never in the node's own thread."""
+        view = self._node.graph()
+        topics = {robot.topics.answer for robot in self._robots.values()} | self._robot_of.keys()
+        with self._judging:
+            self._view = view
+            self._senders.learn(view, topics)
+            for robot in self._robots.values():
+                first = first_to_announce(view, robot.topics.description)
+                if robot.dialect != "rize" and first is not None:
+                    self._owners.setdefault(robot.name, first.node_id)
+            waiting, self._unknown = list(self._unknown), deque(maxlen=MOST_UNKNOWN)
+            for message in waiting:
+                if self._senders.node_of(message) is not None:
+                    self._judge(message)
+        self._poke()
+
+    def _ask(self) -> None:
+        """Let the master be asked who is there, in a thread of its own."""
+        with self._lock:
+            if self._finder is None and not self._closed.is_set():
+                self._finder = threading.Thread(target=self._find, name="program senders", daemon=True)
+                self._finder.start()
+        self._asks.set()
+
+    def _find(self) -> None:
+        """Look for unknown publishers whenever one has answered, until the end."""
+        while self._asks.wait() and not self._closed.is_set():
+            self._asks.clear()
+            with suppress(NepError):
+                self._look()
+            self._closed.wait(LOOK_S)
+
+    def _is_robots(self, message: Message) -> bool:
+        """Whether a message on a sensor's or event's topic counts.
+
+        Where the robot's own program publishes, only that does; a camera may be another program.
+        """
+        robot = self._robot_of.get(message.topic)
+        own = self._owners.get(robot) if robot is not None else None
+        if own is None or own not in publishing(self._view, message.topic):
+            return True
+        node = self._senders.node_of(message)
+        if node is None:
+            self._ask()
+        return node == own
+
+    def _messages(self, messages: Sequence[Message]) -> None:
+        for message in messages:
+            if not self._is_robots(message):
+                continue
+            self._newest[message.topic] = message
+            for told in self._told.get(message.topic, ()):
+                payload = payload_of(message)
+                if payload is not None:
+                    told(payload)
+        self._poke()
+
+    def _answers(self, messages: Sequence[Message]) -> None:
+        with self._judging:
+            for message in messages:
+                self._judge(message)
+        self._poke()
+
+    def _judge(self, message: Message) -> None:
+        """Take an answer; who sent it must be known first. Under `_judging`."""
+        payload = payload_of(message)
+        if not isinstance(payload, Mapping):
+            return
+        node = self._senders.node_of(message)
+        native = any(
+            robot.dialect != "rize" and robot.topics.answer == message.topic
+            for robot in self._robots.values()
+        )
+        waits = any(each.publisher == message.publisher for each in self._unknown)
+        if native and (node is None or waits):
+            self._unknown.append(message)
+            self._ask()
+            return
+        self._answer(message.topic, payload, node or "")
+
+    def _answer(self, topic: str, told: Mapping[str, object], node: str) -> None:
+        """Take an answer of a node: a stop's of all that serve the robot, others only of the robot's own."""
+        answer = told if "state" in told and "op" in told else rize.from_answer(told)
+        if answer is None:
+            return
+        if answer.get("op") == "stop":
+            self._stop_answered(topic, answer, node)
+        if not any(self._is_own(robot, topic, node) for robot in self._robots.values()):
+            return
+        self._hear(topic)
+        if answer.get("op") == "stop":
+            return
+        call = self._calls.get(str(answer.get("id")))
+        # A cancel is answered with the id of the command it was for; only the command's own answer ends it.
+        if call is None or call.done or answer.get("op") not in (None, "invoke"):
+            return
+        state = str(answer.get("state"))
+        if self._robots[call.robot].topics.answer != topic or state not in STATES:
+            return  # another robot's answer, or no word of a robot
+        output = answer.get("output")
+        call.output = output if isinstance(output, Mapping) else {}
+        call.error = said(answer.get("error"))
+        feedback = answer.get("feedback")
+        call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
+        call.began = call.began or state == "running"
+        waits_for = answer.get("waits_for")
+        call.waits_for = tuple(map(str, waits_for)) if isinstance(waits_for, list) else call.waits_for
+        call.state = state
+        if call.state in LAST_STATES:
+            self._calls.pop(call.id, None)
+            self._going.ended(call)
+
+    def _is_own(self, robot: Robot, topic: str, node: str) -> bool:
+        """Whether it is this robot that speaks; robots of RIZE can't be told apart."""
+        if robot.topics.answer != topic:
+            return False
+        return robot.dialect == "rize" or self._owners.get(robot.name) == node
+
+    def _hear(self, topic: str) -> None:
+        """A robot has said something: whoever waits for it knows that it lives."""
+        now = time.monotonic()
+        for call in list(self._calls.values()):
+            if self._robots[call.robot].topics.answer == topic:
+                call.heard_s = now
+
+    def _stop_answered(self, topic: str, answer: Mapping[str, object], node: str) -> None:
+        if answer.get("state") not in ("succeeded", "failed"):
+            return
+        id = str(answer.get("id"))
+        robots = [robot.name for robot in self._robots.values() if robot.topics.answer == topic]
+        own = [robot.name for robot in self._robots.values() if self._is_own(robot, topic, node)]
+        with self._arrived:
+            ours = id in self._own_stops  # also when it is answered twice
+            name, waiting = self._stops.get(id, ("", set()))
+            if name in robots and node in waiting:
+                if answer["state"] == "failed":
+                    self._refused[name] = said_of_stop(name, answer.get("error"))
+                else:
+                    waiting.discard(node)
+                    self._refused.pop(name, None)
+                if not waiting:
+                    del self._stops[id]
+            self._arrived.notify_all()
+        if not ours and not self._ending:
+            for name in own:
+                self._stopped_outside(name)
+
+    def _command(
+        self, id: str, op: str, action: str = "", input: Mapping[str, object] | None = None
+    ) -> dict[str, object]:
+        return {"id": id, "op": op, "from": self._program, "action": action, "input": dict(input or {})}
+
+    def _send(self, robot: Robot, command: Mapping[str, object]) -> None:
+        self._publishers[robot.topics.command].publish(command)
+
+    def _beat(self) -> None:
+        """Say five times a second that the program lives; robots stop by themselves without it."""
+        while not self._closed.wait(ALIVE_S):
+            for robot in self._robots.values():
+                if robot.dialect == "rize":
+                    continue
+                try:
+                    self._send(robot, self._command(new_id("alive"), "alive"))
+                except NepError:
+                    return
+
+
+def _nothing() -> None:
+    return
+
+
+def _ignore(_robot: str) -> None:
+    return

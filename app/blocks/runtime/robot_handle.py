@@ -1,0 +1,244 @@
+"""A robot as a program sees it: do an action and wait for it, read a sensor, begin a script at an event."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from app.blocks.runtime import values
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.held_action import is_unknown, rest_of
+from app.blocks.runtime.link import Call, Link
+from app.blocks.runtime.scheduler import Scheduler
+from app.blocks.runtime.status_text import Saying
+from app.robots.description import Action, Parameter, Robot
+from app.robots.inputs import from_words
+
+FIRST_ANSWER_S = 3.0
+FIRST_VALUE_S = 2.0
+LONGEST_S = 60.0
+MARGIN_S = 2.0
+LOOK_S = 0.25
+"""How often a command that is waited for is looked at: has its robot fallen silent, has it begun?"""
+BEATS_MISSED, SHORTEST_SILENCE_S = 4, 2.0
+HOLD_S = 3.0
+"""How long a robot may take to end what a pause takes back; its own kit answers within about a second."""
+
+_PLACE = re.compile(r"%([A-Za-z_]\w*)")
+
+
+Decorator = Callable[[Callable[..., None]], Callable[..., None]]
+
+
+class Stage(Protocol):
+    """What a robot's handle needs of the program that runs."""
+
+    scheduler: Scheduler
+    saying: Saying
+
+    def described(self, name: str) -> Robot:
+        """The description of a robot that is there."""
+        ...
+
+    def linked(self) -> Link:
+        """The network."""
+        ...
+
+    def write(self, value: object) -> None:
+        """Write a line to the console."""
+        ...
+
+    def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
+        """Begin a script at a robot's event."""
+        ...
+
+    def on_change(self, robot: str, sensor: str) -> Decorator:
+        """Begin a script at a sensor's change."""
+        ...
+
+    def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
+        """Begin a script when a sensor passes a limit."""
+        ...
+
+
+class RobotHandle:
+    """``robot("Pepper")``."""
+
+    def __init__(self, name: str, runtime: Stage) -> None:
+        self._name = name
+        self._runtime = runtime
+
+    def do(self, action: str, /, **input: object) -> None:
+        """Let the robot do an action and wait until it is done; BehaviourError with the robot's sentence."""
+        self._invoke(action, input)
+
+    def ask(self, action: str, field: str, /, **input: object) -> object:
+        """The same for an action that answers: what it says in this field."""
+        return self._invoke(action, input).output.get(field)
+
+    def get(self, sensor: str, field: str | None = None) -> object:
+        """A sensor's newest value, or one field of it; None while it is not known."""
+        robot = self._runtime.described(self._name)
+        link, scheduler = self._runtime.linked(), self._runtime.scheduler
+        if robot.sensor(sensor) is None:
+            raise BehaviourError(f"{self._name} has no sensor “{sensor}”.")
+        if link.sensor(self._name, sensor) is None:
+            # Sensors tell their value several times a second: the first one may still be under way.
+            scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_S)
+        told = link.sensor(self._name, sensor)
+        return told if field is None else values.part(told, field)
+
+    def on(self, event: str, /, **filters: object) -> Decorator:
+        """The script below runs each time this happens to the robot."""
+        return self._runtime.on_event(self._name, event, filters)
+
+    def on_change(self, sensor: str) -> Decorator:
+        """The script below runs each time the sensor tells another value."""
+        return self._runtime.on_change(self._name, sensor)
+
+    def on_pass(self, sensor: str, side: str, limit: float) -> Decorator:
+        """The script below runs each time the sensor passes the limit: "below" or "above" it."""
+        return self._runtime.on_pass(self._name, sensor, side, limit)
+
+    def _invoke(self, name: str, given: Mapping[str, object]) -> Call:
+        robot = self._runtime.described(self._name)
+        action = robot.action(name)
+        if action is None:
+            raise BehaviourError(f"{self._name} can't “{name}”.")
+        input = {key: _fitting(action, key, value) for key, value in given.items()}
+        wrong = action.check(action.complete(input))
+        if wrong:
+            raise BehaviourError(f"{self._name} can't do this: {wrong[0]}.")
+        words = sentence(robot, action, input)
+        self._runtime.saying.tell(words)
+        try:
+            call = self._do(robot, action, action.complete(input), words)
+        finally:
+            self._runtime.saying.tell("")
+        if call.state == "failed":
+            raise BehaviourError(_ended(f"{self._name}: {call.error or f'“{action.title}” failed'}"))
+        return call
+
+    def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> Call:
+        """One command, or several when a pause takes it back and what is left is done afterwards."""
+        while True:
+            call = self._runtime.linked().invoke(self._name, action.name, input)
+            self._await(robot, action, call, words)
+            if not call.held or call.state != "canceled":
+                return call
+            self._stay(action, is_unknown(action, input, call))
+            rest = rest_of(action, input, call)
+            if rest is None:
+                return call
+            input = rest
+
+    def _stay(self, action: Action, unknown: bool) -> None:
+        """Until the pause ends; a person reads that the rest of a move will be left out, and that it was."""
+        known = f"{self._name} does not tell how much of “{action.title}” is left"
+        saying = self._runtime.saying
+        saying.warn(f"{known}; Go on leaves it out" if unknown else "")
+        self._runtime.scheduler.hold()
+        saying.warn("")
+        if unknown:
+            self._runtime.write(f"{known}, so it was left out")
+
+    def _await(self, robot: Robot, action: Action, call: Call, words: str) -> None:
+        scheduler = self._runtime.scheduler
+        if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
+            raise BehaviourError(f"{self._name} does not answer. {_check(robot)}")
+        can_hold = action.cancellable and robot.dialect == "native"
+        limit = action.timeout_s or LONGEST_S
+        until = time.monotonic() + limit + MARGIN_S
+        waits = bool(call.waits_for) and call.state == "accepted"
+        if waits:
+            self._runtime.saying.tell(_waiting(robot, call))
+
+        def ready() -> bool:
+            return call.done or (can_hold and scheduler.holds())
+
+        while not scheduler.wait_for(ready, min(LOOK_S, max(0.0, until - time.monotonic()))):
+            if waits:  # its time limit begins with it
+                until = time.monotonic() + limit + MARGIN_S
+                waits = not call.began
+                self._runtime.saying.tell(_waiting(robot, call) if waits else words)
+            said = self._broken(robot, call)
+            if said is None and time.monotonic() >= until:
+                said = f"{self._name} has not ended “{action.title}” within {limit:g} s."
+            if said is not None:
+                self._runtime.linked().cancel(call)
+                raise BehaviourError(said)
+        if not call.done:
+            self._hold(call)
+
+    def _broken(self, robot: Robot, call: Call) -> str | None:
+        """The sentence when a robot that always tells that it lives does so no more."""
+        if robot.beat_s is None:
+            return None
+        silence = time.monotonic() - call.heard_s
+        if silence <= max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s):
+            return None
+        return f"{self._name} has stopped answering. {_check(robot)}"
+
+    def _hold(self, call: Call) -> None:
+        """The pause takes the command back; a robot that does not end it is no longer under control."""
+        call.held = True
+        self._runtime.linked().cancel(call)
+        if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
+            raise BehaviourError(f"{self._name} does not hold still, so the behaviour was stopped.")
+
+
+def _waiting(robot: Robot, call: Call) -> str:
+    """What the robot does first: "Pepper waits for “say”"."""
+    found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
+    titles = [f"“{action.title if action is not None else name}”" for action, name in found]
+    return f"{robot.name} waits for {' and '.join(titles)}"
+
+
+def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
+    """What the robot does now: "Pepper says “Touch my head.”"."""
+
+    def place(match: re.Match[str]) -> str:
+        if match[1] == "robot":
+            return robot.name
+        parameter = action.parameter(match[1])
+        value = input.get(match[1], parameter.default if parameter else None)
+        if parameter is not None:
+            value = next((choice.title for choice in parameter.choices if choice.value == value), value)
+        return values.text(value)
+
+    return " ".join(_PLACE.sub(place, action.says or action.text).split())
+
+
+def _fitting(action: Action, name: str, value: object) -> object:
+    """A value as the parameter wants it: text of a number, a whole number of 2.0, a list of "yes, no"."""
+    parameter = action.parameter(name)
+    if parameter is None:
+        return value
+    if value is None:
+        raise BehaviourError(
+            f"“{action.title}” needs a value for “{parameter.title}” that is not known yet.", unknown=True
+        )
+    return _as_kind(parameter, value)
+
+
+def _as_kind(parameter: Parameter, value: object) -> object:
+    if parameter.kind in ("text", "image"):
+        return values.text(value)
+    if parameter.kind == "integer" and isinstance(value, float) and value.is_integer():
+        return int(value)
+    if parameter.kind in ("list", "object") and isinstance(value, str):
+        return from_words(parameter, value)
+    return value
+
+
+def _ended(words: str) -> str:
+    return words if words.endswith((".", "!", "?", "”")) else f"{words}."
+
+
+def _check(robot: Robot) -> str:
+    """What a person does about a robot that is silent."""
+    if robot.virtual:
+        return "Start the virtual robot again."
+    return "Check that it is on and in the same Wi-Fi."

@@ -1,0 +1,279 @@
+"""What a program may call: robots, waiting, topics, and how its scripts begin.
+
+One `Runtime` runs one program. The compiler's names (`namespace`) are its methods and the functions of
+`app.blocks.runtime.values`.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
+
+from app.blocks.runtime import values
+from app.blocks.runtime.calls import Calls, EndScript
+from app.blocks.runtime.errors import BehaviourError, explain
+from app.blocks.runtime.link import Link
+from app.blocks.runtime.namespace import namespace
+from app.blocks.runtime.robot_handle import RobotHandle
+from app.blocks.runtime.scheduler import Scheduler, Stopped
+from app.blocks.runtime.status_text import Saying
+from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
+from app.robots.description import Robot
+
+Script = Callable[..., None]
+Decorator = Callable[[Script], Script]
+
+MESSAGES_WAITING = 16
+EVENTS_WAITING = 1
+
+
+class Runtime:
+    """A program while it runs.
+
+    `printed` gets each line that the program writes. After `start`, `finished` is set when no script is left
+    or one of them failed; then ``error`` says why.
+    """
+
+    def __init__(
+        self,
+        printed: Callable[[str], None],
+        *,
+        labels: Mapping[str, str] | None = None,
+        readings: Mapping[str, str] | None = None,
+    ) -> None:
+        self._printed = printed
+        self._labels = labels or {}
+        self._link: Link | None = None
+        self._robots: Mapping[str, Robot] = {}
+        self._starts: list[Script] = []
+        self._hats: list[tuple[Hat, Script]] = []
+        self._subscriptions: list[Callable[[Link], None]] = []
+        self._count_lock = threading.Lock()
+        self._running = 0
+        self.scheduler = Scheduler()
+        self.saying = Saying(self.scheduler.block, readings or {})
+        self._calls = Calls(self.scheduler)
+        self.finished = threading.Event()
+        self.error: BehaviourError | None = None
+
+    def namespace(self) -> dict[str, object]:
+        """The names of a program."""
+        return namespace(self)
+
+    # ---- beginning and end
+
+    def start(self, link: Link, robots: Sequence[Robot]) -> None:
+        """Begin all scripts; the program's text has run, so its hats are known."""
+        self._link = link
+        self._robots = {robot.name: robot for robot in robots}
+        self._calls.begin()
+        link.listen(self.scheduler.poke, self._stopped_outside)
+        for subscribe in self._subscriptions:
+            subscribe(link)
+        self._running = len(self._starts) + len(self._hats)
+        if not self._running:
+            self.finished.set()
+        for script in self._starts:
+            self.scheduler.start(script.__name__, self._guarded(partial(self._once, script)))
+        for hat, script in self._hats:
+            self.scheduler.start(script.__name__, self._guarded(partial(self._each, hat, script)))
+
+    def _once(self, script: Script) -> None:
+        self.scheduler.begin()
+        with suppress(EndScript):
+            script()
+
+    def _each(self, hat: Hat, script: Script) -> None:
+        """Run a script for each of its events, one after the other."""
+        while True:
+            arguments = hat.next(self.scheduler)
+            self.scheduler.begin()
+            with suppress(EndScript):
+                script(*arguments)
+            self.scheduler.rest()
+            if hat.dropped:
+                self.write(f"“{hat.title}” was too slow: {hat.dropped} of its events were left out")
+                hat.dropped = 0
+
+    def _guarded(self, body: Callable[[], None]) -> Callable[[], None]:
+        def run() -> None:
+            try:
+                body()
+            except Exception as error:  # noqa: BLE001 (whatever a program does wrong belongs to its block)
+                block = self.scheduler.block()
+                self._fail(explain(error, self._labels.get(block or "", ""), block))
+            finally:
+                with self._count_lock:
+                    self._running -= 1
+                    last = self._running == 0
+                if last:
+                    self.finished.set()
+
+        return run
+
+    def _fail(self, error: BehaviourError) -> None:
+        if self.error is None and not self.scheduler.stopping:
+            self.error = error
+        self.scheduler.stop()
+        self.finished.set()
+
+    def _stopped_outside(self, robot: str) -> None:
+        self._fail(BehaviourError(f"{robot} was stopped by somebody else, so the behaviour ended."))
+
+    def stop_program(self) -> None:
+        """End all scripts."""
+        self.scheduler.stop()
+        self.finished.set()
+        raise Stopped
+
+    # ---- blocks
+
+    def step(self, block: str) -> None:
+        """A block begins."""
+        self.scheduler.step(block)
+
+    def value(self, block: str, work_out: Callable[[], object]) -> object:
+        """What a value block gives; its error knows the block."""
+        try:
+            return work_out()
+        except Exception as error:
+            raise explain(error, self._labels.get(block, ""), block) from error
+
+    def number(self, block: str, work_out: Callable[[], object]) -> object:
+        """The same for a block that gives a number: text put together by "+" is none."""
+        result = self.value(block, work_out)
+        if result is None or isinstance(result, (int, float)):
+            return result
+        name = f"“{self._labels.get(block, '')}”"
+        if isinstance(result, complex):
+            raise BehaviourError(f"{name} has no result for these numbers.", block)
+        raise BehaviourError(f"{name} needs numbers, not a text.", block)
+
+    def called(self, block: str, call: Callable[[], object]) -> object:
+        """What a function gives back; afterwards the script is where it was before."""
+        name = self._labels.get(block, "")
+        return self.value(block, lambda: self._calls.run(block, name, call))
+
+    def fail(self, sentence: str) -> object:
+        """The block that can't run, says why."""
+        raise BehaviourError(sentence)
+
+    def wait(self, seconds: object) -> None:
+        """Wait that many seconds."""
+        self.scheduler.wait(float(values.number(seconds, "“wait”")))
+
+    def wait_until(self, condition: Callable[[], object], at_most_s: object = None) -> None:
+        """Wait until the condition is so; what is not known yet is not so."""
+        limit = None if at_most_s is None else float(values.number(at_most_s, "“wait until”"))
+        self.scheduler.wait_until(lambda: _is_so(condition), limit)
+
+    def write(self, value: object) -> None:
+        """Write a line to the console."""
+        self._printed(values.text(value))
+
+    # ---- topics
+
+    def publish(self, topic: str, payload: object) -> None:
+        """Send a message."""
+        self._linked().publish(topic, payload)
+
+    def newest(self, topic: str, path: str) -> object:
+        """A field of a topic's newest message; None while it is not known."""
+        message = self._linked().newest(topic)
+        return None if message is None else values.part(message, path)
+
+    # ---- what starts a script
+
+    def on_start(self, script: Script) -> Script:
+        """The script runs when the program starts."""
+        self._starts.append(script)
+        return script
+
+    def on_message(self, topic: str) -> Decorator:
+        """The script runs for each message."""
+
+        def prepare(hat: Hat, link: Link) -> None:
+            link.on_message(topic, lambda payload: hat.happened((payload,)))
+
+        return self._hat(f"when a message arrives on {topic}", prepare, MESSAGES_WAITING)
+
+    def on_true(self, condition: Callable[[], object]) -> Decorator:
+        """The script runs each time the condition becomes so."""
+
+        def decorate(script: Script) -> Script:
+            self._hats.append((Hat("when … becomes true", condition=lambda: _is_so(condition)), script))
+            return script
+
+        return decorate
+
+    def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
+        """The script runs each time this happens to the robot."""
+
+        def prepare(hat: Hat, link: Link) -> None:
+            description = self._robots[robot].event(event)
+            source = self._robots[robot].source
+
+            def told(data: object) -> None:
+                if event_matches(data, filters, description, source):
+                    hat.happened(())
+
+            link.on_event(robot, event, told)
+
+        return self._hat(f"when {robot} {event}", prepare, EVENTS_WAITING)
+
+    def on_change(self, robot: str, sensor: str) -> Decorator:
+        """The script runs each time the sensor tells another value."""
+
+        def prepare(hat: Hat, link: Link) -> None:
+            link.on_sensor(robot, sensor, changes(lambda: hat.happened(())))
+
+        return self._hat(f"when {robot} {sensor} changes", prepare, EVENTS_WAITING)
+
+    def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
+        """The script runs each time the sensor passes the limit to that side."""
+
+        def prepare(hat: Hat, link: Link) -> None:
+            link.on_sensor(robot, sensor, PassGate(side, limit, lambda: hat.happened(())))
+
+        return self._hat(f"when {robot} {sensor} goes {side} {limit:g}", prepare, EVENTS_WAITING)
+
+    def _hat(self, title: str, prepare: Callable[[Hat, Link], None], waiting: int) -> Decorator:
+        def decorate(script: Script) -> Script:
+            hat = Hat(title, most=waiting)
+            self._hats.append((hat, script))
+            self._subscriptions.append(lambda link: prepare(hat, link))
+            return script
+
+        return decorate
+
+    # ---- robots
+
+    def robot(self, name: str) -> RobotHandle:
+        """A robot by its name."""
+        return RobotHandle(name, self)
+
+    def described(self, name: str) -> Robot:
+        """The description of a robot; BehaviourError if it is not there."""
+        if name not in self._robots:
+            raise BehaviourError(f"{name} is not connected.")
+        return self._robots[name]
+
+    def linked(self) -> Link:
+        """The network."""
+        return self._linked()
+
+    def _linked(self) -> Link:
+        if self._link is None:
+            raise BehaviourError("the program has not begun yet.")
+        return self._link
+
+
+def _is_so(condition: Callable[[], object]) -> bool:
+    try:
+        return bool(condition())
+    except BehaviourError as error:
+        if error.unknown:
+            return False
+        raise

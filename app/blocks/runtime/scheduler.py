@@ -1,0 +1,297 @@
+"""Scripts side by side: threads that take turns, one block at a time.
+
+Only the script that has the turn runs; it hands the turn on at each `step` and while it waits. So a block is
+never interrupted by another script's, a pause holds every script at the beginning of a block, and a step runs
+exactly one. See ``docs/adr`` on scripts side by side.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+from app.blocks.runtime.scripts import Script, Snapshot
+from app.blocks.runtime.scripts import Stopped as Stopped
+
+POLL_S = 0.02
+
+
+class Scheduler:
+    """Gives the turn to one script after the other."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._scripts: list[Script] = []
+        self._mine = threading.local()
+        self._owner: Script | None = None
+        self._parked: deque[Script] = deque()  # before a block
+        self._resuming: deque[Script] = deque()  # inside a block, after a wait
+        self._paused = False
+        self.pace_s = 0.0  # slow motion: see `set_pace`
+        self._stepping: Script | None = None
+        self._stopping = False
+
+    # ---- scripts
+
+    def start(self, name: str, body: Callable[[], None]) -> threading.Thread:
+        """Run `body` as a script in a thread of its own; it begins when it gets the turn."""
+        script = Script(name, self._lock)
+        with self._lock:
+            self._scripts.append(script)
+
+        def run() -> None:
+            self._mine.script = script
+            try:
+                body()
+            except Stopped:
+                pass
+            finally:
+                self._end(script)
+
+        thread = threading.Thread(target=run, name=f"script {name}", daemon=True)
+        thread.start()
+        return thread
+
+    def begin(self) -> None:
+        """The script's work begins: it takes the turn. Stopped is raised when the program ends."""
+        script = self._script()
+        with self._lock:
+            script.idle = False
+            self._enter(script)
+
+    def look(self) -> None:
+        """An idle script takes the turn to look at its condition, not while paused; `rest` gives it back."""
+        script = self._script()
+        with self._lock:
+            while self._paused and not self._stopping:
+                script.wake.wait()
+            self._enter(script)
+
+    def rest(self) -> None:
+        """The script's work is done until its next event."""
+        script = self._script()
+        with self._lock:
+            script.idle, script.block = True, None
+            self._leave(script)
+
+    def step(self, block: str) -> None:
+        """The script comes to this block: others get their turn, a pause holds it here.
+
+        In slow motion it stays here for the time of a block first.
+        """
+        script = self._script()
+        with self._lock:
+            if self._stopping:
+                raise Stopped
+            script.block = block
+            if self._stepping is script:
+                self._stepping = None
+            if self.pace_s and not self._paused:
+                self._stay(script, lambda: self.pace_s, step_ends=True)
+            if self._stepping is script:
+                return  # a step was asked for while it stayed here
+            if not self._parked and not self._resuming and not self._paused:
+                return
+            self._leave(script, then_park=True)
+            self._await_turn(script)
+
+    # ---- waiting: the others run meanwhile
+
+    def wait(self, seconds: float) -> None:
+        """Wait; the clock stands while paused."""
+        self.wait_until(None, seconds)
+
+    def wait_until(self, condition: Callable[[], bool] | None, at_most_s: float | None) -> bool:
+        """Wait until the condition is so, looked at 50 times a second.
+
+        False when the time was over before.
+        """
+        script = self._script()
+        remaining = at_most_s
+        while condition is None or not condition():
+            if remaining is not None and remaining <= 0:
+                return False
+            slice_s = remaining if condition is None else POLL_S
+            if remaining is not None and slice_s is not None:
+                slice_s = min(slice_s, remaining)
+            used = self._doze(script, slice_s)
+            remaining = None if remaining is None else remaining - used
+        return True
+
+    def _doze(self, script: Script, seconds: float | None) -> float:
+        """Give the turn away for that long; the seconds that counted are returned."""
+        with self._lock:
+            return self._stay(script, lambda: seconds)
+
+    def wait_for(
+        self, ready: Callable[[], bool], timeout_s: float | None = None, *, idle: bool = False
+    ) -> bool:
+        """Wait for another thread, which calls `poke`; goes on while paused. False after the time-out.
+
+        `ready` is called with the lock held: it only looks at a value.
+        """
+        script = self._script()
+        until = None if timeout_s is None else self._clock() + timeout_s
+        with self._lock:
+            script.busy = not idle
+            self._leave(script)
+            while not self._stopping and not ready():
+                left = None if until is None else until - self._clock()
+                if left is not None and left <= 0:
+                    break
+                script.wake.wait(left)
+            script.busy = False
+            if self._stopping:
+                raise Stopped
+            if not idle:
+                self._enter(script)
+            return ready()
+
+    def holds(self) -> bool:
+        """Whether a pause wants the calling script to stand still; may be asked with the lock held."""
+        return self._paused and self._stepping is not self._script()
+
+    def hold(self) -> None:
+        """Stand still inside a block that the pause interrupted, until it ends or a step is for this one."""
+        with self._lock:
+            self._stay(self._script(), lambda: None if self._paused else 0.0, step_ends=True)
+
+    def poke(self) -> None:
+        """Something arrived: whoever waits looks again."""
+        with self._lock:
+            self._wake_all()
+
+    # ---- pause, step, stop: from other threads
+
+    def pause(self) -> None:
+        """Hold every script at its next block."""
+        with self._lock:
+            self._paused = True
+            self._wake_all()
+
+    def go_on(self) -> None:
+        """End the pause."""
+        with self._lock:
+            self._paused, self._stepping = False, None
+            self._grant()
+            self._wake_all()
+
+    def set_pace(self, seconds: float) -> None:
+        """Slow motion: so long each script stays at a block before it is done; 0 for none."""
+        self.pace_s = max(0.0, seconds)
+        self.poke()
+
+    def step_once(self) -> None:
+        """While paused: run one block, of the script that has waited longest."""
+        with self._lock:
+            if not self._paused or self._stepping is not None or self._owner is not None:
+                return
+            if self._parked:
+                self._stepping = self._parked.popleft()
+                self._resuming.append(self._stepping)
+                self._grant()
+                return
+            self._stepping = next((script for script in self._scripts if script.frozen), None)
+            self._wake_all()
+
+    def stop(self) -> None:
+        """End every script at its next call; at once for those that wait."""
+        with self._lock:
+            self._stopping = True
+            self._wake_all()
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the program ends."""
+        return self._stopping
+
+    def return_to(self, block: str | None) -> None:
+        """The script goes on inside this block, after blocks of another place that it ran."""
+        self._script().block = block
+
+    def block(self) -> str | None:
+        """The block at which the calling script is."""
+        return self._script().block
+
+    def snapshot(self) -> Snapshot:
+        """What runs now."""
+        with self._lock:
+            active = [script for script in self._scripts if not script.idle]
+            blocks = tuple(dict.fromkeys(script.block for script in active if script.block))
+            still = self._owner is None and self._stepping is None and not any(s.busy for s in active)
+            first = next((script.block for script in self._parked if script.block), None)
+            following = first or next((script.block for script in active if script.frozen), None)
+            return Snapshot(blocks, following, self._paused and still and not self._resuming)
+
+    # ---- the turn; the lock is held
+
+    def _stay(self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False) -> float:
+        """Give the turn away until the limit is used up; the seconds used. A step may end it."""
+        used = 0.0
+        script.frozen = True
+        self._leave(script)
+        while not self._stopping and not (step_ends and self._stepping is script):
+            most = limit_s()
+            if most is not None and used >= most:
+                break
+            if self._paused and self._stepping is not script:
+                script.wake.wait()
+                continue
+            began = self._clock()
+            script.wake.wait(None if most is None else most - used)
+            used += self._clock() - began
+        script.frozen = False
+        self._enter(script)
+        return used
+
+    def _script(self) -> Script:
+        script = getattr(self._mine, "script", None)
+        if isinstance(script, Script):
+            return script
+        raise RuntimeError("only a script can do this; put it below “when started”")
+
+    def _leave(self, script: Script, *, then_park: bool = False) -> None:
+        if self._owner is script:
+            self._owner = None
+        if then_park:
+            self._parked.append(script)
+        self._grant()
+
+    def _enter(self, script: Script) -> None:
+        """Take the turn again inside a block: a pause does not hold this."""
+        self._resuming.append(script)
+        self._grant()
+        self._await_turn(script)
+
+    def _await_turn(self, script: Script) -> None:
+        while self._owner is not script and not self._stopping:
+            script.wake.wait()
+        if self._stopping:
+            raise Stopped
+
+    def _grant(self) -> None:
+        if self._owner is not None:
+            return
+        if self._resuming:
+            self._owner = self._resuming.popleft()
+        elif self._parked and not self._paused:
+            self._owner = self._parked.popleft()
+        if self._owner is not None:
+            self._owner.wake.notify()
+
+    def _wake_all(self) -> None:
+        for script in self._scripts:
+            script.wake.notify()
+
+    def _end(self, script: Script) -> None:
+        with self._lock:
+            self._scripts.remove(script)
+            if self._stepping is script:
+                self._stepping = None
+            for queue in (self._parked, self._resuming):
+                if script in queue:
+                    queue.remove(script)
+            self._leave(script)

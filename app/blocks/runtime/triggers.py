@@ -1,0 +1,119 @@
+"""What starts scripts again and again: events that wait for their script, and values watched for a change."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+
+from app.blocks.runtime.scheduler import POLL_S, Scheduler
+from app.robots.description import Event
+
+
+class Hat:
+    """The events of one script.
+
+    They come from the network's thread; at most `most` wait, the oldest is left out and counted. Or, with a
+    `condition`, the event is that it becomes so.
+    """
+
+    def __init__(self, title: str, *, most: int = 1, condition: Callable[[], bool] | None = None) -> None:
+        self.title = title
+        self.dropped = 0
+        self._waiting: deque[tuple[object, ...]] = deque(maxlen=most)
+        self._condition = condition
+        self._was_so: bool | None = None
+
+    def happened(self, arguments: tuple[object, ...]) -> None:
+        """An event; the caller pokes the scheduler."""
+        if len(self._waiting) == self._waiting.maxlen and self._waiting.maxlen > 1:
+            self.dropped += 1
+        self._waiting.append(arguments)
+
+    def next(self, scheduler: Scheduler) -> tuple[object, ...]:
+        """Wait for the next event; what its script is called with."""
+        if self._condition is None:
+            scheduler.wait_for(lambda: bool(self._waiting), idle=True)
+            return self._waiting.popleft()
+        while not self._becomes_so(scheduler):
+            scheduler.wait_for(lambda: False, POLL_S, idle=True)
+        return ()
+
+    def _becomes_so(self, scheduler: Scheduler) -> bool:
+        """Look at the condition; it runs blocks, so it needs the turn."""
+        if self._condition is None:
+            return False
+        scheduler.look()
+        try:
+            is_so = self._condition()
+        finally:
+            scheduler.rest()
+        # So from the beginning is no change.
+        became = is_so and self._was_so is False
+        self._was_so = is_so
+        return became
+
+
+class PassGate:
+    """Tells when a number passes a limit to one side.
+
+    What is beyond it from the beginning has not passed it.
+    """
+
+    def __init__(self, side: str, limit: float, passed: Callable[[], None]) -> None:
+        self._side = side
+        self._limit = limit
+        self._passed = passed
+        self._was_beyond: bool | None = None
+
+    def __call__(self, value: object) -> None:
+        """Look at the sensor's next value."""
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return
+        beyond = value < self._limit if self._side == "below" else value > self._limit
+        if beyond and self._was_beyond is False:
+            self._passed()
+        self._was_beyond = beyond
+
+
+def changes(changed: Callable[[], None]) -> Callable[[object], None]:
+    """Calls `changed` for each value that differs from the one before; the first is no change."""
+    before: list[object] = []
+
+    def told(value: object) -> None:
+        if before and before[0] != value:
+            changed()
+        before[:] = [value]
+
+    return told
+
+
+def event_matches(
+    data: object,
+    filters: Mapping[str, object],
+    event: Event | None,
+    source: Mapping[str, object],
+) -> bool:
+    """Whether an event's data are those that a hat waits for.
+
+    Texts are compared as people do, without case. An event that also tells its end (``rb:level`` with a
+    yes/no field: touched, and down or not) counts only when it begins.
+    """
+    fields: Mapping[str, object] = data if isinstance(data, Mapping) else {}
+    for name, wanted in filters.items():
+        if not _same(wanted, fields.get(name)):
+            return False
+    if event is None or not _has_level(event.name, source):
+        return True
+    return all(fields.get(field.name) is not False for field in event.fields if field.kind == "boolean")
+
+
+def _same(wanted: object, told: object) -> bool:
+    if isinstance(wanted, str) and isinstance(told, str):
+        return wanted.strip().casefold() == told.strip().casefold()
+    return wanted == told
+
+
+def _has_level(name: str, source: Mapping[str, object]) -> bool:
+    events = source.get("events")
+    event = events.get(name) if isinstance(events, Mapping) else None
+    return isinstance(event, Mapping) and event.get("rb:level") is True

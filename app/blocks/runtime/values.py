@@ -1,0 +1,118 @@
+"""What programs do with values: pure functions, called by the blocks of the category "Values"."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+from collections.abc import Mapping, Sequence
+
+from app.blocks.runtime.errors import BehaviourError, kind
+
+LONGEST_TEXT = 1_000_000
+_MOST_ROUNDS = 10**9
+
+
+def text(value: object) -> str:
+    """A value as people write it: 2 for 2.0, true, nothing for a value that is not known."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
+        return str(int(value))
+    if isinstance(value, (Mapping, list, tuple)):
+        return json.dumps(value, ensure_ascii=False, default=str)
+    return str(value)
+
+
+def is_known(value: object) -> bool:
+    """Whether a sensor or topic has told this value."""
+    return value is not None
+
+
+def join(first: object, second: object) -> str:
+    """Both as one text."""
+    one, other = text(first), text(second)
+    if len(one) + len(other) > LONGEST_TEXT:
+        raise BehaviourError(f"This text is too long: more than {LONGEST_TEXT} characters.")
+    return one + other
+
+
+def length(value: object) -> int:
+    """How many characters a text has, how many things a list or message."""
+    if isinstance(value, (str, list, tuple, Mapping)):
+        return len(value)
+    return len(text(value))
+
+
+def number(value: object, what: str) -> int | float:
+    """The value, if it is a finite number; else BehaviourError, whose sentence begins with `what`."""
+    if value is None:
+        raise BehaviourError(f"{what} needs a value that is not known yet.", unknown=True)
+    if not isinstance(value, (int, float)):
+        raise BehaviourError(f"{what} needs a number, not {kind(value)}.")
+    if not math.isfinite(value):
+        raise BehaviourError(f"{what} needs a number that is not endless.")
+    return value
+
+
+def rounded(value: object) -> int:
+    """The nearest whole number; halves go up."""
+    return math.floor(number(value, "“round”") + 0.5)
+
+
+def rounded_up(value: object) -> int:
+    """The next whole number above."""
+    return math.ceil(number(value, "“round up”"))
+
+
+def rounded_down(value: object) -> int:
+    """The next whole number below."""
+    return math.floor(number(value, "“round down”"))
+
+
+def random_number(low: object, high: object) -> int | float:
+    """A number by chance between both; a whole one when both are whole."""
+    first, last = number(low, "“random number”"), number(high, "“random number”")
+    first, last = min(first, last), max(first, last)
+    if float(first).is_integer() and float(last).is_integer():
+        return random.randint(int(first), int(last))  # noqa: S311 (a game, no secret)
+    return random.uniform(first, last)  # noqa: S311 (a game, no secret)
+
+
+def repeat(times: object) -> range:
+    """So many rounds; a fraction is rounded, below 0 is none."""
+    return range(max(0, min(rounded(number(times, "“repeat”")), _MOST_ROUNDS)))
+
+
+def part(message: object, path: str) -> object:
+    """What is at a path inside a message, such as ``faces.0.name``; None when it is not there.
+
+    An empty path is the whole message; ``value`` of a plain value is that value. A list is a copy: what a
+    program does with it does not change the message.
+    """
+    found = _found(message, path)
+    return list(found) if isinstance(found, list) else found
+
+
+def _found(message: object, path: str) -> object:
+    if not path:
+        return message
+    if isinstance(message, Mapping) and path in message:
+        return message[path]
+    if path == "value" and not isinstance(message, (Mapping, list, tuple)):
+        return message
+    found = message
+    for name in path.split("."):
+        found = _member(found, name)
+    return found
+
+
+def _member(value: object, name: str) -> object:
+    if isinstance(value, Mapping):
+        return value.get(name)
+    if isinstance(value, Sequence) and not isinstance(value, str) and name.lstrip("-").isdecimal():
+        index = int(name)
+        return value[index] if -len(value) <= index < len(value) else None
+    return None

@@ -1,0 +1,86 @@
+"""What the editor gets: Blockly's definitions of all blocks, and the toolbox."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from app.blocks.model.category import Category, Entry, Group
+from app.blocks.toolbox.catalogue import Catalogue, categories
+from app.blocks.toolbox.help import help_of
+from app.robots.description import Robot
+
+STYLES = ("events", "control", "values", "variables", "functions", "messages", "robot", "sensors")
+
+
+def editor_definitions(
+    robots: Sequence[Robot], absent: Sequence[Robot] = (), topics: Sequence[str] = ()
+) -> dict[str, object]:
+    """Definitions for the editor.
+
+    ``blocks`` are Blockly's JSON definitions of all categories and of all robots, connected or `absent`,
+    ``help`` what people are told about them (`app.blocks.toolbox.help`);
+    ``toolbox`` is a category toolbox; ``styles`` are the names of the styles; ``robots`` and ``topics`` are
+    what the drop-downs offer.
+    """
+    catalogue = Catalogue(robots, absent)
+    return {
+        "blocks": [block.to_blockly() for block in catalogue.blocks.values()],
+        "help": {block.type: help_of(block) for block in catalogue.blocks.values()},
+        "toolbox": _toolbox(catalogue),
+        "styles": list(STYLES),
+        "robots": {
+            robot.name: {"model": robot.model, "connected": robot.name in catalogue.connected}
+            for robot in (*catalogue.connected.values(), *catalogue.absent.values())
+        },
+        "topics": list(topics),
+    }
+
+
+def _toolbox(catalogue: Catalogue) -> dict[str, object]:
+    contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": "Blocks"}]
+    contents += [_category(category) for category in categories() if category.blocks]
+    known = (*catalogue.connected.values(), *catalogue.absent.values())
+    for robot in catalogue.connected.values():
+        contents.append(_heading(robot, connected=True))
+        for category in categories():
+            groups = category.groups(robot, known) if category.groups else ()
+            contents += [_group(robot, group) for group in groups]
+    contents += [_heading(robot, connected=False) for robot in catalogue.absent.values()]
+    return {"kind": "categoryToolbox", "contents": contents}
+
+
+def _heading(robot: Robot, *, connected: bool) -> dict[str, object]:
+    return {"kind": "robotHeading", "name": robot.name, "virtual": robot.virtual, "connected": connected}
+
+
+def _category(category: Category) -> dict[str, object]:
+    contents: list[Mapping[str, object]] = []
+    if category.button is not None:
+        words, key = category.button
+        contents.append({"kind": "button", "text": words, "callbackkey": key})
+    contents += [block.to_toolbox() for block in category.blocks if block.in_toolbox]
+    made = _entry(category.name, category.title, category.style, category.icon, contents)
+    return made | {"dynamic": category.dynamic} if category.dynamic else made
+
+
+def _group(robot: Robot, group: Group) -> dict[str, object]:
+    contents = [_block(entry) for entry in group.entries]
+    made = _entry(f"{robot.name}: {group.title}", group.title, group.style, group.icon, contents)
+    return made | {"robot": robot.name}
+
+
+def _block(entry: Entry) -> Mapping[str, object]:
+    return entry.block.to_toolbox(entry.fields)
+
+
+def _entry(
+    id: str, title: str, style: str, icon: str, contents: Sequence[Mapping[str, object]]
+) -> dict[str, object]:
+    return {
+        "kind": "category",
+        "toolboxitemid": id,
+        "name": title,
+        "categorystyle": style,
+        "icon": icon,
+        "contents": list(contents),
+    }
