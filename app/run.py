@@ -30,7 +30,7 @@ from app.core.robots.stop_report import StopReport
 from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
 from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError
-from app.robots.description import Robot, parse
+from app.robots.description.description import Robot, parse
 from app.robots.identity import DESCRIPTION_TYPE
 from nep.errors import NepError
 from nep.system.streams import tell

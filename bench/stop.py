@@ -20,7 +20,7 @@ from pathlib import Path
 
 import nep
 from app.core.robots.stop import RobotStopper
-from app.robots.description import Robot, parse
+from app.robots.description.description import Robot, parse
 
 ROOT = Path(__file__).resolve().parents[1]
 GOAL_MS = 50.0

@@ -15,7 +15,7 @@ import pytest
 import nep
 from app.blocks import compile_behaviour, editor_definitions
 from app.blocks.toolbox.catalogue import categories
-from app.robots.description import parse, td_for
+from app.robots.description.description import parse, td_for
 from app.robots.kit import Driver
 from nep.masters.master import Master
 from nep.system.plugins import discover

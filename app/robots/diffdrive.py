@@ -11,10 +11,16 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Annotated, Literal, Protocol
 
-from app.robots.calls import Call, Canceled, Failed, Link
-from app.robots.declare import Kind, action, event, picture, safe_stop, sensor
-from app.robots.moves import MOVEMENT, battery_sensor, distance_sensor, drives, position_sensor
-from app.robots.typed import Colour, Range
+from app.robots.driver.call import Call, Canceled, Failed, Link
+from app.robots.driver.common_actions import (
+    MOVEMENT,
+    battery_sensor,
+    distance_sensor,
+    drives,
+    position_sensor,
+)
+from app.robots.driver.declare import Kind, action, event, picture, safe_stop, sensor
+from app.robots.driver.schema import Colour, Range
 
 LIGHTS = "Lights"
 STEP_S = 1 / 30

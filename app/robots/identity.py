@@ -12,8 +12,8 @@ import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from app.robots.description import topic_of
-from app.robots.parts import Robot
+from app.robots.description.description import topic_of
+from app.robots.description.model import Robot
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 from nep.text import harmless, shortened

@@ -6,11 +6,11 @@ policy, heartbeat watchdog, proven stop and RIZE's dialect come with the :class:
 
 from __future__ import annotations
 
-from app.robots.calls import Call, Canceled, Clock, Failed, Link, MonotonicClock
-from app.robots.declare import Kind, action, detections, event, picture, safe_stop, sensor
-from app.robots.driver import Driver
-from app.robots.process import main, tell_briefly
-from app.robots.typed import Advanced, Colour, Image, Range, Suggested, Text, Title, Words
+from app.robots.driver.call import Call, Canceled, Clock, Failed, Link, MonotonicClock
+from app.robots.driver.declare import Kind, action, detections, event, picture, safe_stop, sensor
+from app.robots.driver.driver import Driver
+from app.robots.driver.process import main, tell_briefly
+from app.robots.driver.schema import Advanced, Colour, Image, Range, Suggested, Text, Title, Words
 
 tell_briefly()
 

@@ -13,10 +13,10 @@ from functools import lru_cache
 
 from app import resources
 from app.errors import RobotInputError
-from app.robots.description import parse
-from app.robots.inputs import pretty_number
-from app.robots.members import as_part, names, part, text
-from app.robots.parts import Robot
+from app.robots.description.description import parse
+from app.robots.description.inputs import pretty_number
+from app.robots.description.json_access import as_part, names, part, text
+from app.robots.description.model import Robot
 
 COMMANDS, ANSWERS, EVENTS = "robot_action", "action_state", "rize_event"
 _STATES = {"success": "succeeded", "failure": "failed"}

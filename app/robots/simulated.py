@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Literal, TypeAlias
 
-from app.robots.calls import Call, Canceled, Failed
-from app.robots.declare import Kind, action, safe_stop
-from app.robots.moves import drives, moves
-from app.robots.process import main as drive
-from app.robots.typed import Colour, Range, Suggested, Text, Title, Words
+from app.robots.driver.call import Call, Canceled, Failed
+from app.robots.driver.common_actions import drives, moves
+from app.robots.driver.declare import Kind, action, safe_stop
+from app.robots.driver.process import main as drive
+from app.robots.driver.schema import Colour, Range, Suggested, Text, Title, Words
 from app.robots.virtual import from_rize
 from app.robots.virtual.acting import FEEDBACK_S, Acting
 from app.robots.virtual.body import START_PITCH

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import cv2
 
-from app.robots.calls import Clock, Link, MonotonicClock
 from app.robots.diffdrive import DIFFDRIVE, DiffDrive
-from app.robots.process import main as drive
+from app.robots.driver.call import Clock, Link, MonotonicClock
+from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
 from app.robots.virtual.colours import colours_in
 from app.robots.virtual.drawing import surroundings

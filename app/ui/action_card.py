@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.robots.description import Action
+from app.robots.description.description import Action
 from app.ui.controls import Pictures
 from app.ui.flow import Flow
 from app.ui.forms import ActionForm

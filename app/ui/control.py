@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QLineEdit, QWidget
 
-from app.robots.description import Parameter
+from app.robots.description.description import Parameter
 from app.ui.theme import Theme
 from app.ui.widgets.menus import EditMenu
 

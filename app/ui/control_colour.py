@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QLinearGradient, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
-from app.robots.description import Parameter
+from app.robots.description.description import Parameter
 from app.ui.control import Control, connect, line_field
 from app.ui.flow import Flow
 from app.ui.theme import Theme

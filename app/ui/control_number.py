@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.robots.description import Parameter
+from app.robots.description.description import Parameter
 from app.ui.angle_dial import AngleDial
 from app.ui.control import VALUE_WIDTH, Control, Tell, connect
 from app.ui.flow import Flow

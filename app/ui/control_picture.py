@@ -14,7 +14,7 @@ from PySide6.QtCore import Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
 from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
 
-from app.robots.description import Parameter
+from app.robots.description.description import Parameter
 from app.ui import plain
 from app.ui.control import Control, connect, line_field
 from app.ui.file_dialogs import show_free

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.robots.description import Parameter
-from app.robots.inputs import from_words, to_words
+from app.robots.description.description import Parameter
+from app.robots.description.inputs import from_words, to_words
 from app.ui.control import Control, connect, line_field
 from app.ui.long_text import LongText
 from app.ui.theme import Theme

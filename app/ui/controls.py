@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.robots.description import Parameter
+from app.robots.description.description import Parameter
 from app.ui.control import ROW_HEIGHT, Control, connect, sentence_case
 from app.ui.control_colour import colour_control
 from app.ui.control_number import number_control

@@ -8,8 +8,8 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
-from app.robots.description import Action, Parameter
-from app.robots.inputs import wrong_value
+from app.robots.description.description import Action, Parameter
+from app.robots.description.inputs import wrong_value
 from app.ui import plain
 from app.ui.control_colour import ColourChoice
 from app.ui.controls import ROW_HEIGHT, Control, Pictures, control_for, sentence_case

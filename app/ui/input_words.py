@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.robots.description import Action, Parameter
-from app.robots.inputs import to_words
+from app.robots.description.description import Action, Parameter
+from app.robots.description.inputs import to_words
 
 UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
 LONGEST_TEXT = 32

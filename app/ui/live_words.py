@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
-from app.robots.description import Field, Robot, Sensor
+from app.robots.description.description import Field, Robot, Sensor
 from app.ui.sensor_words import number_words, reading_of
 
 SILENT = "silent"

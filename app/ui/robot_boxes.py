@@ -9,7 +9,7 @@ from app.ui.picture_boxes import Box, boxes_of
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
     from app.core.session import Session
-    from app.robots.description import Sensor
+    from app.robots.description.description import Sensor
 
 
 def camera_of(link: RobotLink) -> Sensor | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from app.robots.description import Field, Sensor
+from app.robots.description.description import Field, Sensor
 
 MINUS = "\u2212"
 

@@ -10,7 +10,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QVBoxLayout, QWidget
 
-from app.robots.description import Action
+from app.robots.description.description import Action
 from app.ui import plain
 from app.ui.icons import paint_icon
 from app.ui.input_words import input_words

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from app.robots.description import Action, Field
+from app.robots.description.description import Action, Field
 from app.ui.sensor_words import number_words
 from app.ui.words import seconds_words
 

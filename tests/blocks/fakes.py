@@ -8,7 +8,7 @@ from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
 from app.blocks.runtime.link import Call
 from app.blocks.runtime.runtime import Runtime
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 from tests.blocks.samples import robot
 
 LONG_S = 30.0

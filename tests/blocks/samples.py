@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 
-from app.robots.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, td_for
 
 
 def _block(category: str, icon: str, text: str, says: str | None = None) -> dict[str, object]:

@@ -7,7 +7,7 @@ import pytest
 
 from app import resources
 from app.blocks import compile_behaviour, editor_definitions
-from app.robots.description import parse
+from app.robots.description.description import parse
 from tests.blocks.fakes import FakeLink, Play, until
 
 EXAMPLES = sorted(resources.path("examples").glob("*.nepb"))

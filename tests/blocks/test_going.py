@@ -10,7 +10,7 @@ import pytest
 from app.blocks.runtime.link import Call
 from app.blocks.runtime.motions import Going
 from app.blocks.runtime.scheduler import Stopped
-from app.robots.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
 
 TURTLE: Robot = parse(td_for(ROBOT.thing_model, "Turtle"))

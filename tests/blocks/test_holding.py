@@ -10,7 +10,7 @@ from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime.held_action import is_unknown, measured_by, rest_of
 from app.blocks.runtime.link import Call
 from app.robots import simulated
-from app.robots.description import parse, td_for
+from app.robots.description.description import parse, td_for
 from tests.blocks.fakes import FakeLink, Play, until
 from tests.blocks.samples import block, number, started, text, workspace, write
 

@@ -13,7 +13,7 @@ from app.blocks.compiler.compiler import COMMANDS, compile_behaviour
 from app.blocks.model.fields import StatementInput, ValueInput, VariableField
 from app.blocks.toolbox.catalogue import Catalogue
 from app.errors import DescriptionError
-from app.robots.description import parse, td_for
+from app.robots.description.description import parse, td_for
 from tests.blocks.samples import MODEL, block, robot, stack, started, workspace
 
 CATALOGUE = Catalogue([robot()])

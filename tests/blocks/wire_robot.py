@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import nep
 from app.robots import rize
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 from tests.blocks.samples import robot
 
 

@@ -16,7 +16,7 @@ from app.core.robots.virtual_processes import KNOWN_WITHIN_S, WISH_KEPT_S, Compa
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
-from app.robots.driver import Driver
+from app.robots.driver.driver import Driver
 from nep.masters.master import Master
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from tests.core.waiting import tick_until

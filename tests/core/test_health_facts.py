@@ -10,7 +10,7 @@ from app.core.network.topics import Topic
 from app.core.robots.health_facts import LOW_PERCENT, HealthFact, facts_of
 from app.core.robots.robot_link import RobotLink
 from app.robots import rize, simulated
-from app.robots.description import Field, Sensor, parse, td_for
+from app.robots.description.description import Field, Sensor, parse, td_for
 
 PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
 NOW = 1000.0

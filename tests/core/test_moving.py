@@ -8,7 +8,7 @@ import pytest
 
 from app.core.robots.motion_permission import MayNotMoveError, Moving, actions_of, risky, wanted_by
 from app.core.storage.settings import Settings
-from app.robots.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
 
 

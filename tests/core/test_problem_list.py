@@ -8,7 +8,7 @@ from app.core.documents.document import Document
 from app.core.documents.journal import Journal
 from app.core.documents.problems import Mend, listed
 from app.robots import simulated
-from app.robots.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, td_for
 from tests.blocks.samples import block, say, started, text, workspace
 from tests.blocks.samples import robot as sample
 

@@ -20,7 +20,7 @@ import nep
 from app.core.network.mailbox import MESSAGES_PER_TOPIC
 from app.core.robots.robot_link import Invocation, RobotLink
 from app.core.session import Session
-from app.robots.description import td_for
+from app.robots.description.description import td_for
 from app.robots.turtle import ROBOT
 from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace

@@ -18,7 +18,7 @@ import pytest
 import nep
 from app import resources
 from app.robots import turtle
-from app.robots.driver import Driver
+from app.robots.driver.driver import Driver
 from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, robot, say, started, text, workspace, write

@@ -15,7 +15,7 @@ import pytest
 import nep
 from app.core.session import Session
 from app.errors import RobotInputError, RobotUnknownError
-from app.robots.description import td_for
+from app.robots.description.description import td_for
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
 from tests.core.waiting import tick_until
 

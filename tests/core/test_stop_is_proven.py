@@ -12,7 +12,7 @@ import pytest
 import nep
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import RobotStop, StopReport, not_reached
-from app.robots.description import Topics
+from app.robots.description.description import Topics
 from app.robots.identity import first_to_announce, identity_of
 from nep.errors import AddressInUseError
 from nep.masters.master import Master

@@ -8,7 +8,7 @@ import pytest
 
 from app.core.robots.robot_link import TRIES_KEPT, Invocation, Payload, RobotLink
 from app.core.robots.tries import FIRST_ANSWER_S, GRACE_S, Tries
-from app.robots.description import Action, Robot, parse, td_for
+from app.robots.description.description import Action, Robot, parse, td_for
 from app.robots.turtle import ROBOT
 
 

@@ -12,7 +12,7 @@ import nep
 from app.core.robots.motion_permission import MayNotMoveError
 from app.core.session import Session
 from app.robots import simulated, turtle
-from app.robots.driver import Driver
+from app.robots.driver.driver import Driver
 from nep.masters.master import Master
 from tests.blocks.samples import block, number, say, started, text, workspace, write
 from tests.core.waiting import tick_until

@@ -20,7 +20,7 @@ from app.core.robots.motion_permission import MayNotMoveError, Moving
 from app.core.robots.own_processes import Processes
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.robots.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, td_for
 from app.robots.identity import Identity
 from app.robots.turtle import ROBOT
 from nep.masters.master import Master
@@ -32,7 +32,7 @@ MODULES = ("app.robots.turtle",)
 STRANGER = """
 import json, sys
 import nep
-from app.robots.description import td_for
+from app.robots.description.description import td_for
 from app.robots.turtle import ROBOT
 with nep.node("stranger") as node:
     publisher = node.new_pub("/Turtle/description", "robot/description", latched=True)

@@ -19,8 +19,8 @@ import pytest
 import nep
 from app import resources
 from app.robots import simulated, turtle
-from app.robots.description import Action, Parameter, Robot, parse, validate
-from app.robots.driver import Driver
+from app.robots.description.description import Action, Parameter, Robot, parse, validate
+from app.robots.driver.driver import Driver
 from app.robots.identity import program_of
 from app.robots.kit import Kind
 from tests.robots.conftest import Ears, FakeClock, eventually

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from app import resources
 from app.errors import DescriptionError
-from app.robots.description import Parameter, announced, parse, td_for, topic_of, validate
-from app.robots.inputs import check_input, from_words, parameter_of, to_words
+from app.robots.description.description import Parameter, announced, parse, td_for, topic_of, validate
+from app.robots.description.inputs import check_input, from_words, parameter_of, to_words
 from nep.errors import NepError
 from nep.messages.message import UNDECODED, Message
 from nep.text import control_in

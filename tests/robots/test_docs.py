@@ -11,8 +11,8 @@ from types import ModuleType
 import pytest
 
 import nep
-from app.robots.description import parse
-from app.robots.driver import Driver
+from app.robots.description.description import parse
+from app.robots.driver.driver import Driver
 from tests.robots.conftest import Ears, eventually
 from tests.robots.test_process import ended, network, start
 

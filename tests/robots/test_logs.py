@@ -6,8 +6,8 @@ import logging
 import threading
 
 import nep
+from app.robots.driver.process import run
 from app.robots.kit import Call, Kind, Link, action, safe_stop
-from app.robots.process import run
 from tests.robots.conftest import eventually
 
 

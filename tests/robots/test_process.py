@@ -14,7 +14,7 @@ import pytest
 
 import nep
 from app.robots import rize
-from app.robots.description import parse
+from app.robots.description.description import parse
 from tests.robots.conftest import Ears, eventually
 
 ROOT = Path(__file__).resolve().parents[2]

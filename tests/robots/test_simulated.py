@@ -9,7 +9,7 @@ import cv2
 import pytest
 
 import nep
-from app.robots.driver import Driver
+from app.robots.driver.driver import Driver
 from app.robots.simulated import ROBOT, room_of
 from tests.robots.conftest import Ears, eventually
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from app.robots.calls import Canceled, MonotonicClock
-from app.robots.task import Answer, Task
-from app.robots.tasks import Tasks
+from app.robots.driver.call import Canceled, MonotonicClock
+from app.robots.driver.task import Answer, Task
+from app.robots.driver.tasks import Tasks
 from tests.robots.conftest import eventually
 
 

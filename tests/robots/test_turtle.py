@@ -13,7 +13,7 @@ import pytest
 import nep
 from app import resources
 from app.robots.diffdrive import DIFFDRIVE
-from app.robots.driver import Driver
+from app.robots.driver.driver import Driver
 from app.robots.turtle import ROBOT
 from app.robots.virtual.camera import Camera
 from app.robots.virtual.colours import colours_in

@@ -11,10 +11,9 @@ from typing_extensions import NotRequired
 
 import nep
 from app.errors import DescriptionError, RobotValueError
-from app.robots.description import parse
-from app.robots.driver import Driver
-from app.robots.kit import Call, Kind, Link, action, event, safe_stop, sensor
-from app.robots.typed import (
+from app.robots.description.description import parse
+from app.robots.driver.driver import Driver
+from app.robots.driver.schema import (
     Advanced,
     Colour,
     Range,
@@ -25,7 +24,8 @@ from app.robots.typed import (
     input_schema,
     schema_of,
 )
-from app.robots.typed_values import given, told
+from app.robots.driver.schema_values import given, told
+from app.robots.kit import Call, Kind, Link, action, event, safe_stop, sensor
 from tests.robots.conftest import Ears, eventually
 
 

@@ -22,9 +22,9 @@ from app.core.messages.picture import Picture
 from app.core.network.nodes import Nodes
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_permission import Moving
-from app.robots.inputs import Choice, Parameter
-from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor
-from app.robots.parts import Topics as RobotTopics
+from app.robots.description.inputs import Choice, Parameter
+from app.robots.description.model import Action, Event, Field, Robot, SafeStop, Sensor
+from app.robots.description.model import Topics as RobotTopics
 from nep.doctor import Finding
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo

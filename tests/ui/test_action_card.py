@@ -8,8 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.robots.inputs import Parameter
-from app.robots.parts import Action, Field
+from app.robots.description.inputs import Parameter
+from app.robots.description.model import Action, Field
 from app.ui.action_card import ActionCard
 from app.ui.theme import Theme
 from app.ui.try_words import field_words, progress_of

@@ -15,9 +15,9 @@ from PySide6.QtGui import QImage, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
-from app.robots.inputs import Choice as Option
-from app.robots.inputs import Parameter, parameter_of
-from app.robots.parts import Action
+from app.robots.description.inputs import Choice as Option
+from app.robots.description.inputs import Parameter, parameter_of
+from app.robots.description.model import Action
 from app.ui.angle_dial import AngleDial
 from app.ui.control_colour import ColourChoice, HueStrip
 from app.ui.control_picture import PictureChoice

@@ -5,9 +5,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QLineEdit
 
-from app.robots.inputs import Choice as Option
-from app.robots.inputs import Parameter
-from app.robots.parts import Action
+from app.robots.description.inputs import Choice as Option
+from app.robots.description.inputs import Parameter
+from app.robots.description.model import Action
 from app.ui.controls import control_for
 from app.ui.forms import ActionForm
 from app.ui.theme import Theme

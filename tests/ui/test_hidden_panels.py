@@ -13,7 +13,7 @@ from app.core.network.source import GraphSeen, Job
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
-from app.robots.description import parse, td_for
+from app.robots.description.description import parse, td_for
 from app.ui.docks import RESTS_AFTER_S, Dock, on_screen
 from app.ui.main_window import TICK_MS, MainWindow
 from app.ui.panel_shelf import PanelShelf

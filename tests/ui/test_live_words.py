@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 from app.ui.live_words import live_words
 from tests.blocks.samples import robot
 

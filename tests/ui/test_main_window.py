@@ -16,7 +16,7 @@ from app.core.run.view import RunView
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
-from app.robots.description import parse, td_for
+from app.robots.description.description import parse, td_for
 from app.ui.actions import TABLE, shortcuts
 from app.ui.application import Options, first_steps
 from app.ui.coming import Coming

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
 from app.core.robots.motion_permission import Moving
 from app.core.storage.settings import Settings
-from app.robots.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
 from app.ui.move_question import MoveQuestion
 from app.ui.theme import Theme

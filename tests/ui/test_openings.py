@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QP
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
-from app.robots.description import parse, td_for
+from app.robots.description.description import parse, td_for
 from app.ui.commands import Commands
 from app.ui.docks import Dock
 from app.ui.main_window import MainWindow

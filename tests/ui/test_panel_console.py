@@ -115,7 +115,7 @@ def test_with_nothing_it_says_what_will_appear(qtbot, qapp) -> None:
     assert panel.empty._title.text() == "No problem was told"
 
 
-def logged(window, level="info", text="hello", node="Pepper", name="app.robots.tasks", **more) -> None:
+def logged(window, level="info", text="hello", node="Pepper", name="app.robots.driver.tasks", **more) -> None:
     given = {"level": level, "text": text, "node": node, "name": name, "stamp_ns": 10**18, **more}
     window.session.console.take([Message(LOG_TOPIC, json.dumps(given).encode(), "json", LOG_TYPE)])
 
@@ -124,10 +124,10 @@ def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
     logged(window, "warning", "its stop broke off", file="tasks.py", line=272)
     logged(window, "debug", "a detail")
     panel.refresh()
-    assert lines(panel)[0] == "warn Pepper [app.robots.tasks] its stop broke off"
+    assert lines(panel)[0] == "warn Pepper [app.robots.driver.tasks] its stop broke off"
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
     said, level, place = tip_of(record).split("\n")
-    assert (said, place) == ("its stop broke off", "app.robots.tasks  tasks.py:272")
+    assert (said, place) == ("its stop broke off", "app.robots.driver.tasks  tasks.py:272")
     assert level.endswith(" warn  Pepper")
     panel.set_level("debug")
     assert lines(panel)[0].startswith("debug Pepper")
@@ -163,12 +163,12 @@ def test_lines_of_one_node_and_with_some_words(qtbot, panel, window) -> None:
     logged(window, text="walks 1 m")
     logged(window, text="walks 2 m", node="Turtle")
     panel.set_node("Turtle")
-    assert lines(panel) == ["info Turtle [app.robots.tasks] walks 2 m"]
+    assert lines(panel) == ["info Turtle [app.robots.driver.tasks] walks 2 m"]
     assert panel.filter.accessibleName() == "Shown: Everything of Turtle"
     panel.set_node("")
     panel.focus_filter()
     qtbot.keyClicks(panel.words, "PEPPER walks")
-    assert lines(panel) == ["info Pepper [app.robots.tasks] walks 1 m"]
+    assert lines(panel) == ["info Pepper [app.robots.driver.tasks] walks 1 m"]
     qtbot.keyClicks(panel.words, " nowhere")
     assert lines(panel) == []
     assert panel.empty.isVisible()

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.core.robots.known import KEY
-from app.robots.parts import Field
+from app.robots.description.model import Field
 from app.ui.long_text import LongText
 from app.ui.panels.robots import PANEL, RobotsPanel
 from app.ui.robot_list import seen_words

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.robots.inputs import Choice
-from app.robots.parts import Field, Sensor
+from app.robots.description.inputs import Choice
+from app.robots.description.model import Field, Sensor
 from app.ui.panels import sensors
 from app.ui.panels.sensors import PANEL, SensorsPanel
 from app.ui.sensor_words import Reading, number_words, reading_of

@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtTest import QTest
 
 from app.core.storage.settings import Settings
-from app.robots.description import Parameter
+from app.robots.description.description import Parameter
 from app.ui.actions import TABLE
 from app.ui.app_bar import AppBar
 from app.ui.commands import Commands

@@ -13,7 +13,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMenu
 
 import app.ui
-from app.robots.inputs import Parameter
+from app.robots.description.inputs import Parameter
 from app.ui.commands import Commands
 from app.ui.control_picture import NoPictures, PictureChoice
 from app.ui.main_window import MainWindow

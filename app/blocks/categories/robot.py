@@ -11,7 +11,7 @@ from app.blocks.model.block import Block, RobotUse
 from app.blocks.model.category import Category, Entry, Group
 from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
 from app.blocks.model.robot_text import TextParts, about, field_of, input_of, type_of
-from app.robots.description import Action, Event, Robot, Sensor
+from app.robots.description.description import Action, Event, Robot, Sensor
 
 _ICONS = {
     "Speech": "message-circle",

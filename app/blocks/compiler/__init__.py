@@ -1,1 +1,1 @@
-"""From a workspace to a program: templates filled with syntax trees, rendered for people and for the runtime."""
+"""From a workspace to a program: templates filled with syntax trees, rendered for people and to run."""

@@ -22,7 +22,7 @@ from app.blocks.model.template import expression, literal, statements
 from app.blocks.model.workspace import Placed, Workspace, parse_workspace
 from app.blocks.runtime.publishing import moved_by
 from app.blocks.toolbox.catalogue import Catalogue
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 
 class _Skip(Exception):  # noqa: N818 (no error: the block is left out, and its problem is noted)

@@ -10,7 +10,7 @@ from app.blocks.model.fields import Field, FieldError, TextField, ValueInput
 from app.blocks.model.program import Problem, Severity
 from app.blocks.model.workspace import Placed, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
-from app.robots.description import Action
+from app.robots.description.description import Action
 
 _ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
 _NEEDS = {

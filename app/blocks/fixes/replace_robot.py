@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from app.blocks.categories.robot import robot_blocks
 from app.blocks.model.robot_text import type_of
 from app.blocks.model.workspace import saved_blocks
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 
 def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, object], ...]:

@@ -1,1 +1,1 @@
-"""Blocks as data: a block's description, its fields and gaps, the workspace they form, the program made of it."""
+"""Blocks as data: a block's description, its fields and gaps, the workspace they form, the program."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from app.blocks.model.block import Block
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 
 @dataclass(frozen=True)

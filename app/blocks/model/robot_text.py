@@ -14,8 +14,8 @@ from app.blocks.model.fields import (
     TextField,
     ValueInput,
 )
-from app.robots.description import Parameter
-from app.robots.inputs import pretty_number, pretty_unit, to_words
+from app.robots.description.description import Parameter
+from app.robots.description.inputs import pretty_number, pretty_unit, to_words
 
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 _RESERVED = ("ROBOT", "LIVE", "FIELD", "SENSOR", "SIDE", "LIMIT", "X_NAME", "X_INPUT", "X_FIELD", "ICON")

@@ -29,7 +29,7 @@ from app.blocks.runtime.network import Network
 from app.blocks.runtime.publishing import PublishGuard, guarded
 from app.blocks.runtime.runtime import Runtime
 from app.errors import AppError
-from app.robots.description import Robot, parse
+from app.robots.description.description import Robot, parse
 from nep.errors import NepError
 
 SAMPLE_S = 1 / 30

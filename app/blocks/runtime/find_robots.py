@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from app.errors import DescriptionError
-from app.robots.description import Robot, announced
+from app.robots.description.description import Robot, announced
 from app.robots.identity import (
     DESCRIPTION_TYPE,
     Identity,

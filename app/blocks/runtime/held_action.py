@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from app.blocks.runtime.link import Call
-from app.robots.description import Action
+from app.robots.description.description import Action
 
 LEFT = "to_go"
 """The feedback with which an action says how much is left, in the unit of one of its parameters."""

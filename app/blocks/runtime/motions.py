@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from app.blocks.runtime.link import Call
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 
 @dataclass(frozen=True)

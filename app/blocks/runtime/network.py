@@ -13,7 +13,7 @@ from app.blocks.runtime.motions import Going
 from app.blocks.runtime.publishing import PublishGuard
 from app.blocks.runtime.wire import Node, Publisher, new_id, payload_of, value_of
 from app.robots import rize
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
 from nep.errors import NepError
 from nep.messages.message import Message

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping
 
 from app.blocks.runtime.errors import BehaviourError
 from app.robots import rize
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 
 def moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:

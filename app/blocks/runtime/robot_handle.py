@@ -13,8 +13,8 @@ from app.blocks.runtime.held_action import is_unknown, rest_of
 from app.blocks.runtime.link import Call, Link
 from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.status_text import Saying
-from app.robots.description import Action, Parameter, Robot
-from app.robots.inputs import from_words
+from app.robots.description.description import Action, Parameter, Robot
+from app.robots.description.inputs import from_words
 
 FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0

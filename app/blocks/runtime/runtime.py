@@ -20,7 +20,7 @@ from app.blocks.runtime.robot_handle import RobotHandle
 from app.blocks.runtime.scheduler import Scheduler, Stopped
 from app.blocks.runtime.status_text import Saying
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from app.blocks.runtime.scheduler import POLL_S, Scheduler
-from app.robots.description import Event
+from app.robots.description.description import Event
 
 
 class Hat:

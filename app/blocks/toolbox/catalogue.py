@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from app.blocks.model.block import Block
 from app.blocks.model.category import Category
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 from nep.system.plugins import discover
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from app.blocks.model.category import Category, Entry, Group
 from app.blocks.toolbox.catalogue import Catalogue, categories
 from app.blocks.toolbox.help import help_of
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 STYLES = ("events", "control", "values", "variables", "functions", "messages", "robot", "sensors")
 

@@ -27,7 +27,7 @@ from app.core.documents.journal import Journal, Unsaved
 from app.core.documents.versions import Stamp, stamp_of
 from app.core.storage import deep_json
 from app.errors import DescriptionError, DocumentError
-from app.robots.description import Robot, parse
+from app.robots.description.description import Robot, parse
 
 UNNAMED = "New behaviour"
 

@@ -14,7 +14,7 @@ from app.core.documents.compiled import Compiled
 from app.core.documents.document import UNNAMED, Document
 from app.core.documents.journal import Unsaved
 from app.errors import DocumentError
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 CLOSED_KEPT = 20
 

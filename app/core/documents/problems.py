@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from app.blocks import Problem
 from app.blocks.fixes.replace_robot import asked_of, can_do, types_of
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 CONNECT = "connect:"
 MOST_MENDS = 2  # a line has no room for more

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.errors import DescriptionError
-from app.robots.description import Robot, announced
+from app.robots.description.description import Robot, announced
 from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
 from nep.errors import NepError
 from nep.messages.message import Message

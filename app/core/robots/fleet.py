@@ -25,7 +25,7 @@ from app.core.robots.tries import Tries
 from app.core.storage.settings import Settings
 from app.errors import AppError, RobotInputError, RobotUnknownError
 from app.robots import rize
-from app.robots.description import Robot, topic_of
+from app.robots.description.description import Robot, topic_of
 from app.robots.identity import (
     GATEWAY,
     Identity,

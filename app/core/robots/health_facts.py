@@ -11,7 +11,7 @@ from typing import TypeGuard
 
 from app.core.network.topics import Topic, Topics
 from app.core.robots.robot_link import RobotLink
-from app.robots.description import Sensor
+from app.robots.description.description import Sensor
 
 SILENT_S = 3.0
 MISSED = 5

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.errors import SettingsError
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 KEY = "robots.known"
 LIMIT = 24

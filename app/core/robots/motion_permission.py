@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.errors import AppError
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 from app.robots.identity import Identity
 
 ALWAYS = "robots.may_move"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from app.core.network.watches import Watch
-from app.robots.description import Robot, Topics
+from app.robots.description.description import Robot, Topics
 from app.robots.identity import Identity
 from nep.nodes.publisher import Publisher
 

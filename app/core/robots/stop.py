@@ -17,7 +17,7 @@ from typing import Protocol
 
 from app.core.robots.stop_report import RobotStop, StopReport
 from app.robots import rize
-from app.robots.description import Robot, Topics
+from app.robots.description.description import Robot, Topics
 from app.robots.identity import (
     Identity,
     Senders,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink
 from app.robots import rize
-from app.robots.description import Action, Robot
+from app.robots.description.description import Action, Robot
 from app.robots.identity import said
 
 FIRST_ANSWER_S = 3.0

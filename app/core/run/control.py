@@ -33,7 +33,7 @@ from app.core.run.view import (
 )
 from app.core.run.view import unanswered_words as unanswered_words_of
 from app.errors import AppError
-from app.robots.description import Robot
+from app.robots.description.description import Robot
 
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 NO_NETWORK = "there is no connection to the network yet"

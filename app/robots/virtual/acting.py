@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar
 
-from app.robots.calls import Call, Canceled, Failed, Link, MonotonicClock
+from app.robots.driver.call import Call, Canceled, Failed, Link, MonotonicClock
 from app.robots.virtual.body import START_PITCH, Body
 from app.robots.virtual.camera import lens_of
 from app.robots.virtual.life import Life

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.robots.members import number_of
+from app.robots.description.json_access import number_of
 
 
 def turn(given: str, options: Mapping[str, object]) -> Mapping[str, object]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 import cv2
 
-from app.robots.calls import Clock, Link
+from app.robots.driver.call import Clock, Link
 from app.robots.virtual.body import Body, Happening
 from app.robots.virtual.camera import Camera, lens_of
 from app.robots.virtual.drawing import drawable

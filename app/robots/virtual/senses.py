@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypeAlias
 
-from app.robots.declare import detections, event, picture, sensor
-from app.robots.moves import battery_sensor, distance_sensor, position_sensor
-from app.robots.typed import Suggested
+from app.robots.driver.common_actions import battery_sensor, distance_sensor, position_sensor
+from app.robots.driver.declare import detections, event, picture, sensor
+from app.robots.driver.schema import Suggested
 
 Place: TypeAlias = Literal["head", "left_hand", "right_hand"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from app.robots.task import Program, Task
+from app.robots.driver.task import Program, Task
 
 
 class Watchdog:

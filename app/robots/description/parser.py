@@ -1,12 +1,12 @@
-"""From a checked description document to typed parts; :func:`app.robots.description.parse` is the way in."""
+"""From a checked description document to typed parts; the way in is `description.parse`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.robots.inputs import Parameter, choices_of, kind_of, parameter_of, pretty_unit
-from app.robots.members import as_part, names, number, part, text
-from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor, Topics
+from app.robots.description.inputs import Parameter, choices_of, kind_of, parameter_of, pretty_unit
+from app.robots.description.json_access import as_part, names, number, part, text
+from app.robots.description.model import Action, Event, Field, Robot, SafeStop, Sensor, Topics
 
 _SCHEME = "nep:"
 _LANGUAGE = "en"

@@ -16,10 +16,10 @@ import psutil
 
 import nep
 from app.errors import AppError, DescriptionError
-from app.robots.calls import Failed
-from app.robots.declare import Kind
-from app.robots.description import topic_of
-from app.robots.driver import Driver
+from app.robots.description.description import topic_of
+from app.robots.driver.call import Failed
+from app.robots.driver.declare import Kind
+from app.robots.driver.driver import Driver
 from nep.system.addresses import master_address
 from nep.system.terminal import Terminal, log_to
 from nep.text import escaped

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated
 
-from app.robots.declare import FromRize, SensorSpec, action, sensor
-from app.robots.typed import Range, Title
+from app.robots.driver.declare import FromRize, SensorSpec, action, sensor
+from app.robots.driver.schema import Range, Title
 
 MOVEMENT = "Movement"
 DRIVE_S = 60

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Awaitable, Callable
 from functools import partial
 
-from app.robots.calls import Call, Canceled
+from app.robots.driver.call import Call, Canceled
 
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)

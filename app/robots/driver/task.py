@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeAlias
 
-from app.robots.calls import Call
+from app.robots.driver.call import Call
 
 State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "canceled"]
 

@@ -12,9 +12,9 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from app.robots.calls import Call, Canceled, Clock, Failed
-from app.robots.task import Answer, Program, Task
-from app.robots.watchdog import Watchdog
+from app.robots.driver.call import Call, Canceled, Clock, Failed
+from app.robots.driver.task import Answer, Program, Task
+from app.robots.driver.watchdog import Watchdog
 
 BEAT_S = 0.5
 """While something runs or waits, the robot says at least so often that it lives."""

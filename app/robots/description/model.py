@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from app.robots.inputs import Choice, Parameter, check_input
+from app.robots.description.inputs import Choice, Parameter, check_input
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NoReturn, TypeAlias, get_args, get_origin, get_type_hints
 
 from app.errors import RobotValueError
-from app.robots.members import as_part
-from app.robots.typed_values import bare, choices_in, fields_of, shown, told, without_none
+from app.robots.description.json_access import as_part
+from app.robots.driver.schema_values import bare, choices_in, fields_of, shown, told, without_none
 
 Schema: TypeAlias = dict[str, object]
 _LONGEST_UNIT = 16

@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from app.robots.calls import Call
-from app.robots.declare import ActionSpec
-from app.robots.desk import Desk
-from app.robots.inputs import Parameter
-from app.robots.members import as_part, names, number_of
-from app.robots.parts import Action, Robot
-from app.robots.task import Answer, Task
-from app.robots.tasks import Tasks
+from app.robots.description.inputs import Parameter
+from app.robots.description.json_access import as_part, names, number_of
+from app.robots.description.model import Action, Robot
+from app.robots.driver.call import Call
+from app.robots.driver.commands import Desk
+from app.robots.driver.declare import ActionSpec
+from app.robots.driver.task import Answer, Task
+from app.robots.driver.tasks import Tasks
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 _LONGEST_WAIT_S = 3600.0

@@ -11,11 +11,11 @@ import re
 from collections.abc import Mapping
 
 from app.errors import DescriptionError
-from app.robots.inputs import Choice, Parameter, pretty_unit
-from app.robots.members import as_part, part, text
-from app.robots.parts import Action, Event, Field, Robot, SafeStop, Sensor, Topics
-from app.robots.profile import validate
-from app.robots.reading import read
+from app.robots.description.inputs import Choice, Parameter, pretty_unit
+from app.robots.description.json_access import as_part, part, text
+from app.robots.description.model import Action, Event, Field, Robot, SafeStop, Sensor, Topics
+from app.robots.description.parser import read
+from app.robots.description.validate import validate
 from nep.messages.message import Message
 from nep.text import harmless
 

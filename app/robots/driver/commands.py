@@ -8,15 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 from app.errors import RobotValueError
-from app.robots.calls import Call, Failed
-from app.robots.declare import ActionSpec
+from app.robots.description.inputs import near_miss
+from app.robots.description.json_access import as_part, text
+from app.robots.description.model import Action, Robot
+from app.robots.driver.call import Call, Failed
+from app.robots.driver.declare import ActionSpec
+from app.robots.driver.schema_values import given
+from app.robots.driver.task import Answer, Program, Task
+from app.robots.driver.tasks import NOTHING_RUNS, Tasks
 from app.robots.identity import program_of
-from app.robots.inputs import near_miss
-from app.robots.members import as_part, text
-from app.robots.parts import Action, Robot
-from app.robots.task import Answer, Program, Task
-from app.robots.tasks import NOTHING_RUNS, Tasks
-from app.robots.typed_values import given
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 Done: TypeAlias = Callable[[object, Call], object]

@@ -13,8 +13,8 @@ from itertools import count, islice
 from typing import TYPE_CHECKING
 
 from app import resources
-from app.robots.inputs import parameter_of, wrong_value
-from app.robots.members import as_part, names, part
+from app.robots.description.inputs import parameter_of, wrong_value
+from app.robots.description.json_access import as_part, names, part
 from nep.text import control_in
 
 if TYPE_CHECKING:

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 
 import nep
 from app.errors import DescriptionError, RobotValueError
-from app.robots.calls import Call, Clock, MonotonicClock
-from app.robots.declare import Kind
-from app.robots.description import LARGEST_BYTES, parse, td_for, topic_of
-from app.robots.desk import Desk
-from app.robots.dialect import Dialect
-from app.robots.loop import EventLoop
-from app.robots.members import as_part
-from app.robots.tasks import Tasks
-from app.robots.typed_values import told_fields
+from app.robots.description.description import LARGEST_BYTES, parse, td_for, topic_of
+from app.robots.description.json_access import as_part
+from app.robots.driver.call import Call, Clock, MonotonicClock
+from app.robots.driver.commands import Desk
+from app.robots.driver.declare import Kind
+from app.robots.driver.event_loop import EventLoop
+from app.robots.driver.rize_dialect import Dialect
+from app.robots.driver.schema_values import told_fields
+from app.robots.driver.tasks import Tasks
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 
 
 class Driver:
-    """Runs one robot of a kind under a name; it is the :class:`~app.robots.calls.Link` of the robot's class.
+    """Runs one robot of a kind under a name; it is the `Link` of the robot's class.
 
     `node` is borrowed: closing the driver closes what it made on it, not the node. Works in any thread.
     """

@@ -1,6 +1,6 @@
 """Declaring a robot in Python: its actions, sensors, events and safe stop; its Thing Model is made from them.
 
-A robot is a class. Its constructor takes a :class:`~app.robots.calls.Link`; methods marked with
+A robot is a class. Its constructor takes a :class:`~app.robots.driver.call.Link`; methods marked with
 :class:`action` are its actions; :func:`sensor`, :func:`picture`, :func:`detections` and :func:`event` are
 class attributes; exactly one method is marked with :func:`safe_stop`.
 """
@@ -15,12 +15,19 @@ from pathlib import Path
 from typing import Literal, TypeAlias, TypeVar
 
 from app.errors import DeclarationError, DescriptionError
-from app.robots.calls import Link
-from app.robots.profile import validate
-from app.robots.source_lines import Line, line_of, lines_of
-from app.robots.tasks import BEAT_S
-from app.robots.typed import Schema, fields_schema, input_schema, input_types, returned_type, schema_of
-from app.robots.typed_values import check_sendable, plain, told, told_fields
+from app.robots.description.validate import validate
+from app.robots.driver.call import Link
+from app.robots.driver.schema import (
+    Schema,
+    fields_schema,
+    input_schema,
+    input_types,
+    returned_type,
+    schema_of,
+)
+from app.robots.driver.schema_values import check_sendable, plain, told, told_fields
+from app.robots.driver.source_lines import Line, line_of, lines_of
+from app.robots.driver.tasks import BEAT_S
 
 Function = TypeVar("Function", bound=Callable[..., object])
 Described = TypeVar("Described")
