@@ -29,7 +29,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.blocks import editor_definitions
-from app.ui.blockly_view import BlocklyView, register_scheme
+from app.ui.blockly.view import BlocklyView, register_scheme
 from bench.blocks import TRUSTED
 
 LOAD_S, DROP_MS = 1.0, 50.0

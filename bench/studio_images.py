@@ -31,7 +31,7 @@ from studio_window import (
     verdict,
 )
 
-from app.ui.picture_view import PictureView
+from app.ui.pictures.view import PictureView
 
 SHOWN, AGE_MS, GAP_MS, HZ = 0.98, 70.0, 16.0, 30
 CASES = ((4, 1280, 720), (2, 1920, 1080))

@@ -20,10 +20,10 @@ from PySide6.QtCore import QCoreApplication, QEventLoop, Qt, QTimer
 
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui import messages
 from app.ui.application import Options, make_application, make_window
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
+from app.ui.startup import qt_log
 from nep.masters.master import start_process
 
 __all__ = [
@@ -62,7 +62,7 @@ def network() -> Iterator[str]:
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
     os.environ["NEP_GATEWAY"] = "0"  # its ports exist once on a computer
-    messages.listen()
+    qt_log.listen()
     make_application()
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -157,7 +157,7 @@ def test_imports_inside_functions_are_of_heavy_packages_only() -> None:
     # Entries choose what to load: `python -m app run` must not load Qt, `nep --help` not all of nep.
     entries = {"app.__main__", "nep.__main__", "nep.cli"}
     # Our view is Qt WebEngine, a subclass of it by the line: a fifth of a second that only the editor pays.
-    heavy_of_ours = {"app.ui.blockly_view", "app.ui.blockly_view.BlocklyView"}
+    heavy_of_ours = {"app.ui.blockly.view", "app.ui.blockly.view.BlocklyView"}
     only_on_some_systems = {"fcntl", "msvcrt", "resource", "winreg"}
     own_or_standard = {"nep", "app", *sys.stdlib_module_names} - only_on_some_systems
     faults = [
@@ -241,7 +241,7 @@ def places_that_replace_files(tree: ast.AST) -> list[int]:
 def test_files_are_replaced_in_one_place_which_tries_again_on_windows() -> None:
     assert places_that_replace_files(ast.parse("path.replace(other)\n'a'.replace('a', 'b')\n")) == [1]
     found = {module.name for module in modules() if places_that_replace_files(module.tree)}
-    assert found - {"nep.system.replace_file", "app.ui.blockly_view"} == set(), "the latter replaces a tab"
+    assert found - {"nep.system.replace_file", "app.ui.blockly.view"} == set(), "the latter replaces a tab"
 
 
 def test_qt_does_not_lose_references_of_none() -> None:

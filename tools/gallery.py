@@ -15,9 +15,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter, QPixmap
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
 
-from app.ui import fonts
-from app.ui.banner import Banner
-from app.ui.theme import Theme
+from app.ui.shell.bars.banner import Banner
+from app.ui.theme import fonts
+from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Bar,
     Button,

@@ -21,10 +21,10 @@ from PySide6.QtCore import QTimer
 
 from app.core.session import Session
 from app.ui.application import Options, make_application, make_window
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
-from app.ui.palette import Palette
 from app.ui.self_drive import SelfDrive, Step
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.main_window import MainWindow
 from nep.masters.master import is_running
 from tools.small_png import shrink
 

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import QApplication
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from app.ui import blockly_scheme  # noqa: E402
-from app.ui.blockly_view import BlocklyView  # noqa: E402
+from app.ui.blockly import scheme  # noqa: E402
+from app.ui.blockly.view import BlocklyView  # noqa: E402
 
 SAMPLE = ROOT / "tests" / "data" / "blockly"
 SETTLE_MS = 700
@@ -93,7 +93,7 @@ def main() -> int:
     asked = options()
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         os.environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
-    blockly_scheme.register_scheme()
+    scheme.register_scheme()
     QApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     application = QApplication(sys.argv[:1])
     view = BlocklyView()

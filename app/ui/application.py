@@ -22,21 +22,27 @@ from app.core.documents.versions import bring_here
 from app.core.session import Session
 from app.core.storage.file_lock import Turn
 from app.core.storage.settings import home
-from app.ui import fonts, messages, single_window, turns
-from app.ui.commands import Commands
-from app.ui.first_paint import AfterFirstPaint
-from app.ui.incoming_files import Application, IncomingFiles
-from app.ui.logo import LogoEngine
-from app.ui.main_window import MainWindow
-from app.ui.panel_shelf import PanelShelf
+from app.ui.panels.registry import PanelShelf
 from app.ui.self_drive import SelfDrive
-from app.ui.single_window import Asked
-from app.ui.start_page import read_examples
-from app.ui.theme import MODES, Theme
-from app.ui.window_state import WindowState, fitting
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.logo import LogoEngine
+from app.ui.shell.main_window import MainWindow
+from app.ui.shell.start_page.page import read_examples
+from app.ui.shell.window_state import WindowState, fitting
+from app.ui.startup import interpreter, qt_log, single_instance
+from app.ui.startup.deferred import AfterFirstPaint
+from app.ui.startup.file_open import Application, IncomingFiles
+from app.ui.startup.single_instance import Asked
+from app.ui.theme import fonts
+from app.ui.theme.theme import MODES, Theme
 
 LOG_EVERY_MS = 500
-SOON = ("app.ui.palette", "app.ui.blockly_view", "app.ui.settings_sheet", "app.ui.shortcut_sheet")
+SOON = (
+    "app.ui.shell.dialogs.command_palette",
+    "app.ui.blockly.view",
+    "app.ui.shell.dialogs.settings",
+    "app.ui.shell.dialogs.shortcuts",
+)
 """Imported after the first paint, though nobody has asked for them yet."""
 
 _log = logging.getLogger(__name__)
@@ -63,7 +69,7 @@ def make_application() -> QApplication:
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
-    turns.shorten()
+    interpreter.shorten()
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontShowIconsInMenus)
     application = Application(sys.argv[:1])
@@ -146,16 +152,16 @@ def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
 def run(options: Options) -> int:
     """Show the window until it is closed; the exit code is 0 when that was in order, 2 when none can open."""
     bring_here()
-    meeting_place = single_window.place(home())
+    meeting_place = single_instance.place(home())
     turn = Turn(home() / "starting")
-    if not options.alone and single_window.found(meeting_place, Asked(options.files, options.demo), turn):
+    if not options.alone and single_instance.found(meeting_place, Asked(options.files, options.demo), turn):
         return 0
     refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:
         sys.stderr.write(f"nep-studio: {refused}\n")
         return 2
-    log = messages.listen()
-    messages.quiet_chromium(os.environ)
+    log = qt_log.listen()
+    qt_log.quiet_chromium(os.environ)
     application = make_application()
     session = Session()
     window, commands = make_window(session, options)
@@ -171,7 +177,7 @@ def run(options: Options) -> int:
     window.activateWindow()  # keys go there at once, also where no window manager sees to it
     first = first_steps(window, commands, options)
     if not options.alone:
-        first.append(lambda: single_window.Meeting(meeting_place, commands.do_asked, window))
+        first.append(lambda: single_instance.Meeting(meeting_place, commands.do_asked, window))
         first.append(turn.leave)
     soon.put_first(first)
     IncomingFiles(window, commands.files.open_all)

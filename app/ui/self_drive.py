@@ -14,8 +14,8 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
-from app.ui.commands import Commands
-from app.ui.main_window import FIRST_SIZE, MainWindow
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import FIRST_SIZE, MainWindow
 
 LOOK_MS = 100
 SETTLE_S = 0.6

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from app.ui.blockly_view import BlocklyView, register_scheme
+from app.ui.blockly.view import BlocklyView, register_scheme
 from tests.ui.blockly_person import DEFINITIONS, WAIT_MS, Person, editor, workspace
 
 register_scheme()

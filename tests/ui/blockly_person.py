@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from app import resources
-from app.ui.blockly_view import BlocklyView
+from app.ui.blockly.view import BlocklyView
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "blockly"
 DEFINITIONS = json.loads((DATA / "definitions.json").read_text("utf-8"))

@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.theme import Theme
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui import fonts
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
-from app.ui.theme import Theme
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme import fonts
+from app.ui.theme.theme import Theme
 from tests.ui.shell_parts import PANELS, Answers, free_address
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.start_page import Example
+from app.ui.shell.start_page.page import Example
 
 NAMES = {
     "behaviour": ("Behaviour", ()),

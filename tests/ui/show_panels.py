@@ -11,26 +11,19 @@ from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEventLoop, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
-from app.ui import fonts
-from app.ui.blockly_scheme import register_scheme
-from app.ui.docks import Dock
-from app.ui.panels import (
-    alerts,
-    behaviour,
-    camera,
-    console,
-    health,
-    image,
-    inspector,
-    nodes,
-    problems,
-    robot,
-    robots,
-    sensors,
-    topics,
-)
+from app.ui.blockly.scheme import register_scheme
+from app.ui.panels import alerts, camera, health, problems, robot, sensors
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.theme import Theme
+from app.ui.panels.behaviour import panel as behaviour
+from app.ui.panels.console import panel as console
+from app.ui.panels.image import panel as image
+from app.ui.panels.inspector import panel as inspector
+from app.ui.panels.nodes import panel as nodes
+from app.ui.panels.robots import panel as robots
+from app.ui.panels.topics import panel as topics
+from app.ui.shell.docking.dock import Dock
+from app.ui.theme import fonts
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
 
 SIZES: dict[str, tuple[Panel, int, int, str]] = {

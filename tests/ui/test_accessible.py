@@ -11,13 +11,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.run.view import RunView
-from app.ui.commands import Commands
-from app.ui.docks import Dock
-from app.ui.main_window import MainWindow
-from app.ui.overlay import Overlay
 from app.ui.panels.base import PanelContext
-from app.ui.run_bar import RunBar
-from app.ui.theme import Theme
+from app.ui.shell.bars.run_bar import RunBar
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session as FakeSession
 from tests.ui.show_panels import SIZES, prepare
 

@@ -10,9 +10,9 @@ from PySide6.QtTest import QTest
 
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action, Field
-from app.ui.action_card import ActionCard
-from app.ui.theme import Theme
-from app.ui.try_words import field_words, progress_of
+from app.ui.panels.robots.action_card import ActionCard
+from app.ui.panels.robots.tries import field_words, progress_of
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import Invocation
 
 MOVE = Action(

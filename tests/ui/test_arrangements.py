@@ -9,10 +9,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.core.session import Session
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
-from app.ui.name_sheet import NameSheet
-from app.ui.theme import Theme
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.name import NameSheet
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
 from tests.ui.shell_parts import PANELS, Answers
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

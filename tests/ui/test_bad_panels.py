@@ -15,10 +15,10 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.docks import Dock
-from app.ui.main_window import MainWindow
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.theme import Theme
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
 from tests.ui.shell_parts import PANELS, PlainPanel, free_address
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

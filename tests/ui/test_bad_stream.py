@@ -15,9 +15,9 @@ from PySide6.QtWidgets import QApplication
 import nep
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
 from app.ui.panels.alerts import PANEL, AlertsPanel
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
 from nep.masters.master import Master
 from tests.ui.shell_parts import PANELS
 

@@ -8,9 +8,9 @@ from PySide6.QtGui import QCursor, QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.ui.banner_room import FRESH_S
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
+from app.ui.shell.bars.banner_place import FRESH_S
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

@@ -8,9 +8,9 @@ from PySide6.QtGui import QContextMenuEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from app.ui.behaviour_tab import TabFacts
-from app.ui.behaviour_tabs import BehaviourTabs
-from app.ui.theme import Theme
+from app.ui.panels.behaviour.tab import TabFacts
+from app.ui.panels.behaviour.tabs import BehaviourTabs
+from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 
 A, B, C = (TabFacts(key, name) for key, name in (("a", "Greeting"), ("b", "Tour guide"), ("c", "Quiz")))

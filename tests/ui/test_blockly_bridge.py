@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 
-from app.ui.blockly_bridge import BlocklyBridge
+from app.ui.blockly.bridge import BlocklyBridge
 
 
 def test_tells_the_page_in_json(qtbot):

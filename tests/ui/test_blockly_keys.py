@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QMainWindow
 
 from app.blocks import editor_definitions
 from app.blocks.compiler.compiler import compile_behaviour
-from app.ui.blockly_view import BlocklyView
+from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, list_of, number, robot, started, workspace
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 

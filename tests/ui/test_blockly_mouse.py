@@ -8,7 +8,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMainWindow
 
-from app.ui.blockly_view import BlocklyView
+from app.ui.blockly.view import BlocklyView
 from tests.ui.blockly_person import DEFINITIONS, START, WAIT_MS, Person, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]

@@ -5,8 +5,8 @@ from PySide6.QtCore import QByteArray
 from PySide6.QtWebEngineCore import QWebEngineUrlScheme
 
 from app import resources
-from app.ui import blockly_scheme
-from app.ui.blockly_scheme import content, register_scheme
+from app.ui.blockly import scheme as blockly_scheme
+from app.ui.blockly.scheme import content, register_scheme
 
 register_scheme()
 

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.blocks import editor_definitions
 from app.blocks.compiler.compiler import compile_behaviour
-from app.ui.blockly_view import BlocklyView
+from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import (
     block,
     call,

@@ -9,7 +9,7 @@ import signal
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.ui.blockly_tabs import EMPTY, Tabs
+from app.ui.blockly.tabs import EMPTY, Tabs
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]

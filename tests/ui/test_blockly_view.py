@@ -14,7 +14,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 
-from app.ui.blockly_view import BlocklyView
+from app.ui.blockly.view import BlocklyView
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, Person, outlined, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
@@ -186,7 +186,7 @@ def test_blockly_speaks_the_language_or_english(qtbot, language, words):
 ENDING = """
 import sys
 from PySide6.QtWidgets import QApplication
-from app.ui.blockly_view import BlocklyView, register_scheme
+from app.ui.blockly.view import BlocklyView, register_scheme
 
 register_scheme()
 application = QApplication([])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QWidget
 
-from app.ui.blocks_wait import PATIENCE_S, BlocksWait
+from app.ui.panels.behaviour.blocks_wait import PATIENCE_S, BlocksWait
 
 
 def test_words_come_late_and_go_with_the_page(qtbot) -> None:

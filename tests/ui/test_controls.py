@@ -18,14 +18,14 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from app.robots.description.inputs import Choice as Option
 from app.robots.description.inputs import Parameter, parameter_of
 from app.robots.description.model import Action
-from app.ui.angle_dial import AngleDial
-from app.ui.control_colour import ColourChoice, HueStrip
-from app.ui.control_picture import PictureChoice
-from app.ui.forms import ActionForm
-from app.ui.long_text import LEAST_HEIGHT, LongText
-from app.ui.picture_file import FILES, MOST_FILE_BYTES, encoded, read_picture
-from app.ui.theme import Theme
+from app.ui.panels.robots.controls.angle import AngleDial
+from app.ui.panels.robots.controls.colour import ColourChoice, HueStrip
+from app.ui.panels.robots.controls.picture import PictureChoice
+from app.ui.panels.robots.controls.picture_file import FILES, MOST_FILE_BYTES, encoded, read_picture
+from app.ui.panels.robots.form import ActionForm
+from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
+from app.ui.widgets.long_text import LEAST_HEIGHT, LongText
 from app.ui.widgets.menus import Menu
 from tests.nep.bad_pictures import BOMBS, chunk, exif, segment
 from tests.ui import fakes
@@ -347,7 +347,9 @@ def test_a_photo_stands_upright_whichever_way_the_camera_was_held(qapp, tmp_path
 
 def test_the_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     dropped: list[Menu] = []
-    monkeypatch.setattr("app.ui.control_picture.drop_below", lambda menu, _below: dropped.append(menu))
+    monkeypatch.setattr(
+        "app.ui.panels.robots.controls.picture.drop_below", lambda menu, _below: dropped.append(menu)
+    )
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=Cameras())
     choice = child(form, PictureChoice)
     QTest.mouseClick(choice.camera, Qt.MouseButton.LeftButton)

@@ -7,11 +7,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu, QPushButton, QWidget
 
-from app.ui import menu_lists
-from app.ui.commands import Commands
-from app.ui.developer_tools import DeveloperTools
-from app.ui.main_window import MainWindow
-from app.ui.reasons import why_not
+from app.ui.shell.commands import menus
+from app.ui.shell.commands.availability import why_not
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.commands.layout_tools import DeveloperTools
+from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -63,7 +63,7 @@ def test_where_nothing_is_live_nothing_freezes(tools, window) -> None:
 def dropped(monkeypatch: pytest.MonkeyPatch) -> list[tuple[QMenu, QWidget]]:
     """The menus that were opened, each with the button that it is below."""
     seen: list[tuple[QMenu, QWidget]] = []
-    monkeypatch.setattr(menu_lists, "drop_below", lambda menu, anchor: seen.append((menu, anchor)))
+    monkeypatch.setattr(menus, "drop_below", lambda menu, anchor: seen.append((menu, anchor)))
     return seen
 
 

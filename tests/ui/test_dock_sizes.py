@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from app.ui.commands import Commands
-from app.ui.dock_sizes import shares
-from app.ui.main_window import MainWindow
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.docking.sizes import shares
+from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

@@ -12,13 +12,13 @@ from PySide6.QtTest import QTest
 
 from app.core.documents.diff import Difference
 from app.core.documents.versions import keep_earlier
-from app.ui.commands import Commands
-from app.ui.dates import when_words
-from app.ui.earlier_sheet import EarlierSheet, difference_words
-from app.ui.entry_list import Heading
-from app.ui.main_window import MainWindow
-from app.ui.palette_match import Found
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.version_history import EarlierSheet, difference_words
+from app.ui.shell.main_window import MainWindow
+from app.ui.text.dates import when_words
 from app.ui.widgets import Button
+from app.ui.widgets.lists.entry_list import Heading
+from app.ui.widgets.lists.fuzzy import Found
 from tests.ui.test_files_ui import BLOCKS, changed, saved
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

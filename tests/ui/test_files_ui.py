@@ -8,8 +8,8 @@ import pytest
 
 from app.core.documents.document import Document
 from app.core.documents.versions import free_path
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
 from tests.ui.shell_parts import Answers
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

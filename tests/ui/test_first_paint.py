@@ -18,10 +18,10 @@ from pytestqt.qtbot import QtBot
 from app.core.documents.journal import Journal
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui import fonts
 from app.ui.application import Options, make_application, make_window
-from app.ui.first_paint import AfterFirstPaint
-from app.ui.panel_shelf import PanelShelf
+from app.ui.panels.registry import PanelShelf
+from app.ui.startup.deferred import AfterFirstPaint
+from app.ui.theme import fonts
 from tests.ui.shell_parts import free_address
 
 ROOT = Path(__file__).parents[2]
@@ -105,7 +105,7 @@ def test_the_steps_find_every_panel() -> None:
 def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
     """What the first paint needs: a line more here is time that every start takes."""
     late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.doctor"]
-    late += ["app.ui.blockly_view", "app.ui.panels.console", "importlib.metadata"]
+    late += ["app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
     program = (
         "import sys\n"
         "from app.ui import application\n"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QSize
 
-from app.ui.main_window import FIRST_SIZE
-from app.ui.window_state import FRAME, fitting
+from app.ui.shell.main_window import FIRST_SIZE
+from app.ui.shell.window_state import FRAME, fitting
 
 
 def test_a_large_screen_has_the_design_s_size() -> None:

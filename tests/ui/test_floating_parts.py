@@ -9,13 +9,13 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
-from app.ui.banner import BannerPlace
-from app.ui.focus_ring import FocusRing
-from app.ui.popup import Sheet
-from app.ui.theme import Theme
-from app.ui.toast import Toast
+from app.ui.shell.bars.banner import BannerPlace
+from app.ui.shell.bars.toast import Toast
+from app.ui.shell.dialogs.sheet import Sheet
+from app.ui.shell.focus_ring import FocusRing
+from app.ui.text.numbers import spoken_key
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
-from app.ui.words import spoken_key
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

@@ -11,7 +11,7 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QLabel, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
 import app.ui
-from app.ui.focus_chain import following, proxy_of, tab_stops
+from app.ui.widgets.focus_chain import following, proxy_of, tab_stops
 
 ASKS = re.compile(r"\.(nextInFocusChain|previousInFocusChain|focusProxy|buddy)\(\)")
 

@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QLabel, QLineEdit
 from app.robots.description.inputs import Choice as Option
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action
-from app.ui.controls import control_for
-from app.ui.forms import ActionForm
-from app.ui.theme import Theme
+from app.ui.panels.robots.controls.chooser import control_for
+from app.ui.panels.robots.form import ActionForm
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Choice, ColourSwatches, Segments, SliderWithUnit, Switch
 from tests.ui.fakes import ACTIONS
 

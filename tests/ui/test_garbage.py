@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from PySide6.QtCore import QObject
 
-from app.ui import garbage
+from app.ui.startup import garbage
 
 
 @pytest.fixture(autouse=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.ui.main_window import MainWindow
+from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from app.ui.hex_view import HexView, hex_line
-from app.ui.theme import Theme
+from app.ui.panels.inspector.hex_view import HexView, hex_line
+from app.ui.theme.theme import Theme
 
 
 def test_a_line_has_its_offset_its_bytes_and_what_can_be_read_of_them() -> None:

@@ -14,14 +14,14 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
-from app.ui.docks import RESTS_AFTER_S, Dock, on_screen
-from app.ui.main_window import TICK_MS, MainWindow
-from app.ui.panel_shelf import PanelShelf
 from app.ui.panels.camera import CameraPanel
-from app.ui.panels.image import ImagePanel
-from app.ui.panels.inspector import InspectorPanel
+from app.ui.panels.image.panel import ImagePanel
+from app.ui.panels.inspector.panel import InspectorPanel
+from app.ui.panels.registry import PanelShelf
 from app.ui.panels.robot import RobotPanel
-from app.ui.theme import Theme
+from app.ui.shell.docking.dock import RESTS_AFTER_S, Dock, on_screen
+from app.ui.shell.main_window import TICK_MS, MainWindow
+from app.ui.theme.theme import Theme
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 from tests.ui.shell_parts import PANELS

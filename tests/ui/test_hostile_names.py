@@ -14,12 +14,12 @@ from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QAbstractItemView, QLabel, QMenu, QWidget
 
 import app.ui
-from app.ui import plain
-from app.ui.banner import BannerPlace
-from app.ui.docks import Dock
-from app.ui.panel_shelf import PanelShelf
 from app.ui.panels.base import PanelWidget
-from app.ui.theme import Theme
+from app.ui.panels.registry import PanelShelf
+from app.ui.shell.bars.banner import BannerPlace
+from app.ui.shell.docking.dock import Dock
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session, pepper
 from tests.ui.panel_case import Window, ticks
 

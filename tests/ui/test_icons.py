@@ -16,10 +16,11 @@ from app import resources
 from app.blocks import Problem
 from app.blocks.toolbox.catalogue import Catalogue
 from app.core.documents.problems import Listed
-from app.ui import icons, theme_tokens
-from app.ui.actions import TABLE
 from app.ui.panels.problems import ProblemRow
-from app.ui.theme import Theme
+from app.ui.shell.actions.table import TABLE
+from app.ui.theme import icons
+from app.ui.theme import tokens as theme_tokens
+from app.ui.theme.theme import Theme
 from tests.blocks.samples import robot
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

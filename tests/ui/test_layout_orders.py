@@ -8,12 +8,12 @@ import pytest
 from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QStackedWidget
 
-from app.ui.docks import Dock
-from app.ui.focus_chain import tab_stops
-from app.ui.layouts import LAYOUTS
-from app.ui.panel_shelf import PanelShelf
 from app.ui.panels.base import Panel, PanelWidget
-from app.ui.workbench import Workbench
+from app.ui.panels.registry import PanelShelf
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.docking.layouts import LAYOUTS
+from app.ui.shell.docking.workbench import Workbench
+from app.ui.widgets.focus_chain import tab_stops
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 

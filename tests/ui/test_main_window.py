@@ -17,14 +17,14 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
-from app.ui.actions import TABLE, shortcuts
 from app.ui.application import Options, first_steps
-from app.ui.coming import Coming
-from app.ui.commands import Commands
-from app.ui.file_dialogs import SystemDialogs
-from app.ui.main_window import MainWindow
-from app.ui.theme import Theme
+from app.ui.shell.actions.table import TABLE, shortcuts
+from app.ui.shell.coming import Coming
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
+from app.ui.widgets.file_dialogs import SystemDialogs
 from tests.ui.shell_parts import PANELS, PlainPanel, free_address
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

@@ -8,7 +8,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
-from app.ui.theme import Theme
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Choice
 from app.ui.widgets.menus import EditMenu, Menu, round_region
 

@@ -15,7 +15,7 @@ import pytest
 from PySide6.QtCore import QMessageLogContext, QtMsgType
 
 from app.core.faults import IN_CONSOLE, LogFile
-from app.ui.messages import FLAGS, Log, Terminal, on_qt_message, quiet_chromium
+from app.ui.startup.qt_log import FLAGS, Log, Terminal, on_qt_message, quiet_chromium
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ WINDOWED = """
 import json, sys, threading
 sys.stdout = sys.stderr = None
 from PySide6.QtCore import qWarning
-from app.ui.messages import listen
+from app.ui.startup.qt_log import listen
 log = listen()
 def fail():
     raise ValueError("in a thread")

@@ -14,8 +14,8 @@ from app.core.robots.motion_permission import Moving
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
-from app.ui.move_question import MoveQuestion
-from app.ui.theme import Theme
+from app.ui.shell.dialogs.motion_permission import MoveQuestion
+from app.ui.theme.theme import Theme
 from tests.ui.clipping import clipped
 
 ROVER: Robot = replace(parse(td_for(ROBOT.thing_model, "Rover")), virtual=False)

@@ -15,14 +15,14 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
-from app.ui.commands import Commands
-from app.ui.docks import Dock
-from app.ui.main_window import MainWindow
-from app.ui.overlay import Overlay
-from app.ui.panel_shelf import PanelShelf
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour import BehaviourPanel
-from app.ui.theme import Theme
+from app.ui.panels.behaviour.panel import BehaviourPanel
+from app.ui.panels.registry import PanelShelf
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
 from tests.ui.shell_parts import Answers, free_address
 from tests.ui.test_panel_behaviour import Editor
 

@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app.core.alerts import Alerts
 from app.core.network.remote_access import Reach, words_of
 from app.core.storage.settings import Settings
-from app.ui.others_sheet import OthersSheet
-from app.ui.theme import Theme
+from app.ui.shell.dialogs.network_access import OthersSheet
+from app.ui.theme.theme import Theme
 from nep.protocol.graph_view import GraphView
 from nep.system.interfaces import OwnAddress
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.ui.commands import PACES, Commands
-from app.ui.main_window import MainWindow
+from app.ui.shell.commands.commands import PACES, Commands
+from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

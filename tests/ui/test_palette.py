@@ -13,12 +13,12 @@ from PySide6.QtWidgets import QApplication
 from app.core.documents.document import Document
 from app.core.network.topics import Topic
 from app.core.storage.settings import RecentFile
-from app.ui.commands import Commands
-from app.ui.entry_list import Heading
-from app.ui.main_window import MainWindow
-from app.ui.palette import Palette
-from app.ui.palette_match import Entry, Finder, Found, match
-from app.ui.start_page import Example
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.main_window import MainWindow
+from app.ui.shell.start_page.page import Example
+from app.ui.widgets.lists.entry_list import Heading
+from app.ui.widgets.lists.fuzzy import Entry, Finder, Found, match
 from tests.ui.shell_parts import PlainPanel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

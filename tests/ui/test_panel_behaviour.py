@@ -8,9 +8,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour import BehaviourPanel
-from app.ui.program_view import ProgramView
-from app.ui.theme import Theme
+from app.ui.panels.behaviour.panel import BehaviourPanel
+from app.ui.panels.behaviour.program_view import ProgramView
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import PROGRAM, RobotLink, Session, pepper
 from tests.ui.panel_case import Window, button, press, ticks
 

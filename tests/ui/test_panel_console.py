@@ -8,8 +8,8 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy
 
 from app.core.console import Console
-from app.ui.console_list import MESSAGE, LineDelegate, first_line, tip_of
-from app.ui.panels.console import PANEL, ConsolePanel
+from app.ui.panels.console.list import MESSAGE, LineDelegate, first_line, tip_of
+from app.ui.panels.console.panel import PANEL, ConsolePanel
 from app.ui.widgets import paint
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE

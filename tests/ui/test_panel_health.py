@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
 from app.ui.panels.health import PANEL, HealthPanel
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
 from tests.ui.fakes import RobotLink, Session, pepper
 from tests.ui.panel_case import Window, press
 

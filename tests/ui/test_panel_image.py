@@ -13,14 +13,14 @@ from PySide6.QtTest import QTest
 
 from app.ui.panels.camera import PANEL as CAMERA
 from app.ui.panels.camera import CameraPanel
-from app.ui.panels.image import PANEL, ImagePanel
-from app.ui.picture_actions import ROWS
-from app.ui.picture_boxes import boxes_of
-from app.ui.picture_place import PicturePlace
-from app.ui.picture_view import PictureView, pixel_words, rate_sentence
-from app.ui.picture_zoom import ZoomablePicture
-from app.ui.snapshot_job import SnapshotJob
-from app.ui.theme import Theme
+from app.ui.panels.image.actions import ROWS
+from app.ui.panels.image.panel import PANEL, ImagePanel
+from app.ui.panels.image.snapshot import SnapshotJob
+from app.ui.pictures.boxes import boxes_of
+from app.ui.pictures.placement import PicturePlace
+from app.ui.pictures.view import PictureView, pixel_words, rate_sentence
+from app.ui.pictures.zoom import ZoomablePicture
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import ImageStream, Picture, RobotLink, Session, Topic, pepper, picture
 from tests.ui.panel_case import Window
 

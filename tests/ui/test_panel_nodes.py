@@ -7,9 +7,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.core.network.nodes import NodeEntry, Nodes
-from app.ui.node_rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
-from app.ui.panels.nodes import PANEL, NodesPanel
-from app.ui.table import CELL_ROLE
+from app.ui.panels.nodes.panel import PANEL, NodesPanel
+from app.ui.panels.nodes.rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
+from app.ui.widgets.table.model import CELL_ROLE
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks

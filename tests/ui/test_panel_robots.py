@@ -10,10 +10,10 @@ from PySide6.QtTest import QTest
 
 from app.core.robots.known import KEY
 from app.robots.description.model import Field
-from app.ui.long_text import LongText
-from app.ui.panels.robots import PANEL, RobotsPanel
-from app.ui.robot_list import seen_words
-from app.ui.try_words import feedback_words, progress_of
+from app.ui.panels.robots.list import seen_words
+from app.ui.panels.robots.panel import PANEL, RobotsPanel
+from app.ui.panels.robots.tries import feedback_words, progress_of
+from app.ui.widgets.long_text import LongText
 from tests.ui.fakes import ACTIONS, Invocation, RobotLink, Session, pepper
 from tests.ui.panel_case import Window, button, press
 

@@ -6,7 +6,7 @@ from app.robots.description.inputs import Choice
 from app.robots.description.model import Field, Sensor
 from app.ui.panels import sensors
 from app.ui.panels.sensors import PANEL, SensorsPanel
-from app.ui.sensor_words import Reading, number_words, reading_of
+from app.ui.text.sensor_values import Reading, number_words, reading_of
 from tests.ui.fakes import RobotLink, Session, pepper
 from tests.ui.panel_case import Window
 

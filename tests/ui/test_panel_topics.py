@@ -4,9 +4,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QSignalSpy, QTest
 
-from app.ui.panels.topics import PANEL, TopicsPanel
-from app.ui.table import CELL_ROLE
-from app.ui.topic_columns import age_cell, curve_cell, loss_cell, name_cell, nodes_cell, type_cell
+from app.ui.panels.topics.columns import age_cell, curve_cell, loss_cell, name_cell, nodes_cell, type_cell
+from app.ui.panels.topics.panel import PANEL, TopicsPanel
+from app.ui.widgets.table.model import CELL_ROLE
 from tests.ui.fakes import Session, Topic
 from tests.ui.panel_case import Window, button, press, ticks
 

@@ -5,20 +5,26 @@ from __future__ import annotations
 import ast
 import importlib
 import pkgutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 
 import app.ui.panels
-from app.ui import icons
-from app.ui.panels import behaviour
+import app.ui.panels.behaviour
 from app.ui.panels.base import Panel
+from app.ui.panels.behaviour import panel as behaviour
+from app.ui.theme import icons
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, ticks
 from tests.ui.test_panel_behaviour import Editor
 
-BASES = {"base", "table_panel"}  # what panels derive from; no panels themselves
+BASES = {
+    "base",
+    "registry",
+    "table_panel",
+}  # no panels themselves
 NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES)
 
 
@@ -26,7 +32,7 @@ NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__p
 def without_web(monkeypatch) -> None:
     """The block editor has tests of its own."""
     made = lambda context: behaviour.BehaviourPanel(context, Editor)  # noqa: E731
-    monkeypatch.setattr(behaviour, "PANEL", Panel("behaviour", "Behaviour", "blocks", (), made))
+    monkeypatch.setattr(app.ui.panels.behaviour, "PANEL", Panel("behaviour", "Behaviour", "blocks", (), made))
 
 
 def description(name: str) -> Panel:
@@ -102,11 +108,20 @@ def test_a_panel_with_nothing_says_what_to_do_next(qtbot, qapp, name) -> None:
     assert len(said.split()) >= 5
 
 
-def test_panels_do_not_import_panels() -> None:
-    for path in Path(app.ui.panels.__path__[0]).glob("*.py"):
+def imported_panels(folder: Path) -> Iterator[tuple[str, str]]:
+    """Of each panel, a file or a folder, which other modules beside it it imports."""
+    for path in folder.rglob("*.py"):
+        own = path.relative_to(folder).with_suffix("").parts[0]
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("app.ui.panels"):
-                assert node.module in {f"app.ui.panels.{base}" for base in BASES}, path.name
+                other = (node.module or "").removeprefix("app.ui.panels").strip(".").partition(".")[0]
+                yield from ((own, each or alias.name) for alias in node.names for each in [other])
+
+
+def test_panels_do_not_import_panels() -> None:
+    found = list(imported_panels(Path(app.ui.panels.__path__[0])))
+    assert ("inspector", "inspector") in found, "panels that are folders are read, too"
+    assert [(own, other) for own, other in found if other not in {own, *BASES}] == []
 
 
 @pytest.mark.parametrize("name", sorted(BASES))

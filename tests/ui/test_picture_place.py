@@ -7,7 +7,7 @@ import itertools
 import pytest
 from PySide6.QtCore import QPointF, QRectF, QSizeF
 
-from app.ui.picture_place import LARGEST, PicturePlace
+from app.ui.pictures.placement import LARGEST, PicturePlace
 
 VIEW, PICTURE = QSizeF(400, 300), QSizeF(800, 400)
 

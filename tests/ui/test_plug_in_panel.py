@@ -12,10 +12,10 @@ import pytest
 from PySide6.QtWidgets import QMenu, QMenuBar
 
 from app.core.session import Session
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
-from app.ui.panel_shelf import PanelShelf
-from app.ui.theme import Theme
+from app.ui.panels.registry import PanelShelf
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
 from tests.ui.shell_parts import PANELS, Answers
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

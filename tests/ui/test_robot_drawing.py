@@ -6,10 +6,10 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from app.ui.robot_drawing import PREVIEW, RobotDrawing
-from app.ui.robot_face import EMOTIONS
-from app.ui.robot_room import Stage
-from app.ui.robot_state import RobotState, Room, Thing
+from app.ui.robot_drawing.pepper_face import EMOTIONS
+from app.ui.robot_drawing.room import Stage
+from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
+from app.ui.robot_drawing.state import RobotState, Room, Thing
 from tests.ui.fakes import drawing
 
 AREA = QRectF(0, 0, 382, 286)

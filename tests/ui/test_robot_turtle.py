@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from app.ui.robot_drawing import RobotDrawing
-from app.ui.robot_state import RobotState
+from app.ui.robot_drawing.scene import RobotDrawing
+from app.ui.robot_drawing.state import RobotState
 
 AREA = QRectF(0, 0, 382, 286)
 

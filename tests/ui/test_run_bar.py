@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.core.run.view import RunView
-from app.ui.run_bar import RunBar, ToolBar
-from app.ui.theme import Theme
+from app.ui.shell.bars.run_bar import RunBar, ToolBar
+from app.ui.theme.theme import Theme
 from app.ui.widgets import StopButton, paint
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

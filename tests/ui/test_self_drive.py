@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from PySide6.QtGui import QImage
 
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
 from app.ui.self_drive import SelfDrive, Step
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

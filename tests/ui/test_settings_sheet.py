@@ -10,12 +10,12 @@ from PySide6.QtTest import QTest
 
 from app.core.messages import snapshots
 from app.core.storage.settings import RecentFile, Settings
-from app.ui.commands import Commands
-from app.ui.main_window import MainWindow
-from app.ui.settings_sheet import SettingsSheet
-from app.ui.shortcut_sheet import ShortcutSheet
-from app.ui.theme import Theme
-from app.ui.window_state import WindowState
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.settings import SettingsSheet
+from app.ui.shell.dialogs.shortcuts import ShortcutSheet
+from app.ui.shell.main_window import MainWindow
+from app.ui.shell.window_state import WindowState
+from app.ui.theme.theme import Theme
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

@@ -11,21 +11,21 @@ from PySide6.QtTest import QTest
 
 from app.core.storage.settings import Settings
 from app.robots.description.description import Parameter
-from app.ui.actions import TABLE
-from app.ui.app_bar import AppBar
-from app.ui.commands import Commands
-from app.ui.console_list import FindWords
-from app.ui.control_number import OpenNumber
-from app.ui.entry_list import Heading
-from app.ui.filter_field import FilterField
-from app.ui.layouts import LAYOUTS
-from app.ui.main_window import MainWindow
-from app.ui.palette import Palette
-from app.ui.palette_match import Found
-from app.ui.shortcut_sheet import ShortcutSheet
-from app.ui.shortcuts import FIXED, Shortcuts
-from app.ui.theme import Theme
-from app.ui.words import spoken_key, tip_with_key
+from app.ui.panels.console.list import FindWords
+from app.ui.panels.robots.controls.number import OpenNumber
+from app.ui.shell.actions.shortcuts import FIXED, Shortcuts
+from app.ui.shell.actions.table import TABLE
+from app.ui.shell.bars.app_bar import AppBar
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.dialogs.shortcuts import ShortcutSheet
+from app.ui.shell.docking.layouts import LAYOUTS
+from app.ui.shell.main_window import MainWindow
+from app.ui.text.numbers import spoken_key, tip_with_key
+from app.ui.theme.theme import Theme
+from app.ui.widgets.fields import FilterField
+from app.ui.widgets.lists.entry_list import Heading
+from app.ui.widgets.lists.fuzzy import Found
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 CTRL = Qt.KeyboardModifier.ControlModifier

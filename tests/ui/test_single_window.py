@@ -16,14 +16,14 @@ from PySide6.QtNetwork import QLocalSocket
 from PySide6.QtWidgets import QApplication
 
 from app.core.storage.file_lock import Turn
-from app.ui import single_window
-from app.ui.single_window import Asked, Meeting, found, hand_over, is_ours, parse, peer_of, place
+from app.ui.startup import single_instance
+from app.ui.startup.single_instance import Asked, Meeting, found, hand_over, is_ours, parse, peer_of, place
 
 WAIT_MS = 30_000
 SECOND = """
 import sys
 from pathlib import Path
-from app.ui.single_window import Asked, hand_over
+from app.ui.startup.single_instance import Asked, hand_over
 files = tuple(Path(each) for each in sys.argv[2:])
 sys.exit(0 if hand_over(sys.argv[1], Asked(files)) else 3)
 """
@@ -64,7 +64,7 @@ STARTING = """
 import sys
 from pathlib import Path
 from app.core.storage.file_lock import Turn
-from app.ui.single_window import Asked, found
+from app.ui.startup.single_instance import Asked, found
 print("begun", flush=True)
 turn = Turn(Path(sys.argv[2]))
 there = found(sys.argv[1], Asked((Path("a.nepb"),)), turn, 60.0)
@@ -125,7 +125,7 @@ def test_the_second_window_does_not_take_the_place_of_the_first(qtbot, name: str
 
 @pytest.mark.skipif(os.name != "posix", reason="a named pipe goes with its process")
 def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
-    code = "import sys; from app.ui.single_window import *; m = Meeting(sys.argv[1], print); "
+    code = "import sys; from app.ui.startup.single_instance import *; m = Meeting(sys.argv[1], print); "
     code += "print(m.open, flush=True); sys.stdin.read()"
     environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen(
@@ -231,7 +231,7 @@ def test_another_user_at_the_other_end_is_not_served(
 ) -> None:
     asked: list[Asked] = []
     meeting = meet(name, asked.append)
-    monkeypatch.setattr(single_window, "peer_of", lambda _descriptor: os.geteuid() + 1)
+    monkeypatch.setattr(single_instance, "peer_of", lambda _descriptor: os.geteuid() + 1)
     assert hand_over(name, Asked()) is False
     socket = QLocalSocket()
     socket.connectToServer(name)
@@ -253,7 +253,7 @@ def test_the_system_tells_who_is_at_the_other_end(tmp_path: Path) -> None:
 
 @needs_modes
 def test_one_that_never_answers_does_not_hold_a_start_up(qtbot, name: str, monkeypatch) -> None:
-    monkeypatch.setattr(single_window, "ANSWER_MS", 50)
+    monkeypatch.setattr(single_instance, "ANSWER_MS", 50)
     code = "import socket, sys\ns = socket.socket(socket.AF_UNIX)\ns.bind(sys.argv[1])\ns.listen()\n"
     code += "print('up', flush=True)\nc, _ = s.accept()\nsys.stdin.read()\n"
     process = subprocess.Popen(

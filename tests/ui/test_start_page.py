@@ -13,13 +13,13 @@ from PySide6.QtWidgets import QLabel
 
 from app import resources
 from app.core.storage.settings import RecentFile
-from app.ui.dates import day_words
-from app.ui.miniature import Row, category_of, rows
-from app.ui.start_page import StartPage, read_examples
-from app.ui.start_parts import CardTitle
-from app.ui.theme import Theme
+from app.ui.shell.start_page.cards import CardTitle
+from app.ui.shell.start_page.page import StartPage, read_examples
+from app.ui.shell.start_page.preview import Row, category_of, rows
+from app.ui.text.dates import day_words
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
-from app.ui.widgets.button import LinkButton
+from app.ui.widgets.buttons import LinkButton
 from tests.ui.shell_parts import examples
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

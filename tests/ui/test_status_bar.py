@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.ui.robots_chip import robots_chip
-from app.ui.status_bar import Facts, StatusBar
-from app.ui.theme import Theme
+from app.ui.shell.bars.robots_chip import robots_chip
+from app.ui.shell.bars.status_bar import Facts, StatusBar
+from app.ui.theme.theme import Theme
 from tests.ui import fakes
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

@@ -14,11 +14,11 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QMenu
 
 import app.ui
 from app.robots.description.inputs import Parameter
-from app.ui.commands import Commands
-from app.ui.control_picture import NoPictures, PictureChoice
-from app.ui.main_window import MainWindow
-from app.ui.theme import Theme
-from app.ui.widgets.choices import Choice
+from app.ui.panels.robots.controls.picture import NoPictures, PictureChoice
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
+from app.ui.widgets.inputs.choice import Choice
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)

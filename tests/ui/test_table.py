@@ -8,11 +8,11 @@ from PySide6.QtGui import QImage, QPainter, QPaintEvent, QRegion
 from PySide6.QtTest import QSignalSpy, QTest
 from PySide6.QtWidgets import QTableView
 
-from app.ui.table import CELL_ROLE, Cell, Column, Order, TableModel
-from app.ui.table_cells import REMEMBERED
-from app.ui.table_columns import ColumnChoice
-from app.ui.table_view import TableView
-from app.ui.theme import Theme
+from app.ui.theme.theme import Theme
+from app.ui.widgets.table.cells import REMEMBERED
+from app.ui.widgets.table.columns import ColumnChoice
+from app.ui.widgets.table.model import CELL_ROLE, Cell, Column, Order, TableModel
+from app.ui.widgets.table.view import TableView
 
 
 @dataclass

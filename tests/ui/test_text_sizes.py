@@ -11,15 +11,15 @@ from PySide6.QtCore import QPoint, QRect
 from app import resources
 from app.core.run.view import RunView
 from app.core.session import Session
-from app.ui.commands import Commands
-from app.ui.docks import Dock
-from app.ui.main_window import MainWindow
-from app.ui.overlay import Overlay
-from app.ui.panels import robots
 from app.ui.panels.base import PanelContext
-from app.ui.start_page import read_examples
-from app.ui.status_bar import StatusBar
-from app.ui.theme import Theme
+from app.ui.panels.robots import panel as robots
+from app.ui.shell.bars.status_bar import StatusBar
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.main_window import MainWindow
+from app.ui.shell.start_page.page import read_examples
+from app.ui.theme.theme import Theme
 from app.ui.widgets import StatusItem, StopButton
 from tests.ui.clipping import clipped, lengthen, sideways
 from tests.ui.fakes import Session as FakeSession

@@ -10,8 +10,8 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QFontInfo, QPalette
 from PySide6.QtWidgets import QApplication, QLabel
 
-from app.ui import fonts
-from app.ui.theme import Theme, qt_colour
+from app.ui.theme import fonts
+from app.ui.theme.theme import Theme, qt_colour
 from app.ui.widgets import label
 from tests.ui.test_tokens import RAW, contrast
 

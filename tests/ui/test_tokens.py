@@ -7,9 +7,9 @@ import math
 
 import pytest
 
-from app.ui import theme_tokens
+from app.ui.theme import tokens
 
-TOKENS = theme_tokens.load()
+TOKENS = tokens.load()
 RAW = TOKENS.raw
 # Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB
 SEEN = {

@@ -4,10 +4,10 @@ import pytest
 from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtTest import QSignalSpy, QTest
 
-from app.ui.theme import Theme
-from app.ui.tree import TreeModel
-from app.ui.tree_values import search, words_of
-from app.ui.tree_view import TreeView
+from app.ui.panels.inspector.tree_model import TreeModel
+from app.ui.panels.inspector.tree_view import TreeView
+from app.ui.panels.inspector.values import search, words_of
+from app.ui.theme.theme import Theme
 
 FIRST = {"stamp": 1.5, "robots": {"Pepper": {"pose": {"x": 1, "y": 2}, "on": True}}, "list": [1, "two", None]}
 

@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import QModelIndex
 
 from app.core.messages.lazy_json import JsonIndex
-from app.ui.tree import Node, TreeModel
-from app.ui.tree_difference import MISSING, OFF, differs, mark_of, parts_of
+from app.ui.panels.inspector.diff import MISSING, OFF, differs, mark_of, parts_of
+from app.ui.panels.inspector.tree_model import Node, TreeModel
 
 
 @pytest.mark.parametrize(

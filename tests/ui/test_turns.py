@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.ui import turns
+from app.ui.startup import interpreter
 
 
 @pytest.fixture(autouse=True)
@@ -21,7 +21,7 @@ def _as_before() -> Iterator[None]:
 
 def test_the_window_never_waits_for_as_long_as_python_would_let_it() -> None:
     sys.setswitchinterval(0.005)
-    turns.shorten()
+    interpreter.shorten()
     assert sys.getswitchinterval() <= 0.001
 
 
@@ -36,4 +36,4 @@ def test_studio_does_so_when_it_starts() -> None:
     said = subprocess.run(
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
     )
-    assert float(said.stdout) == pytest.approx(turns.TURN_S)
+    assert float(said.stdout) == pytest.approx(interpreter.TURN_S)

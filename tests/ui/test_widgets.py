@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
-from app.ui.theme import Theme
+from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Bar,
     Button,
@@ -28,9 +28,9 @@ from app.ui.widgets import (
     Switch,
     paint,
 )
+from app.ui.widgets.inputs.slider import decimals_of
+from app.ui.widgets.labels import paint_sparkline
 from app.ui.widgets.scrolled import Scrolled
-from app.ui.widgets.slider import decimals_of
-from app.ui.widgets.small import paint_sparkline
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.ui.words import (
+from app.ui.text.numbers import (
     age_words,
     bandwidth_words,
     grouped,

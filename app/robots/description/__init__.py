@@ -1,1 +1,1 @@
-"""What a robot can do and tell: its W3C Thing Model, parsed once into typed values, and inputs checked by it."""
+"""What a robot can do and tell: its W3C Thing Model, parsed once into typed values, and inputs checked."""

@@ -1,1 +1,1 @@
-"""The driver of a robot: declared as a Python class, its topics, tasks, stop and watchdog; a process of its own."""
+"""The driver of a robot: declared as a Python class, its topics, tasks, stop and watchdog, its process."""

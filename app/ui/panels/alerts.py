@@ -9,12 +9,12 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 
-from app.ui.icons import paint_icon
-from app.ui.panel_rows import PanelRows
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.theme import Theme
+from app.ui.text.numbers import grouped
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyState, label, paint
-from app.ui.words import grouped
+from app.ui.widgets.lists.scroll_rows import PanelRows
 
 if TYPE_CHECKING:
     from app.core.alerts import Alert

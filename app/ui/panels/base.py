@@ -15,7 +15,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction, QFont
 from PySide6.QtWidgets import QWidget
 
-from app.ui.theme import Theme
+from app.ui.theme.theme import Theme
 
 if TYPE_CHECKING:
     from app.core.network.watches import Look
@@ -37,7 +37,7 @@ class PanelContext:
     """What a panel may use of the window.
 
     ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
-    does one of the window's commands by its name (`app.ui.actions`).
+    does one of the window's commands by its name (`app.ui.shell.actions.table`).
     """
 
     session: Session

@@ -10,11 +10,11 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.ui.icons import paint_icon
-from app.ui.panel_rows import PanelRows
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.theme import Theme
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyState, IconButton, label, paint
+from app.ui.widgets.lists.scroll_rows import PanelRows
 from nep.doctor import report
 
 if TYPE_CHECKING:

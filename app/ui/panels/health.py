@@ -11,11 +11,11 @@ from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.robots.health_facts import HealthFact, facts_of
-from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
-from app.ui.theme import Theme
+from app.ui.text.numbers import age_words
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Scrolled, label, paint
-from app.ui.words import age_words
 
 if TYPE_CHECKING:
     from app.core.network.watches import Look, Watch

@@ -18,13 +18,13 @@ from PySide6.QtWidgets import (
 
 from app.core.documents.problems import Listed, Mend, listed
 from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
-from app.ui import plain
-from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
-from app.ui.rich_line import BoldInLine, is_pressed_key
-from app.ui.theme import Theme
+from app.ui.text import plain
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, Scrolled, label, paint
-from app.ui.widgets.small import Tile
+from app.ui.widgets.labels import Tile
+from app.ui.widgets.rich_line import BoldInLine, is_pressed_key
 
 if TYPE_CHECKING:
     from app.blocks import Program

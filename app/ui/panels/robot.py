@@ -11,14 +11,14 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.ui import plain
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.plain_key import is_plain
-from app.ui.robot_drawing import RobotDrawing
-from app.ui.robot_state import RobotState
-from app.ui.theme import Theme
+from app.ui.robot_drawing.scene import RobotDrawing
+from app.ui.robot_drawing.state import RobotState
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.plain_key import is_plain
 
 if TYPE_CHECKING:
     from app.core.network.watches import Look, Watch

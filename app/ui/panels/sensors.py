@@ -11,12 +11,12 @@ from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description.description import Sensor
-from app.ui.icons import paint_icon
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
-from app.ui.sensor_words import Reading, reading_of
-from app.ui.theme import Theme
+from app.ui.text.numbers import age_words
+from app.ui.text.sensor_values import Reading, reading_of
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState, paint
-from app.ui.words import age_words
 
 if TYPE_CHECKING:
     from app.core.network.watches import Look, Watch

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Generic, TypeVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QStackedWidget, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.ui.doctor_line import DoctorLine
-from app.ui.filter_field import FilterField
 from app.ui.panels.base import Density, PanelContext, PanelWidget
-from app.ui.table import TableModel
-from app.ui.table_view import TableView
-from app.ui.widgets import EmptyAction, EmptyState, Line, label
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Elided, EmptyAction, EmptyState, Line, label
+from app.ui.widgets.buttons import LinkButton
+from app.ui.widgets.fields import FilterField
 from app.ui.widgets.menus import Menu
+from app.ui.widgets.table.model import TableModel
+from app.ui.widgets.table.view import TableView
 
 Row = TypeVar("Row")
 
@@ -118,3 +119,31 @@ class TablePanel(PanelWidget, Generic[Row]):
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         self.table.restore(state)
+
+
+COMMAND = "help.doctor"
+
+
+class DoctorLine(QWidget):
+    """``Expected to see something?`` with its button."""
+
+    def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
+        """``run`` does a command of the window by its name."""
+        super().__init__()
+        words = Elided("small", "textSecondary")
+        words.setText("Expected to see something?")
+        self.button = LinkButton(theme, "Open the connection doctor")
+        self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+        self.button.clicked.connect(lambda: run(COMMAND))
+        row = QHBoxLayout()
+        row.setContentsMargins(12, 3, 12, 3)
+        row.setSpacing(6)
+        row.addStretch(1)
+        row.addWidget(words)
+        row.addWidget(self.button)
+        row.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(Line(theme))
+        column.addLayout(row)

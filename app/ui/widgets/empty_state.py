@@ -9,12 +9,12 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.ui.icons import paint_icon
-from app.ui.theme import Theme
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.button import Button
+from app.ui.widgets.buttons import Button
+from app.ui.widgets.labels import label
 from app.ui.widgets.scrolled import Scrolled
-from app.ui.widgets.small import label
 
 TILE, BELOW_TILE = 56, 16
 TEXT_WIDTH = 400

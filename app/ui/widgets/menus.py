@@ -23,8 +23,8 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QLineEdit, QMenu, QPlainTextEdit, QWidget
 
-from app.ui.icons import paint_icon
-from app.ui.theme import Theme
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets.paint import RIGHT, box, words
 
 CUT_ON = frozenset({"xcb"})

@@ -8,9 +8,9 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
-from app.ui.theme import Theme
+from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.button import Button, name_command
+from app.ui.widgets.buttons import Button, name_command
 
 Place = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112

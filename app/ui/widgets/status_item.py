@@ -6,8 +6,8 @@ from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.icons import paint_icon
-from app.ui.theme import Theme
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
 LEAST = 64  # px at 100 % that a fact keeps where there is too little room for all; its tooltip has the whole

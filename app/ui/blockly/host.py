@@ -1,0 +1,191 @@
+"""The page of the block editor in a widget: making it, dressing it, keeping it alive, its function keys."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from collections.abc import Mapping
+from typing import cast
+
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QKeySequence, QShowEvent
+from PySide6.QtWebEngineCore import QWebEnginePage
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app import resources
+from app.ui.blockly.bridge import BlocklyBridge, Json
+from app.ui.blockly.page import BlocklyWeb
+
+_log = logging.getLogger(__name__)
+_RESTART_MS = (0, 500, 2000, 5000)
+_STABLE_S = 60.0
+_FUNCTION_KEYS = range(Qt.Key.Key_F1, Qt.Key.Key_F12 + 1)
+
+
+class BlocklyHost(QWidget):
+    """Holds the page, which comes with the first show and is started again whenever its process dies."""
+
+    ready = Signal()  # the page is there (again, after its process died)
+    recovered = Signal()  # its process had died: every behaviour is back, without its undo
+    key_pressed = Signal(str)  # a function key pressed in the page that no shortcut of the window took
+
+    def __init__(self, parent: QWidget | None, language: str) -> None:
+        super().__init__(parent)
+        self._language = language
+        self._web: BlocklyWeb | None = None
+        self._up = False
+        self._theme: Json = {}
+        self._reduced_motion = False
+        self._deaths = 0
+        self._had_died = False
+        self._up_since = 0.0
+        self._bridge = BlocklyBridge(self._beginning, self)
+        self._bridge.came_up.connect(self._came_up)
+        self._on_block = False
+        self._bridge.block_focused.connect(self._block_focused)
+        self._bridge.went_wrong.connect(lambda sentence: _log.error("block editor: %s", sentence))
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the page is there now."""
+        return self._up
+
+    @property
+    def web(self) -> BlocklyWeb | None:
+        """The page's view, None until the first show. For tools and tests; panels have no need of it."""
+        return self._web
+
+    def set_theme(self, tokens: Mapping[str, object], dark: bool) -> None:
+        """Use the design tokens: the whole file, or `Theme.blockly_tokens()`. Keeps program and undo."""
+        self._theme = {"tokens": dict(tokens), "dark": dark}
+        if isinstance(tokens.get("reducedMotion"), bool):
+            self.set_reduced_motion(bool(tokens["reducedMotion"]))
+        if self._web is not None:
+            self._dress(self._web)
+        self._tell("theme", self._theme)
+
+    def set_reduced_motion(self, reduced: bool) -> None:
+        """Steady glow instead of a breathing one."""
+        if reduced != self._reduced_motion:
+            self._reduced_motion = reduced
+            self._tell("motion", {"reduced": reduced})
+
+    # -- for the view -----------------------------------------------------------------------------
+
+    def _page_came(self) -> None:
+        """The page is there and knows nothing yet."""
+
+    def _page_went(self) -> None:
+        """The page is gone with everything in it."""
+
+    def _tell(self, command: str, payload: object) -> None:
+        """Say it to the page if there is one; a page that comes later is told by `_page_came`."""
+        if self._up:
+            self._bridge.tell(command, payload)
+
+    # -- the page ---------------------------------------------------------------------------------
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if self._web is None:
+            self._make_page()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ChildAdded:
+            self._watch_keys()
+        overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
+        if overrides and _is_help(cast("QKeyEvent", event)):
+            event.accept()  # on a block, F1 is for the block: the window's own F1 does not get it then
+            return True
+        if event.type() == QEvent.Type.KeyPress:
+            key = cast("QKeyEvent", event)
+            # A shortcut of the window has had its turn before a key press arrives here.
+            if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
+                if self._on_block and _is_help(key):
+                    self._tell("help", None)
+                else:
+                    self.key_pressed.emit(QKeySequence(key.key()).toString())
+                return True
+        return super().eventFilter(watched, event)
+
+    def _make_page(self) -> None:
+        self._web = BlocklyWeb(self._bridge, self._background(), self)
+        self._layout.addWidget(self._web.view)
+        self.setFocusProxy(self._web.view)
+        self._web.view.installEventFilter(self)
+        self._web.page.renderProcessTerminated.connect(self._died)
+        self._dress(self._web)
+        application = QCoreApplication.instance()
+        if application is not None:
+            application.aboutToQuit.connect(self._close_page)
+        self._web.start()
+
+    def _close_page(self) -> None:
+        """Let the page go before its profile, whatever order the interpreter ends things in."""
+        web, self._web, self._up = self._web, None, False
+        if web is not None:
+            web.close()
+
+    def _dress(self, web: BlocklyWeb) -> None:
+        """What the theme decides outside the page: the colour before the first picture, the size of text."""
+        web.page.setBackgroundColor(self._background())
+        tokens = cast("Mapping[str, object]", self._theme["tokens"])
+        percent = tokens.get("textPercent")
+        web.view.setZoomFactor(percent / 100 if isinstance(percent, int | float) else 1.0)
+
+    def _watch_keys(self) -> None:
+        """The widget that gets the keys is made by the web engine, and made again with a new process."""
+        keyboard = self._web.keyboard() if self._web is not None else None
+        if self._web is not None:
+            self._web.view.setAcceptDrops(False)
+        if keyboard is not None:
+            if isinstance(keyboard, QWidget):
+                keyboard.setAcceptDrops(False)  # files that are dropped here are the window's
+            keyboard.removeEventFilter(self)
+            keyboard.installEventFilter(self)
+            if isinstance(keyboard, QWidget):
+                keyboard.setAcceptDrops(False)  # a dropped file is for the window, which opens it
+
+    def _beginning(self) -> Json:
+        if not self._theme:
+            tokens = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
+            self._theme = {"tokens": tokens, "dark": False}
+        return {"language": self._language, "reduced": self._reduced_motion, "theme": self._theme}
+
+    def _background(self) -> QColor:
+        tokens = cast("Mapping[str, Mapping[str, object]]", self._beginning()["theme"])["tokens"]
+        colours = cast("Mapping[str, object]", tokens["colour"])
+        mode = colours.get("dark" if self._theme["dark"] else "light", colours)
+        return QColor(str(cast("Mapping[str, object]", mode)["workspace"]))
+
+    def _block_focused(self, has: bool) -> None:
+        self._on_block = has
+
+    def _came_up(self) -> None:
+        self._up = True
+        self._up_since = time.monotonic()
+        self._watch_keys()
+        self._page_came()
+        self.ready.emit()
+        if self._had_died:
+            self._had_died = False
+            self.recovered.emit()
+
+    def _died(self, _status: QWebEnginePage.RenderProcessTerminationStatus, code: int) -> None:
+        _log.warning("the web process of the block editor ended (code %d); it is started again", code)
+        self._up = self._on_block = False
+        self._had_died = True
+        self._page_went()
+        if time.monotonic() - self._up_since > _STABLE_S:
+            self._deaths = 0
+        delay = _RESTART_MS[min(self._deaths, len(_RESTART_MS) - 1)]
+        self._deaths += 1
+        if self._web is not None:
+            QTimer.singleShot(delay, self._web.page, self._web.start)
+
+
+def _is_help(key: QKeyEvent) -> bool:
+    return key.key() == Qt.Key.Key_F1 and key.modifiers() == Qt.KeyboardModifier.NoModifier

@@ -1,0 +1,247 @@
+"""The block editor as a widget.
+
+The view knows the newest program at any time. The page in it may come late (it is made when the view is first
+shown) or die (its process can be killed): it is given everything again and the person goes on.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from app.core.storage import deep_json
+from app.ui.blockly.bridge import Json
+from app.ui.blockly.host import BlocklyHost
+from app.ui.blockly.scheme import register_scheme as register_scheme
+from app.ui.blockly.tabs import Tabs
+
+
+class BlocklyView(BlocklyHost):
+    """Shows and edits behaviours, one at a time, each in its tab.
+
+    All methods may be called at any time, also before the first show. Before the first `show_tab` there is
+    one behaviour, with the key "".
+    """
+
+    changed = Signal(str, dict)  # a tab's key and its newest workspace, 150 ms after the last real edit
+    history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
+    block_selected = Signal(str)  # a block's id; "" when nothing is selected
+    sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
+
+    def __init__(self, parent: QWidget | None = None, *, language: str = "en") -> None:
+        super().__init__(parent, language)
+        self._tabs = Tabs()
+        self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
+        self._live: Json = {"values": {}, "old": []}
+        self._alarms: Json = {}
+        self._waiting: dict[int, Callable[[Json], None]] = {}
+        self._tokens = 0
+        self._bridge.edited.connect(self._edited)
+        self._bridge.undo_changed.connect(self.history_changed)
+        self._bridge.block_chosen.connect(self.block_selected)
+        self._bridge.answered.connect(self._answered)
+        self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
+
+    # -- the program ------------------------------------------------------------------------------
+
+    @property
+    def workspace(self) -> Json:
+        """The newest program of the shown tab; call `flush` for one without the last 150 ms missing."""
+        return self._tabs.shown.workspace
+
+    def workspace_of(self, key: str) -> Json | None:
+        """The newest program of a tab; None when there is no such tab."""
+        tab = self._tabs[key]
+        return tab.workspace if tab is not None else None
+
+    def show_tab(self, key: str, workspace: Mapping[str, object]) -> None:
+        """Show the behaviour kept under this key, with its own undo, zoom and scroll position.
+
+        The first time it is ``workspace``; afterwards what became of it.
+        """
+        gone = self._tabs.show(key, workspace)
+        self._send_tab()
+        if gone is not None:
+            self._tell("close", gone)
+
+    def close_tab(self, key: str) -> None:
+        """Forget a behaviour and its undo. In the place of the shown one there is an empty one then."""
+        was_shown = key == self._tabs.shown.key
+        if self._tabs.close(key):
+            if was_shown:
+                self._send_tab()
+            self._tell("close", key)
+
+    def load(self, workspace: Mapping[str, object]) -> None:
+        """Show another program in the shown tab.
+
+        Forgets its undo; edits of the old one that are still under way are dropped.
+        """
+        self._tabs.replace(workspace)
+        self._tabs.shown.in_page = False
+        self._send_tab()
+
+    def change(self, workspace: Mapping[str, object]) -> None:
+        """Change the shown tab's program as one edit, which undo takes back; `changed` does not tell it."""
+        self._tabs.shown.workspace = dict(workspace)
+        self._tell("change", self._tabs.shown.workspace)
+
+    def flush(self, done: Callable[[Json], None]) -> None:
+        """Ask for the newest program of the shown tab now.
+
+        `done` is called once, also if the page is absent or dies. The other tabs have told their newest when
+        they were left.
+        """
+        if not self._up:
+            done(self.workspace)
+            return
+        self._tokens += 1
+        self._waiting[self._tokens] = done
+        self._bridge.tell("flush", self._tokens)
+
+    def set_definitions(self, definitions: Mapping[str, object]) -> None:
+        """Give what `app.blocks.editor_definitions` made. Equal definitions cost nothing.
+
+        Keeps the program, its undo and an open category; waits while a block is being dragged.
+        """
+        if definitions == self._definitions:
+            return
+        self._definitions = dict(definitions)
+        self._tell("definitions", self._definitions)
+
+    # -- what the blocks of the shown tab say -----------------------------------------------------
+
+    def highlight(self, ids: Sequence[str]) -> None:
+        """Let exactly these blocks glow; 30 calls a second are fine."""
+        self._show("highlight", list(ids))
+
+    def mark_stopped(self, ids: Sequence[str]) -> None:
+        """Outline the blocks at which the program was stopped."""
+        self._show("stopped", list(ids))
+
+    def set_errors(self, errors: Mapping[str, str]) -> None:
+        """Outline these blocks and put a sentence beside each: id -> sentence."""
+        self._show("errors", dict(errors))
+
+    def set_absent(self, ids: Sequence[str]) -> None:
+        """Show these blocks grey and dashed: their robot is not connected."""
+        self._show("absent", list(ids))
+
+    def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None:
+        """Set the words of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
+
+        No undo, no change. Those whose key is among ``old`` are faint: the robot has not told them lately.
+        """
+        live: Json = {"values": dict(values), "old": sorted(old)}
+        if live != self._live:
+            self._live = live
+            self._tell("live", self._live)
+
+    def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
+        """Say in the toolbox what is wrong with robots: name -> status of its dot, words.
+
+        All others have the dot of a robot that is connected or not.
+        """
+        told: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
+        if told != self._alarms:
+            self._alarms = told
+            self._tell("alarms", told)
+
+    # -- commands ---------------------------------------------------------------------------------
+
+    def undo(self) -> None:
+        """Take back the last edit."""
+        self._tell("undo", None)
+
+    def redo(self) -> None:
+        """Do it again."""
+        self._tell("redo", None)
+
+    def zoom_in(self) -> None:
+        """One step larger."""
+        self._tell("zoom", 1)
+
+    def zoom_out(self) -> None:
+        """One step smaller."""
+        self._tell("zoom", -1)
+
+    def zoom_to_fit(self) -> None:
+        """Show the whole program."""
+        self._tell("fit", None)
+
+    def open_find(self) -> None:
+        """Open the bar that finds blocks in the shown program."""
+        self._tell("find", None)
+
+    def open_search(self) -> None:
+        """Let the keys go to the field that finds blocks in the toolbox."""
+        self._tell("search", None)
+
+    def show_help(self) -> None:
+        """Show the help of the block that the keys go to, if there is one."""
+        self._tell("help", None)
+
+    def show_block(self, id: str) -> None:
+        """Bring the block to the middle and select it."""
+        self._tell("show", id)
+
+    # -- the page ---------------------------------------------------------------------------------
+
+    def _page_came(self) -> None:
+        self._tell("definitions", self._definitions)
+        self._tell("alarms", self._alarms)
+        self._tabs.page_gone()
+        self._send_tab()
+
+    def _page_went(self) -> None:
+        waiting, self._waiting = self._waiting, {}
+        for done in waiting.values():
+            done(self.workspace)
+        self.history_changed.emit(False, False)
+        self.sensors_offered.emit(())
+
+    def _send_tab(self) -> None:
+        """Let the page show this tab: its program when the page does not hold it, and what its blocks say."""
+        if not self._up:
+            return
+        tab = self._tabs.shown
+        here: Json = {"key": tab.key}
+        if not tab.in_page:
+            here |= {"generation": tab.generation, "workspace": tab.workspace}
+            tab.in_page = True
+        self._bridge.tell("tab", here)
+        for name, value in tab.states.items():
+            self._bridge.tell(name, value)
+        self._bridge.tell("live", self._live)
+
+    def _show(self, name: str, value: object) -> None:
+        states = self._tabs.shown.states
+        if states.get(name) != value:
+            states[name] = value
+            self._tell(name, value)
+
+    def _edited(self, key: str, generation: int, workspace: str) -> None:
+        tab = self._tabs.edited(key, generation)
+        if tab is not None:
+            tab.workspace = _program(workspace)
+            self.changed.emit(key, tab.workspace)
+
+    def _answered(self, token: int, workspace: str) -> None:
+        done = self._waiting.pop(token, None)
+        if done is not None:
+            done(_program(workspace))
+
+
+def _program(text: str) -> dict[str, object]:
+    """The page's JSON, however long its stacks are."""
+    made = deep_json.loads(text)
+    return made if isinstance(made, dict) else {}
+
+
+def _pairs(text: str) -> tuple[tuple[str, str], ...]:
+    """The page's robots and their sensors."""
+    made = json.loads(text)
+    return tuple((str(robot), str(sensor)) for robot, sensor in made)

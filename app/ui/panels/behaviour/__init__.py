@@ -1,0 +1,3 @@
+"""Behaviour: the block editor, its tabs, and the program that its blocks make."""
+
+from app.ui.panels.behaviour.panel import PANEL as PANEL

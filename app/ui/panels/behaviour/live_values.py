@@ -1,0 +1,67 @@
+"""What sensor blocks say now: "84 %" on the battery."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Protocol
+
+from app.robots.description.description import Field, Robot, Sensor
+from app.ui.text.sensor_values import number_words, reading_of
+
+SILENT = "silent"
+
+
+class Told(Protocol):
+    """What is known of a robot that is there (`app.core.robots.robot_link.RobotLink`)."""
+
+    @property
+    def robot(self) -> Robot: ...
+    @property
+    def values(self) -> Mapping[str, object]: ...
+    @property
+    def state(self) -> str: ...
+    @property
+    def connected(self) -> bool: ...
+
+
+class Fleet(Protocol):
+    """Where robots are found by their names."""
+
+    def link(self, name: str) -> Told | None: ...
+
+
+def live_words(fleet: Fleet, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
+    """Words by ``<robot>/<sensor>`` and ``<robot>/<sensor>/<field>``, and which of them are old.
+
+    Old is what a robot told that has fallen silent. A robot that is away says nothing.
+    """
+    words: dict[str, str] = {}
+    old: set[str] = set()
+    for robot, name in sensors:
+        link = fleet.link(robot)
+        sensor = link.robot.sensor(name) if link is not None else None
+        if link is None or sensor is None or not link.connected:
+            continue
+        told = _words(f"{robot}/{name}", sensor, link.values.get(name))
+        words |= told
+        if link.state == SILENT:
+            old |= told.keys()
+    return words, old
+
+
+def _words(key: str, sensor: Sensor, value: object) -> dict[str, str]:
+    """One sensor, or each field of one that has several."""
+    if sensor.kind != "object":
+        return {key: reading_of(sensor, value).value}
+    parts = value if isinstance(value, Mapping) else {}
+    return {
+        f"{key}/{field.name}": _part(field, parts[field.name])
+        for field in sensor.fields
+        if parts.get(field.name) is not None
+    }
+
+
+def _part(field: Field, value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return number_words(value, field.unit) if isinstance(value, (int, float)) else str(value)

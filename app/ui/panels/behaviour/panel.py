@@ -1,0 +1,314 @@
+"""Behaviour: the block editor, and the program that its blocks make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QGuiApplication, QResizeEvent
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.robots.robot_link import NOT_STOPPED, STOPPING
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.behaviour.blocks_wait import BlocksWait
+from app.ui.panels.behaviour.editor import Editor, blockly
+from app.ui.panels.behaviour.live_values import live_words
+from app.ui.panels.behaviour.program_view import ProgramView
+from app.ui.panels.behaviour.tab import TabFacts
+from app.ui.panels.behaviour.title import BehaviourTitle
+from app.ui.widgets import EmptyAction, EmptyState
+from app.ui.widgets.robot_item import STATUS
+
+if TYPE_CHECKING:
+    from app.blocks import Program
+    from app.core.documents.document import Document
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
+    from app.core.run.control import Runs
+
+LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
+TOOLBOX_WIDTH = 196
+EMPTY_SIZE = (460, 250)
+ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
+
+
+class BehaviourPanel(PanelWidget):
+    """The behaviour that is open: Blocks to build with, Python to read."""
+
+    def __init__(self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = blockly) -> None:
+        super().__init__(context, "Behaviour")
+        self._bar = BehaviourTitle(self.theme)
+        self._bar.mode.changed.connect(self.set_mode)
+        self._bar.copy.clicked.connect(self.copy_program)
+        self._bar.undo.clicked.connect(self.undo)
+        self._bar.redo.clicked.connect(self.redo)
+        tabs = self._bar.tabs
+        tabs.chosen.connect(lambda key: context.run(f"tab:{key}"))
+        tabs.closed.connect(lambda key: context.run(f"tab.close:{key}"))
+        tabs.moved.connect(lambda key, place: context.run(f"tab.move:{key}:{place}"))
+        tabs.asked.connect(lambda command, key: context.run(f"{command}:{key}"))
+        tabs.add.clicked.connect(lambda: context.run("file.new"))
+        self.mode = "blocks"
+        self.program = ProgramView(self.theme)
+        self._make_editor = make_editor
+        self.editor: Editor | None = None
+        self._place = QWidget()
+        self._place_column = QVBoxLayout(self._place)
+        self._place_column.setContentsMargins(0, 0, 0, 0)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self._place)
+        self.pages.addWidget(self.program)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+        self.empty = EmptyState(
+            self.theme,
+            "bot",
+            "No robot is connected",
+            "You can build now and run later. With the virtual robot you can try it at once.",
+            [
+                EmptyAction(
+                    "Use the virtual robot", lambda: context.run("robots.virtual"), "bot", primary=True
+                )
+            ],
+        )
+        self.empty.setParent(self._place)
+        self.empty.hide()
+        self.waiting = BlocksWait(self._place)
+        self._shown: dict[str, object] = {}
+        self._given: dict[str, tuple[int, int]] = {}
+        self._watches: dict[str, Watch] = {}
+        self._sensors: tuple[tuple[str, str], ...] = ()
+        self._offered: tuple[tuple[str, str], ...] = ()  # in the toolbox, while it is open
+        self._ticks = 0
+
+    def replaces_title(self) -> QWidget:
+        return self._bar
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        documents, document = self.session.documents, self.session.document
+        runs = self.session.runs
+        self._bar.tabs.show_tabs([tab_facts(each, runs) for each in documents], document.key)
+        if self.editor is None:
+            self.editor = self._open_editor()
+        if self._new("definitions", documents.definitions_revision):
+            self.editor.set_definitions(documents.definitions())
+        self._show_blocks(self.editor)
+        program = document.newest()
+        if program is not None and program is not self._shown.get("facts"):
+            self._shown["facts"] = program
+            self._program_changed(program)
+        mine = runs.document is document
+        if self._new("blocks", (runs.blocks_revision, mine)):
+            self.editor.highlight(runs.running_blocks if mine else ())
+            self.editor.mark_stopped(runs.stopped_blocks if mine else ())
+            self.editor.set_errors(runs.block_errors if mine else {})
+        alarms = alarms_of(self.session.fleet.links)
+        if self._new("alarms", alarms):
+            self.editor.set_alarms(alarms)
+        if self._ticks % LIVE_EVERY == 0:
+            self._show_live()
+        self.waiting.tell(ready=self.editor.is_ready)
+        self._show_empty()
+
+    def _show_blocks(self, editor: Editor) -> None:
+        """Let the editor show the current behaviour, and forget those that were closed."""
+        document = self.session.document
+        now = (document.revision, document.mends)
+        known = self._given.get(document.key)
+        if self._new("tab", document.key):
+            editor.show_tab(document.key, document.workspace)
+            for what in ("facts", "blocks"):
+                self._shown.pop(what, None)
+        if known is not None and known[0] != now[0]:
+            editor.load(document.workspace)
+        elif known is not None and known[1] != now[1]:
+            editor.change(document.workspace)
+        self._given[document.key] = now
+        for key in self._given.keys() - {each.key for each in self.session.documents}:
+            del self._given[key]
+            editor.close_tab(key)
+
+    def _new(self, what: str, now: object) -> bool:
+        """Whether this differs from what was shown."""
+        if self._shown.get(what) == now and what in self._shown:
+            return False
+        self._shown[what] = now
+        return True
+
+    def _open_editor(self) -> Editor:
+        editor = self._make_editor(self._place)
+        editor.changed.connect(self._edited)
+        editor.recovered.connect(
+            lambda: self.context.toast("The block editor was started again. Undo begins anew.")
+        )
+        editor.history_changed.connect(self._history)
+        editor.key_pressed.connect(self._key)
+        editor.sensors_offered.connect(self._offer)
+        editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
+        if isinstance(editor, QWidget):
+            had_focus = self.hasFocus()
+            self._place_column.addWidget(editor)
+            self.setFocusProxy(editor)
+            if had_focus:
+                editor.setFocus(Qt.FocusReason.OtherFocusReason)
+        return editor
+
+    def _program_changed(self, program: Program) -> None:
+        """The program is another one: its problems, the sensors it reads, its text."""
+        if self.editor is not None:
+            self.editor.set_absent(program.absent)
+        self._sensors = tuple(program.sensors)
+        self._show_live()
+        if self.mode == "python":
+            self.program.show_program(program.source)
+
+    def _look_at(self, robots: set[str]) -> None:
+        for name in self._watches.keys() - robots:
+            self._watches.pop(name).close()
+        for name in robots - self._watches.keys():
+            if self.session.fleet.link(name) is not None:
+                self._watches[name] = self.session.fleet.look_at(name)
+
+    def _offer(self, sensors: tuple[tuple[str, str], ...]) -> None:
+        self._offered = sensors
+        self._show_live()
+
+    def _show_live(self) -> None:
+        """What sensor blocks say now: "84 %" on the battery, in the behaviour and in the open toolbox."""
+        sensors = dict.fromkeys((*self._sensors, *self._offered))
+        self._look_at({robot for robot, _ in sensors})
+        if self.editor is not None:
+            words, old = live_words(self.session.fleet, sensors)
+            self.editor.set_live_values(words, old)
+
+    def _show_empty(self) -> None:
+        """Over the empty workspace, while there is no robot to build for."""
+        building = self.mode == "blocks" and self.editor is not None and self.editor.is_ready
+        wanted = building and not self.session.fleet.connected and not _blocks(self.session.document)
+        if wanted != self.empty.isVisibleTo(self._place):
+            self.empty.setVisible(wanted)
+        if wanted:
+            self._place_empty()
+
+    def _place_empty(self) -> None:
+        toolbox = TOOLBOX_WIDTH * self.theme.text_percent // 100
+        width = min(EMPTY_SIZE[0], self._place.width() - toolbox - 16)
+        left = toolbox + (self._place.width() - toolbox - width) // 2
+        self.empty.resize(width, EMPTY_SIZE[1])
+        self.empty.move(QPoint(left, max(0, (self._place.height() - EMPTY_SIZE[1]) // 2)))
+        self.empty.raise_()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self.empty.isVisibleTo(self._place):
+            self._place_empty()
+
+    def theme_changed(self) -> None:
+        if self.editor is not None:
+            self.editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
+        if self.empty.isVisibleTo(self._place):
+            self._place_empty()
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def set_mode(self, mode: str) -> None:
+        """Show "blocks" or "python"."""
+        self.mode = mode
+        self._bar.show_mode(mode)
+        self.pages.setCurrentIndex(1 if mode == "python" else 0)
+        if mode == "python":
+            self.flush(lambda: self.program.show_program(self.session.document.program().source))
+
+    def copy_program(self) -> None:
+        """Put the Python text on the clipboard."""
+        QGuiApplication.clipboard().setText(self.program.toPlainText())
+        self.context.toast("Copied the program")
+
+    def flush(self, done: Callable[[], None]) -> None:
+        """Take over the newest edits (the editor tells them 150 ms late), then call ``done``."""
+        if self.editor is None:
+            done()
+            return
+
+        # An edit that was still on its way is told before the answer. A behaviour that nobody edited stays
+        # the file's own JSON, which Blockly would write another way.
+        self.editor.flush(lambda _workspace: done())
+
+    def undo(self) -> None:
+        """Take back the last edit of the blocks."""
+        if self.editor is not None:
+            self.editor.undo()
+
+    def redo(self) -> None:
+        """Do it again."""
+        if self.editor is not None:
+            self.editor.redo()
+
+    def find_blocks(self, *, to_add: bool) -> None:
+        """Let the keys go to the field that finds blocks in the behaviour, or blocks to add."""
+        self.set_mode("blocks")
+        if self.editor is not None:
+            self.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            (self.editor.open_search if to_add else self.editor.open_find)()
+
+    def show_block(self, block: str) -> None:
+        """Show the blocks, and this one in the middle."""
+        self.set_mode("blocks")
+        if self.editor is not None:
+            self.editor.show_block(block)
+
+    def _edited(self, key: str, workspace: dict[str, object]) -> None:
+        document = self.session.documents.with_key(key)
+        if document is not None:
+            document.edited(workspace)
+
+    def _history(self, can_undo: bool, can_redo: bool) -> None:
+        self._bar.undo.setEnabled(can_undo)
+        self._bar.redo.setEnabled(can_redo)
+
+    def _key(self, key: str) -> None:
+        self.context.run(f"key:{key}")  # whatever that key is for, as the person chose
+
+    def save_state(self) -> dict[str, object]:
+        return {"mode": self.mode}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self.set_mode("python" if state.get("mode") == "python" else "blocks")
+
+    def looks(self) -> Iterable[Look | None]:
+        return self._watches.values()
+
+    def shut(self) -> None:
+        self._sensors = self._offered = ()
+        self._look_at(set())
+
+
+def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
+    """What the toolbox says of robots that may move or do not answer, instead of a green dot."""
+    return {
+        link.name: (STATUS[link.state], link.chip.removeprefix("virtual, "))
+        for link in links
+        if link.state in ALARMS
+    }
+
+
+def tab_facts(document: Document, runs: Runs) -> TabFacts:
+    """What the tab of a behaviour shows."""
+    running = runs.active and runs.document is document
+    where = str(document.path) if document.path is not None else "Not saved in a file yet"
+    return TabFacts(document.key, document.name, document.dirty, running, f"{document.name}\n{where}")
+
+
+def _blocks(document: object) -> bool:
+    """Whether there is any block in the workspace."""
+    workspace = getattr(document, "workspace", {})
+    inner = workspace.get("blocks") if isinstance(workspace, Mapping) else None
+    return bool(inner.get("blocks")) if isinstance(inner, Mapping) else False
+
+
+PANEL = Panel("behaviour", "Behaviour", "blocks", (), BehaviourPanel)

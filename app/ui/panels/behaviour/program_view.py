@@ -1,0 +1,75 @@
+"""The program of a behaviour as Python text: coloured, to read and to copy, never to edit."""
+
+from __future__ import annotations
+
+import keyword
+import re
+
+from PySide6.QtCore import QRegularExpression
+from PySide6.QtGui import QSyntaxHighlighter, QTextCharFormat, QTextDocument
+from PySide6.QtWidgets import QFrame, QPlainTextEdit
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets.menus import EditMenu
+
+# The first rule that fits a place colours it: text and comments before the words inside them.
+_RULES: tuple[tuple[str, str], ...] = (
+    ("ok", r"""[fFrRbB]{0,2}(?:\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*')"""),
+    ("textTertiary", r"#[^\n]*"),
+    ("changed", r"@[\w.]+"),
+    ("accentText", rf"\b(?:{'|'.join(keyword.kwlist)})\b"),
+    ("info", r"\b(?:def|class)\s+\w+"),
+    ("warn", r"\b\d+(?:\.\d+)?\b"),
+)
+
+
+class _Colours(QSyntaxHighlighter):
+    def __init__(self, document: QTextDocument, theme: Theme) -> None:
+        super().__init__(document)
+        self._theme = theme
+        together = "|".join(f"(?P<r{place}>{rule})" for place, (_, rule) in enumerate(_RULES))
+        self._rules = re.compile(together)
+
+    def highlightBlock(self, text: str) -> None:
+        for found in self._rules.finditer(text):
+            role = _RULES[int((found.lastgroup or "r0")[1:])][0]
+            shown = QTextCharFormat()
+            shown.setForeground(self._theme.colour(role))
+            self.setFormat(found.start(), found.end() - found.start(), shown)
+
+
+class ProgramView(QPlainTextEdit):
+    """Python text in the colours of the theme."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setReadOnly(True)
+        self.setProperty("bare", "true")
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.setAccessibleName("The program in Python")
+        self.document().setDocumentMargin(16)
+        self._colours = _Colours(self.document(), theme)
+        EditMenu(theme, self)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        font = self._theme.font("code")
+        font.setPixelSize(round(self._theme.scaled(13)))
+        self.setFont(font)
+        self._colours.rehighlight()
+
+    def show_program(self, source: str) -> None:
+        """Show this text; the place that is read stays."""
+        if source != self.toPlainText():
+            bar = self.verticalScrollBar()
+            place = bar.value()
+            self.setPlainText(source)
+            bar.setValue(place)
+
+    def line_with(self, words: str) -> int:
+        """The number of the first line with these words, from 1; 0 when there is none."""
+        found = self.document().find(QRegularExpression(QRegularExpression.escape(words)))
+        return found.blockNumber() + 1 if not found.isNull() else 0

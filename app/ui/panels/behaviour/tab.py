@@ -1,0 +1,188 @@
+"""One open behaviour as a tab: its name, a dot while it is not saved, an amber one while it runs, close."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QFocusEvent,
+    QFont,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+)
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
+
+from app.ui.text import plain
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+LONGEST_NAME = 220
+PADDING = 12
+ICON = 16
+SLOT = 18  # the unsaved dot, or close under the mouse
+
+
+@dataclass(frozen=True)
+class TabFacts:
+    """What a tab shows."""
+
+    key: str
+    name: str
+    dirty: bool = False
+    runs: bool = False
+    tip: str = ""
+
+
+class BehaviourTab(QAbstractButton):
+    """One open behaviour. Amber dot in place of the icon: its program runs; small dot: not saved."""
+
+    chosen = Signal()
+    close_pressed = Signal()
+    dragged = Signal(int)
+    stepped = Signal(int)
+
+    def __init__(self, theme: Theme, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self.facts = TabFacts("", "")
+        self._from: QPointF | None = None
+        self._over_close = self._close_down = False
+        self.setCheckable(True)
+        self.setMouseTracking(True)
+        self.setProperty("focusRadius", theme.radius("small"))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+
+    def show_facts(self, facts: TabFacts, current: bool) -> bool:
+        """Show these; whether the width changed."""
+        if facts == self.facts and current == self.isChecked():
+            return False
+        wider = facts.name != self.facts.name or current != self.isChecked() or facts.runs != self.facts.runs
+        self.facts = facts
+        self.setChecked(current)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
+        states = [word for word, so in (("not saved", facts.dirty), ("runs", facts.runs)) if so]
+        self.setText(facts.name)
+        self.setAccessibleName(", ".join([facts.name, *states]))
+        self.setAccessibleDescription("The behaviour that shows" if current else "Another open behaviour")
+        self.setToolTip(plain.tip(facts.tip or self.accessibleName()))
+        self.update()
+        return wider
+
+    def _icon(self) -> int:
+        return round(self._theme.scaled(ICON))
+
+    def _has_icon(self) -> bool:
+        return self.isChecked() or self.facts.runs
+
+    def sizeHint(self) -> QSize:
+        font = self._font(current=True)
+        name = min(self._theme.scaled(LONGEST_NAME), paint.width_of(font, self.facts.name) + 1)
+        icon = self._icon() + 8 if self._has_icon() else 0
+        height = max(28, round(paint.height_of(font)) + 6)
+        return QSize(round(PADDING + icon + name + SLOT + 4), height)
+
+    def _font(self, *, current: bool) -> QFont:
+        font = self._theme.font("label")
+        font.setWeight(font.Weight.DemiBold if current else font.Weight.Medium)
+        return font
+
+    def close_rect(self) -> QRectF:
+        """Where a press closes."""
+        rect = QRectF(self.rect())
+        return QRectF(rect.right() - SLOT - 1, rect.center().y() - 8, 16, 16)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect())
+        current, over = self.isChecked(), self.underMouse() or self._from is not None
+        if current or over:
+            role = "selected" if current else "hover"
+            paint.box(painter, rect, theme.radius("small"), theme.colour(role))
+        ink = theme.colour("selectedText" if current else "textSecondary")
+        left = float(PADDING)
+        if self._has_icon():
+            side = self._icon()
+            self._paint_mark(painter, QRectF(left, rect.center().y() - side / 2, side, side))
+            left += side + 8
+        words = rect.adjusted(left, 0, -SLOT - 2, 0)
+        paint.words(painter, words, self.facts.name, self._font(current=current), ink)
+        self._paint_slot(painter, over or self.hasFocus())
+        painter.end()
+
+    def _paint_mark(self, painter: QPainter, square: QRectF) -> None:
+        theme = self._theme
+        if not self.facts.runs:
+            paint_icon(painter, square, "blocks", theme.colour("selectedText"))
+            return
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        halo = theme.colour("running")
+        halo.setAlphaF(0.3)
+        for colour, radius in ((halo, 7.0), (theme.colour("running"), 4.5)):
+            painter.setBrush(colour)
+            painter.drawEllipse(square.center(), radius, radius)
+
+    def _paint_slot(self, painter: QPainter, over: bool) -> None:
+        theme, slot = self._theme, self.close_rect()
+        ink = theme.colour("selectedText" if self.isChecked() else "textSecondary")
+        if over:
+            if self._over_close:
+                paint.box(painter, slot, theme.radius("key"), theme.colour("pressed"))
+            paint_icon(painter, slot.adjusted(2, 2, -2, -2), "x", ink)
+        elif self.facts.dirty:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(ink)
+            painter.drawEllipse(slot.center(), 3.5, 3.5)
+
+    # -- mouse and keyboard -----------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._close_down = self.close_rect().contains(event.position())
+            self._from = None if self._close_down else event.position()
+            if not self._close_down:
+                self.chosen.emit()
+        event.accept()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        over = self.close_rect().contains(event.position())
+        if over != self._over_close:
+            self._over_close = over
+            self.update()
+        if self._from is not None:
+            far = abs(event.position().x() - self._from.x()) >= QApplication.startDragDistance()
+            if far:
+                self.dragged.emit(round(self.mapToParent(event.position()).x()))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        inside = QRectF(self.rect()).contains(event.position())
+        pressed, self._close_down, self._from = self._close_down, False, None
+        if (event.button() == Qt.MouseButton.MiddleButton and inside) or (
+            pressed and self.close_rect().contains(event.position())
+        ):
+            self.close_pressed.emit()
+        self.update()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self._over_close = False
+        super().leaveEvent(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        steps = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+        if event.key() in steps:
+            self.stepped.emit(steps[Qt.Key(event.key())])
+        elif event.key() == Qt.Key.Key_Delete:
+            self.close_pressed.emit()
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}:
+            self.chosen.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.update()

@@ -1,0 +1,170 @@
+"""The behaviours that are open, as tabs in the title of their panel, and "+" for a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QContextMenuEvent, QResizeEvent, QWheelEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.ui.panels.behaviour.tab import BehaviourTab, TabFacts
+from app.ui.theme.theme import Theme
+from app.ui.widgets import IconButton
+from app.ui.widgets.menus import Menu
+
+SHORTEST = 76
+GAP = 4
+
+
+class BehaviourTabs(QWidget):
+    """All tabs side by side and "+"; narrow room shortens them, then the wheel moves them along."""
+
+    chosen = Signal(str)
+    closed = Signal(str)
+    moved = Signal(str, int)
+    asked = Signal(str, str)  # a command of a tab's menu, and the tab's key
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._facts: tuple[TabFacts, ...] = ()
+        self._current = ""
+        self._left = 0.0
+        self.tabs: dict[str, BehaviourTab] = {}
+        self._room = QWidget(self)  # cuts off what the wheel has moved out of sight
+        self.add = IconButton(theme, "plus", "New behaviour", "Ctrl+N", parent=self)
+        self.add.setProperty("command", "file.new")
+        self.setAccessibleName("Open behaviours")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        theme.changed.connect(self._restyle)
+
+    def show_tabs(self, facts: Sequence[TabFacts], current: str) -> None:
+        """Show exactly these, in this order."""
+        wanted = tuple(facts)
+        if (wanted, current) == (self._facts, self._current):
+            return
+        had_focus = any(tab.hasFocus() for tab in self.tabs.values())
+        for key in self.tabs.keys() - {each.key for each in wanted}:
+            gone = self.tabs.pop(key)
+            gone.hide()
+            gone.deleteLater()
+        moved = current != self._current
+        self._facts, self._current = wanted, current
+        changed = [self._tab(each).show_facts(each, each.key == current) for each in wanted]
+        if had_focus and moved and current in self.tabs:
+            self.tabs[current].setFocus(Qt.FocusReason.OtherFocusReason)
+        self._place(bring=moved)
+        if any(changed):
+            self.updateGeometry()
+
+    def _tab(self, facts: TabFacts) -> BehaviourTab:
+        key = facts.key
+        if key not in self.tabs:
+            tab = self.tabs[key] = BehaviourTab(self._theme, self._room)
+            tab.chosen.connect(lambda: self.chosen.emit(key))
+            tab.close_pressed.connect(lambda: self.closed.emit(key))
+            tab.dragged.connect(lambda x: self._drag(key, x))
+            tab.stepped.connect(self._step)
+            tab.show()
+        return self.tabs[key]
+
+    def _step(self, step: int) -> None:
+        keys = [each.key for each in self._facts]
+        self.chosen.emit(keys[(keys.index(self._current) + step) % len(keys)])
+
+    def _drag(self, key: str, x: int) -> None:
+        """A tab changes places with the one whose middle it passes."""
+        keys = [each.key for each in self._facts]
+        place = keys.index(key)
+        for step in (-1, 1):
+            other = place + step
+            if 0 <= other < len(keys):
+                middle = self.tabs[keys[other]].geometry().center().x()
+                if (x < middle) if step < 0 else (x > middle):
+                    self.moved.emit(key, other)
+                    return
+
+    # -- places -----------------------------------------------------------------------------------
+
+    def _restyle(self) -> None:
+        self.updateGeometry()
+        self._place(bring=True)
+
+    def _widths(self) -> list[int]:
+        """As wide as the names want; all but the current one shorter where that does not fit."""
+        wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
+        room = self.width() - self.add.sizeHint().width() - GAP * (len(wanted) + 1)
+        least = round(self._theme.scaled(SHORTEST))
+        keys = [each.key for each in self._facts]
+
+        def cut(most: int) -> list[int]:
+            pairs = zip(keys, wanted, strict=True)
+            return [width if key == self._current else min(width, most) for key, width in pairs]
+
+        most = max(wanted, default=least)
+        while most > least and sum(cut(most)) > room:
+            most -= 4
+        return cut(max(most, least))
+
+    def _place(self, *, bring: bool = False) -> None:
+        widths = self._widths()
+        room = self.width() - self.add.sizeHint().width() - GAP
+        total = sum(widths) + GAP * max(0, len(widths) - 1)
+        if bring:
+            self._left = self._left_for_current(widths, room)
+        self._left = max(0.0, min(self._left, float(total - room)))
+        self._room.setGeometry(0, 0, max(0, room), self.height())
+        x = -self._left
+        for each, width in zip(self._facts, widths, strict=True):
+            tab = self.tabs[each.key]
+            height = tab.sizeHint().height()
+            tab.setGeometry(round(x), (self.height() - height) // 2, width, height)
+            x += width + GAP
+        side = self.add.sizeHint().height()
+        self.add.setGeometry(min(round(x), room + GAP), (self.height() - side) // 2, side, side)
+        self.add.raise_()
+
+    def _left_for_current(self, widths: list[int], room: int) -> float:
+        x = 0.0
+        for each, width in zip(self._facts, widths, strict=True):
+            if each.key == self._current:
+                return min(max(self._left, x + width - room), x)
+            x += width + GAP
+        return self._left
+
+    def sizeHint(self) -> QSize:
+        tabs = [self.tabs[each.key].sizeHint() for each in self._facts]
+        height = max([28, *(size.height() for size in tabs)])
+        return QSize(sum(size.width() + GAP for size in tabs) + self.add.sizeHint().width(), height)
+
+    def minimumSizeHint(self) -> QSize:
+        width = round(self._theme.scaled(SHORTEST)) + GAP + self.add.sizeHint().width()
+        return QSize(width, self.sizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place(bring=True)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        turned = event.angleDelta().y() or event.angleDelta().x()
+        self._left -= turned / 2
+        self._place()
+        event.accept()
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        found = next((key for key, tab in self.tabs.items() if tab.geometry().contains(event.pos())), None)
+        if found is None:
+            return
+        menu = Menu(self._theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for words, command in (
+            ("Save as", "tab.save_as"),
+            ("Close", "tab.close"),
+            ("Close the others", "tab.close_others"),
+        ):
+            menu.addAction(words).triggered.connect(
+                lambda _on=False, command=command: self.asked.emit(command, found)
+            )
+        menu.popup(event.globalPos())
+        event.accept()

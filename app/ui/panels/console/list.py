@@ -1,0 +1,270 @@
+"""The Console's lines: a list model of log records, newest first, and how one line is painted."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import (
+    QAbstractListModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QFont, QKeyEvent, QPainter, QResizeEvent
+from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
+
+from app.ui.text import plain
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import SearchField, paint
+from app.ui.widgets.plain_key import is_plain
+
+if TYPE_CHECKING:
+    from app.core.console import LogRecord
+
+Index = QModelIndex | QPersistentModelIndex
+RECORD_ROLE = int(Qt.ItemDataRole.UserRole)
+LEVELS = {
+    "debug": ("circle-dashed", "textTertiary"),
+    "info": ("circle-check", "textTertiary"),
+    "warn": ("triangle-alert", "warn"),
+    "error": ("circle-x", "error"),
+    "critical": ("octagon-x", "error"),
+}
+WORDS = {"critical": "fatal"}
+"""Words that fit into the column of levels."""
+ROW = {"compact": 22, "comfortable": 30}
+ICON = 14
+MESSAGE = 24  # letters of the text that should be seen
+_ROOT = QModelIndex()
+
+
+def line_of(record: LogRecord) -> str:
+    """A record as text, for the clipboard."""
+    moment = time.localtime(record.stamp_s)
+    clock = f"{time.strftime('%H:%M:%S', moment)}.{int(record.stamp_s % 1 * 1000):03d}"
+    logger = f" [{record.logger}]" if record.logger else ""
+    return f"{clock} {record.level} {record.origin}{logger} {record.text}"
+
+
+def tip_of(record: LogRecord) -> str:
+    """What is known of a record beside its text: where in the program it was logged."""
+    where = "  ".join(part for part in (record.logger, record.place) if part)
+    said = f"{record.text}\n{time.strftime('%H:%M:%S', time.localtime(record.stamp_s))} {record.level}"
+    return f"{said}  {record.origin}\n{where}" if where else f"{said}  {record.origin}"
+
+
+def first_line(text: str) -> str:
+    """A text in one row; how many lines follow is said."""
+    first, _, rest = text.partition("\n")
+    if not rest:
+        return first
+    more = rest.count("\n") + 1
+    return f"{first} (and {more} more line{'' if more == 1 else 's'})"
+
+
+class Wanted:
+    """Whether a record is shown: by its level, its node ("" for all), and words that it must hold."""
+
+    def __init__(self, levels: frozenset[str], node: str, words: str) -> None:
+        self._levels, self._node, self._words = levels, node, words.casefold().split()
+
+    def __call__(self, record: LogRecord) -> bool:
+        """Decide."""
+        if record.level not in self._levels or (self._node and record.origin != self._node):
+            return False
+        if not self._words:
+            return True
+        said = f"{record.origin} {record.logger} {record.text}".casefold()
+        return all(word in said for word in self._words)
+
+
+class ConsoleModel(QAbstractListModel):
+    """Some of the console's records, newest first; new ones are inserted above, the oldest leave below."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._records: deque[LogRecord] = deque()  # oldest first
+        self._newest = 0
+
+    def rowCount(self, parent: Index = _ROOT) -> int:
+        return 0 if parent.isValid() else len(self._records)
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        if not index.isValid():
+            return None
+        record = self._records[-1 - index.row()]
+        if role == RECORD_ROLE:
+            return record
+        if role in {Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole}:
+            return line_of(record)
+        return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
+
+    def show_all(self, records: Sequence[LogRecord], wanted: Callable[[LogRecord], bool]) -> None:
+        """Begin anew with those of the records (oldest first) that are wanted."""
+        self.beginResetModel()
+        self._records = deque(record for record in records if wanted(record))
+        self._newest = records[-1].number if records else 0
+        self.endResetModel()
+
+    def follow(self, records: Sequence[LogRecord], wanted: Callable[[LogRecord], bool]) -> int:
+        """Take over what came since the last time, and let go what is kept no more; how many rows came."""
+        if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
+            self.show_all(records, wanted)
+            return len(self._records)
+        self._leave(records[0].number)
+        came: list[LogRecord] = []
+        for record in reversed(records):
+            if record.number <= self._newest:
+                break
+            if wanted(record):
+                came.append(record)
+        self._newest = records[-1].number
+        if came:
+            self.beginInsertRows(_ROOT, 0, len(came) - 1)
+            self._records.extend(reversed(came))
+            self.endInsertRows()
+        return len(came)
+
+    def _leave(self, oldest: int) -> None:
+        gone = 0
+        for record in self._records:
+            if record.number >= oldest:
+                break
+            gone += 1
+        if gone:
+            rows = len(self._records)
+            self.beginRemoveRows(_ROOT, rows - gone, rows - 1)
+            for _ in range(gone):
+                self._records.popleft()
+            self.endRemoveRows()
+
+
+class LineDelegate(QStyledItemDelegate):
+    """Paints one record: time, level with icon and word, who says it, the text.
+
+    Time and level stand in columns; the text follows who says it.
+    """
+
+    def __init__(self, theme: Theme, density: Callable[[], str], font: Callable[[], QFont]) -> None:
+        super().__init__()
+        self._theme, self._density, self._font = theme, density, font
+
+    def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
+        return QSize(100, self.row_height())
+
+    def row_height(self) -> int:
+        """Pixels of one row, grown with the text."""
+        return round(self._theme.scaled(ROW[self._density()]))
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        record: LogRecord | None = index.data(RECORD_ROLE)
+        if record is None:
+            return
+        theme, font = self._theme, self._font()
+        box = QRect(option.rect)
+        if option.state & QStyle.StateFlag.State_Selected:
+            painter.fillRect(box, theme.colour("selected"))
+        rect = QRectF(box).adjusted(10, 0, -8, 0)
+        small = theme.font("code")
+        shown = self.columns(record, rect.width())
+        if "time" in shown:
+            clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
+            paint.words(painter, rect, clock, small, theme.colour("textTertiary"))
+            rect.setLeft(rect.left() + shown["time"])
+        icon, role = LEVELS.get(record.level, LEVELS["info"])
+        square = QRectF(rect.left(), rect.center().y() - ICON / 2, ICON, ICON)
+        paint_icon(painter, square, icon, theme.colour(role))
+        rect.setLeft(rect.left() + shown["icon"])
+        if "level" in shown:
+            level = WORDS.get(record.level, record.level)
+            paint.words(painter, rect, level, font, theme.colour(role))
+            rect.setLeft(rect.left() + shown["level"])
+        for words, colour, most in self._parts(record, logger="logger" in shown):
+            part = QRectF(rect)
+            part.setWidth(min(paint.width_of(font, words) + 1, rect.width() * most))
+            paint.words(painter, part, words, font, theme.colour(colour))
+            rect.setLeft(part.right() + 7)
+
+    def columns(self, record: LogRecord, width: float) -> dict[str, float]:
+        """What stands before the text, with its width, in a row of that width.
+
+        Where little is left for the text, first the logger goes, then the level's word (its icon says it
+        too), then the time; who says it stays. All of it is in the row's tooltip.
+        """
+        font = self._font()
+        text = MESSAGE * paint.width_of(font, "n")
+        shown = {
+            "time": paint.width_of(self._theme.font("code"), "00:00:00") + 14,
+            "icon": float(ICON + 4),
+            "level": max(paint.width_of(font, word) for word in ("debug", "error")) + 10,
+            "origin": min(paint.width_of(font, record.origin), 0.3 * width) + 7,
+            "logger": paint.width_of(font, record.logger.rpartition(".")[2]),
+        }
+        for name in ("logger", "level", "time"):
+            if width - sum(shown.values()) >= text:
+                break
+            del shown[name]
+        return shown
+
+    @staticmethod
+    def _parts(record: LogRecord, *, logger: bool) -> list[tuple[str, str, float]]:
+        """What stands in the rest of a row: words, their colour, how much of what is left they may take."""
+        parts = [(record.origin, "textTertiary", 0.4), (first_line(record.text), "text", 1.0)]
+        name = record.logger.rpartition(".")[2] if logger else ""
+        if name:
+            parts.insert(1, (name, "textDisabled", 0.3))
+        return parts
+
+
+class Lines(QListView):
+    """The list of lines. ``/`` asks for the field of words; `resized` when its place changed."""
+
+    find_wanted = Signal()
+    resized = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("What happened, newest first")
+        self.setUniformItemSizes(True)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.text() == "/":
+            self.find_wanted.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.resized.emit()
+
+
+class FindWords(SearchField):
+    """The words that lines must hold. Down goes to the lines, Esc shows all of them again."""
+
+    left = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme, "Find words")
+        self.setAccessibleName("Find words in the lines")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.clear()
+            self.hide()
+        if event.key() in {Qt.Key.Key_Escape, Qt.Key.Key_Down} and is_plain(event):
+            self.left.emit()
+        else:
+            super().keyPressEvent(event)

@@ -1,0 +1,272 @@
+"""Console: what happened, line by line, the newest first: Studio's own lines and what programs log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout
+
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.console.list import (
+    LEVELS,
+    RECORD_ROLE,
+    ConsoleModel,
+    FindWords,
+    LineDelegate,
+    Lines,
+    Wanted,
+    line_of,
+)
+from app.ui.text import plain
+from app.ui.text.numbers import grouped
+from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton
+from app.ui.widgets.menus import Menu, drop_below
+
+if TYPE_CHECKING:
+    from app.core.console import LogRecord
+
+FROM = {
+    "debug": "Everything, also details",
+    "all": "Everything",
+    "warn": "Warnings and errors",
+    "error": "Errors only",
+}
+SHOWN = {
+    "debug": frozenset(LEVELS),
+    "all": frozenset(LEVELS) - {"debug"},
+    "warn": frozenset({"warn", "error", "critical"}),
+    "error": frozenset({"error", "critical"}),
+}
+MOST_NODES = 20
+
+
+class ConsolePanel(PanelWidget):
+    """The lines, and which of them are shown: by level, by node, by words."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Console")
+        self._seen = -1
+        self._choice: tuple[object, ...] = ()
+        self._unseen = 0
+        self.level = "all"
+        self.node = ""
+        self.filter = IconButton(self.theme, "filter", "Choose what is shown", size=26)
+        self.filter.clicked.connect(self._show_menu)
+        self.header = [self.filter]
+        self.words = FindWords(self.theme)
+        self.words.textChanged.connect(self.refresh)
+        self.words.left.connect(self._to_lines)
+        self.words.hide()
+        self.model = ConsoleModel()
+        self.list = self._make_list()
+        self.empty = EmptyState(self.theme, "terminal", "Nothing happened yet", "")
+        self.newer = Button(self.theme, "", "arrow-up", size="small")
+        self.newer.setParent(self.list)
+        self.newer.hide()
+        self.newer.clicked.connect(self.list.scrollToTop)
+        self.list.verticalScrollBar().valueChanged.connect(self._scrolled)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(self.list)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 4, 0, 4)
+        column.setSpacing(4)
+        row = QHBoxLayout()
+        row.setContentsMargins(8, 0, 8, 0)
+        row.addWidget(self.words)
+        column.addLayout(row)
+        column.addWidget(self.pages)
+
+    def _make_list(self) -> Lines:
+        made = Lines()
+        made.setModel(self.model)
+        self._delegate = LineDelegate(self.theme, lambda: self.density, self.text_font)
+        made.setItemDelegate(self._delegate)
+        made.find_wanted.connect(self.focus_filter)
+        made.resized.connect(self._place_newer)
+        self._copy = QAction("Copy", made)
+        self._copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
+        self._copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        self._copy.triggered.connect(self.copy)
+        made.addAction(self._copy)
+        made.customContextMenuRequested.connect(self._show_actions)
+        self._copy_all = QAction("Copy all lines", self)
+        self._copy_all.triggered.connect(self._copy_everything)
+        self._clear = QAction("Clear", self)
+        self._clear.triggered.connect(self.clear)
+        self._find = QAction("Find words", self)
+        self._find.triggered.connect(self.focus_filter)
+        return made
+
+    # ---- showing
+
+    def refresh(self) -> None:
+        console = self.session.console
+        choice = (self.level, self.node, self.words.text())
+        if (console.revision, choice) == (self._seen, self._choice):
+            return
+        records, wanted = console.records, self._wanted()
+        if choice != self._choice:
+            self.model.show_all(records, wanted)
+            self.list.scrollToTop()
+        else:
+            self._follow(records)
+        self._seen, self._choice = console.revision, choice
+        self.pages.setCurrentIndex(1 if self.model.rowCount() else 0)
+        self._say_nothing()
+
+    def _follow(self, records: Sequence[LogRecord]) -> None:
+        """New lines come above; who reads further down keeps the lines that he reads."""
+        bar = self.list.verticalScrollBar()
+        before = bar.value()
+        came = self.model.follow(records, self._wanted())
+        if before > 0 and came:
+            self.list.doItemsLayout()
+            bar.setValue(before + came * self._delegate.row_height())
+            self._unseen += came
+            self._say_newer()
+        elif came:
+            self.list.scrollToTop()
+
+    def _wanted(self) -> Wanted:
+        return Wanted(SHOWN[self.level], self.node, self.words.text())
+
+    def _scrolled(self, value: int) -> None:
+        if value == 0:
+            self._unseen = 0
+        self._say_newer()
+
+    def _say_newer(self) -> None:
+        """The way back to the newest line, with how many came meanwhile."""
+        away = self.list.verticalScrollBar().value() > 0
+        if self._unseen:
+            self.newer.set_word(f"{grouped(self._unseen)} new", "arrow-up")
+        else:
+            self.newer.set_word("To the newest", "arrow-up")
+        self.newer.setVisible(away)
+        self.newer.adjustSize()
+        self._place_newer()
+
+    def _place_newer(self) -> None:
+        """Keep the way back at the top right of the list."""
+        port = self.list.viewport()
+        self.newer.move(port.width() - self.newer.width() - 12, 8)
+
+    def _say_nothing(self) -> None:
+        chosen = self.level in {"warn", "error"} or self.node or self.words.text()
+        if not chosen:
+            self.empty.say("Nothing happened yet", "What programs and robots say appears here.")
+            self.empty.set_actions([])
+        elif self.node or self.words.text():
+            self.empty.say("No line fits", "Show all lines again, or wait for one that fits.")
+            self.empty.set_actions([EmptyAction("Show all lines", self.show_all, "x")])
+        else:
+            self.empty.say("No problem was told", "Choose “Everything” to see all lines.")
+            self.empty.set_actions([])
+
+    # ---- what a person chooses
+
+    def set_level(self, level: str) -> None:
+        """Show everything ("all", with details "debug"), from warnings on ("warn"), or errors ("error")."""
+        if level in SHOWN:
+            self.level = level
+            self._name_filter()
+
+    def set_node(self, node: str) -> None:
+        """Show the lines of one node; of all when it is empty."""
+        self.node = node
+        self._name_filter()
+
+    def show_all(self) -> None:
+        """Take all filters away."""
+        self.words.clear()
+        self.words.hide()
+        self.set_node("")
+        self.set_level("all")
+
+    def clear(self) -> None:
+        """Forget all lines."""
+        self.session.console.clear()
+        self.refresh()
+
+    def _name_filter(self) -> None:
+        whose = f" of {self.node}" if self.node else ""
+        self.filter.set_name(f"Shown: {FROM[self.level]}{whose}")
+        self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
+        self.refresh()
+
+    def _show_menu(self) -> None:
+        menu = Menu(self.theme, self)
+        for level, words in FROM.items():
+            self._offer(menu, words, level == self.level, partial(self.set_level, level))
+        nodes = sorted({record.origin for record in self.session.console.records} | {self.node} - {""})
+        if nodes:
+            menu.addSeparator()
+            self._offer(menu, "Of everybody", not self.node, partial(self.set_node, ""))
+        for node in nodes[:MOST_NODES]:
+            if node:
+                self._offer(menu, node, node == self.node, partial(self.set_node, node))
+        menu.addSeparator()
+        menu.addAction(self._find)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        drop_below(menu, self.filter)
+
+    @staticmethod
+    def _offer(menu: Menu, words: str, is_chosen: bool, choose: partial[None]) -> None:
+        action = menu.addAction(plain.entry(words))
+        action.setCheckable(True)
+        action.setChecked(is_chosen)
+        action.triggered.connect(lambda _on=False: choose())
+
+    def _show_actions(self, at: QPoint) -> None:
+        menu = Menu(self.theme, self)
+        menu.addActions([self._copy, self._copy_all, self._find, self._clear])
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(self.list.viewport().mapToGlobal(at))
+
+    def more_actions(self) -> Sequence[QAction]:
+        return (self._find, self._copy_all, self._clear)
+
+    def focus_filter(self) -> bool:
+        self.words.show()
+        self.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.words.selectAll()
+        return True
+
+    def _to_lines(self) -> None:
+        self.list.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    # ---- copying
+
+    def copy(self) -> None:
+        """Put the chosen lines on the clipboard, oldest first."""
+        self._copy_rows(sorted((index.row() for index in self.list.selectedIndexes()), reverse=True))
+
+    def _copy_everything(self) -> None:
+        self._copy_rows(range(self.model.rowCount() - 1, -1, -1))
+
+    def _copy_rows(self, rows: Sequence[int]) -> None:
+        if rows:
+            records = [self.model.index(row, 0).data(RECORD_ROLE) for row in rows]
+            QGuiApplication.clipboard().setText("\n".join(line_of(record) for record in records))
+            self.context.toast(f"Copied {grouped(len(rows))} line{'' if len(rows) == 1 else 's'}")
+
+    # ---- how it looks, and what is kept
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self.list.doItemsLayout()  # rows grow with the text
+        self._say_newer()
+
+    def save_state(self) -> dict[str, object]:
+        return {"level": self.level}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        self.set_level(str(state.get("level", "all")))
+
+
+PANEL = Panel("console", "Console", "terminal", (), ConsolePanel)

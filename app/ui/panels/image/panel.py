@@ -1,0 +1,265 @@
+"""Image: the pictures of one topic at their own aspect, and how many of them are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, Qt, QUrl
+from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QImage, QResizeEvent
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
+
+from app.core.messages import snapshots
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.image.actions import PictureActions
+from app.ui.panels.image.snapshot import SnapshotJob
+from app.ui.pictures.placement import PicturePlace
+from app.ui.pictures.robot_boxes import boxes_on, owner_of
+from app.ui.pictures.zoom import ZoomablePicture
+from app.ui.text import plain
+from app.ui.widgets import EmptyAction, EmptyState, IconButton
+from app.ui.widgets.menus import Menu, drop_below
+
+if TYPE_CHECKING:
+    from app.core.messages.image_streams import ImageStream
+    from app.core.network.watches import Look, Watch
+    from nep.messages.message import Message
+
+CODEC = "image"
+ROOMY = 320
+MOST_PLACES = 200
+
+
+class ImagePanel(PanelWidget):
+    """One picture stream; the first one that there is, until a person chooses another in the title."""
+
+    shows_pictures = True
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Image")
+        self._topic = ""
+        self._stream: ImageStream | None = None
+        self._watch: Watch | None = None
+        self._watched_robot = ""
+        self._places: dict[str, PicturePlace] = {}
+        self._revision = -1
+        self._there: bool | None = None
+        self.choose = IconButton(self.theme, "chevron-down", "Choose a picture topic", size=26)
+        self.choose.setProperty("place", "start")
+        self.choose.clicked.connect(self._show_menu)
+        self.chips = [self.choose]
+        self.view = ZoomablePicture(self.theme)
+        self.view.setAccessibleName("Picture")
+        self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.view.customContextMenuRequested.connect(self._show_actions)
+        self._make_actions()
+        self.empty = EmptyState(self.theme, "image", "", "")
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(self.view)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.pages)
+        self.setFocusProxy(self.view)
+        self._say_nothing()
+
+    def _make_actions(self) -> None:
+        own = {"freeze": self._freeze_or_not, "save": self.save_picture, "copy": self.copy_picture}
+        self.actions_of = PictureActions(self.theme, self.view, own)
+        self._look_inside = QAction(self.theme.icon("list-tree"), "Show in the inspector", self)
+        self._look_inside.triggered.connect(self._inspect)
+        self._line = QAction(self)
+        self._line.setSeparator(True)
+        self.job = SnapshotJob(self, lambda: snapshots.folder(self.session.settings))
+        self.job.saved.connect(self._saved)
+        self.job.copied.connect(self._copied)
+        self.job.failed.connect(self._failed)
+        self.fit = IconButton(self.theme, "maximize", "Whole picture", "0", size=26)
+        self.freeze = IconButton(
+            self.theme, "snowflake", "Freeze this picture", "Space", checkable=True, size=26
+        )
+        self.keep = IconButton(self.theme, "download", "Save as PNG", "S", size=26)
+        self.fit.clicked.connect(self.view.show_whole)
+        self.freeze.toggled.connect(self._hold)
+        self.keep.clicked.connect(self.save_picture)
+        self.header = [self.fit, self.freeze, self.keep]
+
+    def topics(self) -> list[str]:
+        """The picture topics that there are now."""
+        return [topic.name for topic in self.session.topics if topic.codec == CODEC and topic.gone_s is None]
+
+    def show_topic(self, name: str) -> None:
+        """Look at another topic."""
+        if name == self._topic and self._stream is not None:
+            return
+        self.shut()
+        if name != self._topic:
+            self._show_place_of(name)
+        self._topic = name
+        self.view.clear()
+        self.freeze.setChecked(False)
+        self.set_title("Image", name)
+        if name:
+            self._stream = self.session.images.stream(name)
+            self.session.topics.mark_seen(name)
+        self._say_nothing()
+
+    def _show_place_of(self, topic: str) -> None:
+        """How a person looked, zoomed and turned, belongs to a topic: it comes back with it."""
+        if len(self._places) >= MOST_PLACES:
+            self._places.clear()
+        self.view.place = self._places.setdefault(topic, PicturePlace())
+        self.actions_of.show_checks()
+
+    def refresh(self) -> None:
+        if self.session.topics.revision != self._revision:
+            self._revision = self.session.topics.revision
+            there = self.topics()
+            self.choose.setVisible(bool(there))
+            if not self._topic and there:
+                self.show_topic(there[0])
+        if self._stream is None:
+            return
+        self._look_at_robot()
+        link = self.session.fleet.link(self._watched_robot) if self._watched_robot else None
+        self.view.take(self._stream, boxes_on(link, self._topic) if link is not None else ())
+        if self._stream.picture is not None:
+            self._page(there=True)
+        elif self._stream.error:
+            self.empty.say("This can't be shown as a picture", f"{self._stream.error}.", "circle-x")
+            look = EmptyAction("Look at the message", self._inspect, "list-tree")
+            self.empty.set_actions([look])
+
+    def _look_at_robot(self) -> None:
+        link = owner_of(self.session, self._topic)
+        name = link.name if link is not None else ""
+        if name != self._watched_robot:
+            self._leave_robot()
+            self._watched_robot = name
+            if name:
+                self._watch = self.session.fleet.look_at(name)
+
+    def _say_nothing(self) -> None:
+        if self._topic:
+            self.empty.say("No pictures yet", f"The next picture on {self._topic} appears here.", "image")
+            self.empty.set_actions([])
+        else:
+            words = "Pictures appear here as soon as a camera publishes them."
+            self.empty.say("No pictures yet", words, "image")
+            robot = EmptyAction("Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot")
+            self.empty.set_actions([robot])
+        self._page(there=False)
+
+    def _page(self, *, there: bool) -> None:
+        if self._there is there:
+            return
+        self._there = there
+        self.pages.setCurrentWidget(self.view if there else self.empty)
+        self.actions_of.set_enabled(there)
+        self._fit_title()
+
+    def _fit_title(self) -> None:
+        """A narrow title keeps its name: what is left out is in "more"."""
+        self.freeze.setVisible(self._there is True)
+        for button in (self.fit, self.keep):
+            button.setVisible(self._there is True and self.width() >= self.theme.scaled(ROOMY))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_title()
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def _freeze_or_not(self) -> None:
+        self.freeze.setChecked(not self.freeze.isChecked())
+
+    def _hold(self, held: bool) -> None:
+        self.actions_of["freeze"].setChecked(held)
+        if self._stream is not None:
+            self._stream.hold(held)
+
+    def save_picture(self) -> None:
+        """Save what is shown as PNG, as large as it was received."""
+        message = self._message()
+        if message is not None:
+            self.job.save(message)
+
+    def copy_picture(self) -> None:
+        """Put what is shown on the clipboard, as large as it was received."""
+        message = self._message()
+        if message is not None:
+            self.job.copy(message)
+
+    def _message(self) -> Message | None:
+        return self.view.picture.message if self.view.picture is not None else None
+
+    def _saved(self, path: str) -> None:
+        folder = QUrl.fromLocalFile(str(Path(path).parent))
+        self.context.toast(
+            f"Saved {Path(path).name}", "Open folder", lambda: QDesktopServices.openUrl(folder)
+        )
+
+    def _copied(self, image: QImage) -> None:
+        QGuiApplication.clipboard().setImage(image)
+        self.context.toast(f"Copied the picture, {image.width()}\u00d7{image.height()}")
+
+    def _failed(self, sentence: str) -> None:
+        self.session.console.add("error", "image", f"the picture can't be kept: {sentence}")
+        self.session.alerts.put(
+            "snapshot", "error", "The picture can't be kept.", sentence, button="Look at the console",
+            action="panel:console",
+        )  # fmt: skip
+
+    def _show_actions(self, at: QPoint) -> None:
+        menu = Menu(self.theme, self)
+        menu.addActions(self.more_actions())
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(self.view.mapToGlobal(at))
+
+    def _inspect(self) -> None:
+        self.context.run(f"inspect:{self._topic}")
+
+    def _show_menu(self) -> None:
+        menu = Menu(self.theme, self)
+        for name in self.topics():
+            action = menu.addAction(plain.entry(name))
+            action.setCheckable(True)
+            action.setChecked(name == self._topic)
+            action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))
+        if menu.isEmpty():  # Qt shows no empty menu, and would keep it
+            menu.addAction("No camera sends pictures now").setEnabled(False)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        drop_below(menu, self.choose)
+
+    def more_actions(self) -> list[QAction]:
+        self._look_inside.setEnabled(bool(self._topic))
+        return [*self.actions_of.listed(), self._line, self._look_inside]
+
+    def save_state(self) -> dict[str, object]:
+        return {"topic": self._topic, "place": self.view.place.saved()}
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        topic = state.get("topic")
+        if isinstance(topic, str) and topic:
+            self.show_topic(topic)
+        self.view.place.restore(state.get("place"))
+        self.actions_of.show_checks()
+
+    def _leave_robot(self) -> None:
+        if self._watch is not None:
+            self._watch.close()
+        self._watch, self._watched_robot = None, ""
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._stream, self._watch)
+
+    def shut(self) -> None:
+        self.job.wait()
+        self._leave_robot()
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+
+
+PANEL = Panel("image", "Image", "image", (CODEC,), ImagePanel)

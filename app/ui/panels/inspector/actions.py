@@ -1,0 +1,113 @@
+"""What a person can do with the message in the inspector: in its menus and by keys."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
+
+from app.ui.panels.inspector.footer import plain_words
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from PySide6.QtWidgets import QWidget
+
+    from app.ui.panels.inspector.body import InspectorBody
+    from app.ui.panels.inspector.tree_model import Node
+    from app.ui.theme.theme import Theme
+    from nep.messages.message import Message
+
+
+FIND = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)
+
+
+class InspectorActions(QObject):
+    """Copy a value, its path, or the message; find; compare."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        panel: QWidget,
+        body: InspectorBody,
+        shown: Callable[[], Message | None],
+        *,
+        find: Callable[[], object],
+        toast: Callable[[str], None],
+    ) -> None:
+        """Keys work in ``panel``; ``shown`` is its message, ``find`` goes to its field."""
+        super().__init__(panel)
+        self._body, self._shown, self._toast = body, shown, toast
+        rows: tuple[tuple[str, str, str, Callable[[], object]], ...] = (
+            ("Copy value", "Ctrl+C", "copy", self.copy_value),
+            ("Copy path", "Ctrl+Shift+C", "link", self.copy_path),
+            ("Copy the message as JSON", "Ctrl+Shift+J", "braces", self.copy_message),
+            ("Find a key or value", "Ctrl+F", "search", find),
+            ("Next one", "F3", "", lambda: body.finder.step(1)),
+            ("Previous one", "Shift+F3", "", lambda: body.finder.step(-1)),
+        )
+        self._find = find
+        panel.installEventFilter(self)
+        self._actions: list[QAction] = []
+        for words, key, icon, does in rows:
+            action = QAction(words, panel)
+            action.setShortcut(QKeySequence(key))
+            action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            if icon:
+                action.setIcon(theme.icon(icon))
+            action.triggered.connect(lambda _on=False, do=does: do())
+            (body.tree if key.endswith("C") else panel).addAction(action)  # fields copy their own text
+            self._actions.append(action)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Inside the panel its own Ctrl+F goes before the window's, which finds blocks."""
+        if isinstance(event, QKeyEvent) and event.keyCombination() == FIND:
+            if event.type() == QEvent.Type.ShortcutOverride:
+                event.accept()
+                return True
+            if event.type() == QEvent.Type.KeyPress:
+                self._find()
+                return True
+        return super().eventFilter(watched, event)
+
+    def listed(self) -> list[QAction]:
+        """All of them, for a menu."""
+        return list(self._actions)
+
+    def set_enabled(self, there: bool) -> None:
+        """Whether there is a message in the tree."""
+        for action in self._actions:
+            action.setEnabled(there)
+
+    def copy_value(self) -> None:
+        """Put the chosen value on the clipboard."""
+        node = self._chosen()
+        if node is not None:
+            self._copied(plain_words(node.value), node.path)
+
+    def copy_path(self) -> None:
+        """Put the chosen value's path on the clipboard."""
+        node = self._chosen()
+        if node is not None:
+            self._copied(node.path, f"the path {node.path}")
+
+    def copy_message(self) -> None:
+        """Put the whole message on the clipboard: JSON as it was sent, anything else as JSON."""
+        message = self._shown()
+        if message is None:
+            return
+        if message.codec == "json":
+            text = str(message.data, "utf-8", "replace")
+        else:
+            text = plain_words(self._body.model.value())
+        self._copied(text, f"the message of {message.topic}")
+
+    def _chosen(self) -> Node | None:
+        """The value that is chosen in the tree."""
+        index = self._body.tree.currentIndex()
+        return self._body.model.node(index) if index.isValid() else None
+
+    def _copied(self, text: str, what: str) -> None:
+        QGuiApplication.clipboard().setText(text)
+        self._toast(f"Copied {what}")

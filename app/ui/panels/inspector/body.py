@@ -1,0 +1,122 @@
+"""What the inspector is made of: find bar, tree, bytes, empty states and foot, of which one page shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from app.ui.panels.inspector.compare import CompareStrip
+from app.ui.panels.inspector.find import FindBar
+from app.ui.panels.inspector.footer import Foot
+from app.ui.panels.inspector.hex_view import HexView
+from app.ui.panels.inspector.tree_model import TreeModel
+from app.ui.panels.inspector.tree_view import TreeView
+from app.ui.text.numbers import size_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import EmptyAction, EmptyState, IconButton, Line, Segments, label
+
+if TYPE_CHECKING:
+    from app.core.messages.lazy_json import JsonIndex
+
+NOTHING, LARGE, TREE, RAW = range(4)
+
+
+class InspectorBody(QWidget):
+    """The parts below the title."""
+
+    def __init__(self, theme: Theme, looked_through: Callable[[], tuple[object, JsonIndex | None]]) -> None:
+        """``looked_through`` gives what the find bar looks through."""
+        super().__init__()
+        self._waiting = ""
+        self.model = TreeModel()
+        self.tree = TreeView(theme, self.model)
+        self.tree.setAccessibleName("Newest message")
+        self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.finder = FindBar(theme, looked_through)
+        self.finder.found.connect(self._reveal)
+        self.finder.field.leave.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.mode = Segments(
+            theme, [("tree", "Tree", None), ("raw", "Raw", None)], size="small", name="Show as"
+        )
+        self.compare = IconButton(theme, "equal", "Compare with the message before", checkable=True, size=26)
+        self.strip = CompareStrip(theme)
+        self.sentence = label("", "small", role="warn", wrap=True)
+        self.sentence.setContentsMargins(12, 6, 12, 6)
+        self.bytes = HexView(theme)
+        self.empty = EmptyState(theme, "list-tree", "", "")
+        self.large = EmptyState(theme, "database", "", "")
+        self.foot = Foot(theme)
+        self.foot.show_path("")
+        self._arrange(theme)
+
+    def _arrange(self, theme: Theme) -> None:
+        self.bar = QWidget()
+        bar = QHBoxLayout(self.bar)
+        bar.setContentsMargins(8, 7, 8, 7)
+        bar.setSpacing(6)
+        bar.addWidget(self.finder, 1)
+        bar.addWidget(self.compare)
+        bar.addWidget(self.mode)
+        self.line = Line(theme)
+        self.pages = QStackedWidget()
+        for page in (self.empty, self.large, self.tree, self.bytes):
+            self.pages.addWidget(page)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget in (self.bar, self.line, self.strip, self.sentence):
+            column.addWidget(widget)
+        column.addWidget(self.pages, 1)
+        column.addWidget(self.foot)
+
+    @property
+    def page(self) -> int:
+        """Which page shows."""
+        return self.pages.currentIndex()
+
+    def show_page(self, page: int, *, comparing: bool) -> None:
+        """Show a page with what belongs to it."""
+        sentence = self.sentence.text() if page == RAW else ""
+        self.sentence.setText(sentence)
+        self.sentence.setVisible(bool(sentence))
+        self.pages.setCurrentIndex(page)
+        for widget in (self.bar, self.line, self.foot):
+            widget.setVisible(page in {TREE, RAW})
+        self.strip.setVisible(page == TREE and comparing)
+        self.foot.legend.setVisible(page == TREE)
+        if page in {TREE, RAW}:
+            self.mode.set_value("tree" if page == TREE else "raw")
+
+    def say_waiting(self, topic: str, published: bool) -> None:
+        """There is no message of this topic yet, and perhaps nobody publishes it."""
+        words = f"The next message on {topic} appears here."
+        words = words if published else f"Nobody publishes it now. {words}"
+        if words != self._waiting:
+            self._waiting = words
+            self.empty.say("No message yet", words)
+            self.empty.set_actions([])
+
+    def say_nothing(self, topic: str, choose: Callable[[], object]) -> None:
+        """There is no message: of which topic, or that none is chosen."""
+        self._waiting = ""
+        if topic:
+            self.say_waiting(topic, published=True)
+        else:
+            self.empty.say("Nothing chosen", "Click a topic to see its newest message.")
+            self.empty.set_actions([EmptyAction("Choose a topic", choose, "list")])
+
+    def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
+        """There is a large message; ``read`` reads it when a person asks for it."""
+        self.large.say(f"A message of {size_words(size_bytes)}", words)
+        if read is None:
+            self.large.set_actions([])
+        elif self.page != LARGE:
+            self.large.set_actions([EmptyAction("Read the newest one", read, "list-tree", primary=True)])
+
+    def _reveal(self, path: object) -> None:
+        index = self.model.reveal(path)  # type: ignore[arg-type]
+        self.tree.setCurrentIndex(index)
+        self.tree.scrollTo(index)

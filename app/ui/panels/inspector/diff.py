@@ -1,0 +1,117 @@
+"""How two messages differ, level by level: what was changed, added or removed; lists by index."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Final, Literal
+
+import orjson
+
+from app.core.messages.lazy_json import LazyList, LazyObject
+from app.ui.panels.inspector.values import is_container, keys_of, size_of, values_of
+
+Mark = Literal["", "changed", "added", "removed"]
+Key = str | int
+MOST = 5000  # children of one value that are looked through for changes
+
+
+class _Nothing:
+    """Stands for "is not there", which is something else than null."""
+
+    def __init__(self, words: str) -> None:
+        self._words = words
+
+    def __repr__(self) -> str:
+        return self._words
+
+
+OFF: Final = _Nothing("nothing to compare with")
+MISSING: Final = _Nothing("missing")
+Part = tuple[Key, object, object, Mark]
+
+
+def differs(before: object, after: object) -> bool:
+    """Whether a value has changed. NaN has not; 1 and true are equal in Python, not in JSON."""
+    if before is after or (before != before and after != after):  # noqa: PLR0124
+        return False
+    if is_container(before) and is_container(after):
+        return _kind(before) != _kind(after) or not _same(before, after)
+    return type(before) is not type(after) or before != after
+
+
+def mark_of(value: object, base: object) -> Mark:
+    """How a value differs from the one at the same place before."""
+    if base is OFF:
+        return ""
+    if base is MISSING:
+        return "added"
+    if value is MISSING:
+        return "removed"
+    return "changed" if differs(base, value) else ""
+
+
+def parts_of(
+    value: object, base: object, mark: Mark, count: int, *, changes_only: bool
+) -> tuple[list[Part], int]:
+    """The first ``count`` children of a value, and how many there are.
+
+    A child is its key, its value, the value before, and how they differ. What was removed stands after what
+    is there, with its old value. All below something added is added, all below something removed is removed
+    (``mark`` is the parent's). For ``changes_only`` the first `MOST` children are looked through.
+    """
+    if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
+        whole: Mark = "removed" if mark == "removed" else "added"
+        pairs = zip(keys_of(value, count), values_of(value, count), strict=False)
+        return [(key, below, MISSING, whole) for key, below in pairs], size_of(value)
+    if changes_only:
+        found = [part for part in islice(_compared(value, base), MOST) if part[3]]
+        return found[:count], len(found)
+    return list(islice(_compared(value, base), count)), _total(value, base)
+
+
+def _compared(value: object, base: object) -> Iterator[Part]:
+    """The children of two containers of one kind, one after the other, as somebody asks for them."""
+    if isinstance(value, Mapping) and isinstance(base, Mapping):
+        before = {str(key): key for key in base}
+        for key, below in value.items():
+            own = before.pop(str(key), MISSING)
+            was = MISSING if own is MISSING else base[own]
+            yield str(key), below, was, mark_of(below, was)
+        for name, key in before.items():
+            yield name, base[key], MISSING, "removed"
+    elif isinstance(value, Sequence) and isinstance(base, Sequence):
+        for row, below in enumerate(value):
+            was = base[row] if row < len(base) else MISSING
+            yield row, below, was, mark_of(below, was)
+        for row in range(len(value), len(base)):
+            yield row, base[row], MISSING, "removed"
+
+
+def _total(value: object, base: object) -> int:
+    """How many children two containers of one kind have together."""
+    if isinstance(value, Mapping) and isinstance(base, Mapping):
+        return len({str(key) for key in value} | {str(key) for key in base})
+    return max(size_of(value), size_of(base))
+
+
+def _kind(value: object) -> str:
+    return "object" if isinstance(value, Mapping) else "list"
+
+
+def _same(before: object, after: object) -> bool:
+    """Containers of one kind: equal at every depth; true is not 1, the order of keys does not matter.
+
+    Large ones that are not decoded are compared by their texts.
+    """
+    if isinstance(before, (LazyList, LazyObject)) and isinstance(after, (LazyList, LazyObject)):
+        return before == after
+    return size_of(before) == size_of(after) and _written(before) == _written(after)
+
+
+def _written(value: object) -> object:
+    """A value in a form whose equality is that of JSON; as it is when it has none (bytes of msgpack)."""
+    try:
+        return orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
+    except (TypeError, RecursionError):
+        return value

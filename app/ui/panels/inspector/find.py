@@ -1,0 +1,168 @@
+"""Finding a key or a value in a message: the field, how many there are, next and previous."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from app.ui.panels.inspector.values import search
+from app.ui.theme.theme import Theme
+from app.ui.widgets import IconButton, SearchField, paint
+from app.ui.widgets.plain_key import is_plain
+
+if TYPE_CHECKING:
+    from app.core.messages.lazy_json import JsonIndex
+
+MOST = 1000
+Path = tuple[str | int, ...]
+
+
+def find_in_text(index: JsonIndex, words: str, most: int = MOST) -> list[int]:
+    """The places in a large JSON text where these words are (any case of the letters a to z)."""
+    text, wanted = bytes(index.data).lower(), words.encode().lower()
+    found: list[int] = []
+    at = text.find(wanted) if wanted else -1
+    while at >= 0 and len(found) < most:
+        found.append(at)
+        at = text.find(wanted, at + len(wanted))
+    return found
+
+
+class FindField(SearchField):
+    """Return goes to the next one, Shift+Return to the one before, Esc clears, Down goes into the tree."""
+
+    step_wanted = Signal(int)
+    leave = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme, "Find a key or value")
+        self._count = ""
+
+    @property
+    def count(self) -> str:
+        """What stands at its right end: ``2 of 111``."""
+        return self._count
+
+    def show_count(self, words: str) -> None:
+        """Say how many there are, inside the field."""
+        if words != self._count:
+            self._count = words
+            room = round(paint.width_of(self._theme.font("small"), words)) + 6 if words else 0
+            self.setTextMargins(20, 0, room, 0)
+            self.setAccessibleDescription(words)
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if self._count:
+            painter = QPainter(self)
+            room = QRectF(self.rect()).adjusted(0, 0, -8, 0)
+            ink = self._theme.colour("textTertiary")
+            paint.words(painter, room, self._count, self._theme.font("small"), ink, paint.RIGHT)
+            painter.end()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        back = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_F3}:
+            self.step_wanted.emit(-1 if back else 1)
+        elif event.key() == Qt.Key.Key_Escape and self.text():
+            self.clear()
+        elif event.key() == Qt.Key.Key_Down and is_plain(event):
+            self.leave.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class FindBar(QWidget):
+    """The field with its count and arrows; `found` with the path of what was found.
+
+    What is found belongs to the message that was looked through: `forget` when another one is shown, then the
+    next step looks anew and goes on where it was.
+    """
+
+    found = Signal(object)
+
+    def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
+        """``source`` gives the message that is shown, and the index of a large one."""
+        super().__init__()
+        self._source = source
+        self._matches: list[Path] | list[int] | None = None
+        self._index: JsonIndex | None = None
+        self._more = False
+        self._place = -1
+        self.field = FindField(theme)
+        self.field.textChanged.connect(self.look)
+        self.field.step_wanted.connect(self.step)
+        self.before = IconButton(theme, "chevron-up", "Previous one", "Shift+Return", size=22)
+        self.after = IconButton(theme, "chevron-down", "Next one", "Return", size=22)
+        self.before.clicked.connect(lambda: self.step(-1))
+        self.after.clicked.connect(lambda: self.step(1))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(1)
+        row.addWidget(self.field, 1)
+        for button in (self.before, self.after):
+            row.addWidget(button)
+            button.hide()
+        self.setFocusProxy(self.field)
+
+    @property
+    def matches(self) -> list[Path] | list[int]:
+        """Where the words are, as far as the message was looked through: paths, or places in a large text."""
+        return self._matches or []
+
+    def look(self, words: str) -> None:
+        """Look for these words and go to the first place."""
+        self._place = -1
+        self._search(words)
+        for button in (self.before, self.after):
+            button.setVisible(bool(words))
+        self._say(wrong=bool(words) and not self.matches)
+        if self.matches:
+            self.step(1)
+
+    def forget(self) -> None:
+        """Another message is shown."""
+        self._matches = None
+
+    def step(self, by: int) -> None:
+        """Go on to the next one, or back."""
+        words = self.field.text()
+        if not words:
+            return
+        if self._matches is None:
+            last = self._place
+            self._search(words)
+            self._place = min(last, len(self.matches) - 1)
+        if self.matches:
+            self._place = (self._place + by) % len(self.matches)
+            found = self.matches[self._place]
+            place = isinstance(found, int) and self._index is not None
+            self.found.emit(self._index.path_to(found) if place else found)  # type: ignore[union-attr, arg-type]
+        self._say(wrong=not self.matches)
+
+    def _search(self, words: str) -> None:
+        if not words:
+            self._matches = []
+            return
+        value, self._index = self._source()
+        found: list[Path] | list[int]
+        if self._index is not None:
+            found = find_in_text(self._index, words, MOST + 1)
+        else:
+            found = list(islice(search(value, words), MOST + 1))
+        self._more = len(found) > MOST
+        self._matches = found[:MOST]
+
+    def _say(self, *, wrong: bool) -> None:
+        total = f"{len(self.matches)}{'+' if self._more else ''}"
+        words = f"{self._place + 1} of {total}" if self.matches else "none"
+        self.field.show_count(words if self.field.text() else "")
+        self.field.setProperty("wrong", "true" if wrong else "false")
+        self.field.style().unpolish(self.field)
+        self.field.style().polish(self.field)

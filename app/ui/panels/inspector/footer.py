@@ -1,0 +1,172 @@
+"""Parts of the inspector: what it says of pictures, what it copies, and its foot."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from app.core.messages.lazy_json import LazyList, LazyObject
+from app.ui.text import plain
+from app.ui.text.numbers import age_words, grouped, latency_words, size_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Changing, IconButton, Line, label, paint
+from nep.errors import NepError
+
+if TYPE_CHECKING:
+    from app.core.network.topics import Topic
+    from nep.messages.message import Message
+
+FACTS_S = 0.1  # nobody reads faster, and each time is painted
+LARGE_BYTES = 1_000_000  # above, a message is never decoded in the window's thread
+
+
+def image_summary(message: Message) -> Mapping[str, object]:
+    """What is worth reading of a picture: how it is coded, its shape, its bytes; never its pixels."""
+    shape = message.extension.get("shape")
+    if shape is None:
+        shape = list(getattr(message.payload, "shape", ()))
+    height, width, *depth = (
+        [*shape, 0, 0][: max(2, len(shape))] if isinstance(shape, (list, tuple)) else (0, 0)
+    )
+    return {
+        "encoding": message.extension.get("encoding", "not told"),
+        "width": width,
+        "height": height,
+        "channels": depth[0] if depth else 1,
+        "size": size_words(message.size_bytes),
+    }
+
+
+def tells_its_shape(message: Message) -> bool:
+    """Whether it is a picture that can be summed up without decoding it."""
+    return message.codec == "image" and message.extension.get("shape") is not None
+
+
+def plain_words(value: object) -> str:
+    """A value for the clipboard: text as it is, everything else as JSON."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return bytes(value).hex(" ")
+    if isinstance(value, (LazyList, LazyObject)):
+        return str(value.text, "utf-8", "replace")
+    return json.dumps(value, indent=2, ensure_ascii=False, default=str)
+
+
+def payload_or(message: Message, otherwise: object) -> object:
+    """A message's decoded value; ``otherwise`` for what can't be read or is too large to be read here."""
+    if message.size_bytes > LARGE_BYTES or message.codec == "image":
+        return otherwise
+    try:
+        return message.payload
+    except NepError:
+        return otherwise
+
+
+def live_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
+    """The words, status and icon of the chip that says whether what is shown is still coming."""
+    if frozen:
+        return "frozen", "off", "snowflake"
+    if topic is None:
+        return "gone", "off", ""
+    if topic.gone_s is not None:
+        return f"gone {int(topic.gone_s)} s", "off", ""
+    return "live", "info", ""
+
+
+def message_facts(message: Message, since_ns: int = 0) -> str:
+    """``seq 18 204   412 B   latency 0.6 ms``, just when it came; what is not known is left out.
+
+    A latched message from before ``since_ns``, when somebody began to look, took no time on its way: it says
+    how long ago it was sent.
+    """
+    facts = [size_words(message.size_bytes)]
+    if message.seq is not None:
+        facts.insert(0, f"seq {grouped(message.seq)}")
+    if message.stamp_ns is not None:
+        latency = (time.time_ns() - message.stamp_ns) / 1e9
+        if message.is_latched and message.stamp_ns < since_ns:
+            facts.append(f"latched, sent {age_words(latency)} ago")
+        elif 0 <= latency < 3600:
+            facts.append(f"latency {latency_words(latency)}")
+    return "   ".join(facts)
+
+
+class Legend(QWidget):
+    """Says what the bar at a row's left means."""
+
+    WORDS = "changed"
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("A bar at the left marks changed values")
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("small")
+        return QSize(round(paint.width_of(font, self.WORDS)) + 10, max(18, round(paint.height_of(font)) + 2))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        colour = self._theme.colour("changed")
+        painter.fillRect(QRectF(0, self.height() / 2 - 7, 3, 14), colour)
+        words = QRectF(self.rect()).adjusted(7, 0, 3, 0)
+        paint.words(painter, words, self.WORDS, self._theme.font("small"), colour)
+        painter.end()
+
+
+class Foot(QWidget):
+    """The path of the chosen value with its copy buttons; below, the message's facts."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.path = label("", "code", role="textSecondary")
+        self.path.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.path.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.copy_value = IconButton(theme, "copy", "Copy value", "Ctrl+C", size=26)
+        self.copy_path = IconButton(theme, "link", "Copy path", "Ctrl+Shift+C", size=26)
+        self.facts = Changing("small", "textTertiary")
+        self._facts_next, self._facts_due = "", -FACTS_S
+        self.legend = Legend(theme)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(0, 0, 0, 0)
+        rows.setSpacing(0)
+        for parts in ((self.path, self.copy_value, self.copy_path), (self.facts, self.legend)):
+            rows.addWidget(Line(theme))
+            row = QHBoxLayout()
+            row.setContentsMargins(10, 3, 8, 3)
+            row.setSpacing(2)
+            row.addWidget(parts[0], 1)
+            for part in parts[1:]:
+                row.addWidget(part)
+            rows.addLayout(row)
+
+    def show_path(self, path: str) -> None:
+        """The path of the chosen value; empty when none is."""
+        self.path.setText(path)
+        self.path.setToolTip(plain.tip(path))
+        for button in (self.copy_value, self.copy_path):
+            button.setEnabled(bool(path))
+
+    def clear(self) -> None:
+        """Another topic is shown from now on."""
+        self.show_path("")
+        self._facts_next, self._facts_due = "", -FACTS_S
+
+    def show_facts(self, facts: str, now: float) -> None:
+        """The facts of the message that is shown from ``now`` (monotonic) on, ten times a second at most."""
+        self._facts_next = facts
+        self.show_next_facts(now)
+
+    def show_next_facts(self, now: float) -> None:
+        """Show the facts that came too soon after others, when it is time; call it with every refresh."""
+        if self._facts_next and now >= self._facts_due:
+            self.facts.setText(self._facts_next)
+            self._facts_next, self._facts_due = "", now + FACTS_S

@@ -1,0 +1,88 @@
+"""Raw bytes: offset, sixteen bytes, and the text in them; only the lines that can be seen are made."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QAbstractScrollArea
+
+from app.ui.theme.theme import Theme
+
+WIDE, NARROW = 16, 8
+EDGE = 12
+
+
+def hex_line(data: memoryview, offset: int, count: int) -> tuple[str, str, str]:
+    """One line: ``0010``, ``7b 22 …`` and the printable signs with dots for the others."""
+    part = bytes(data[offset : offset + count])
+    text = "".join(chr(byte) if 32 <= byte < 127 else "·" for byte in part)
+    return f"{offset:04x}", part.hex(" "), text
+
+
+class HexView(QAbstractScrollArea):
+    """Shows bytes; sixteen in a line, or eight when it is narrow."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._data = memoryview(b"")
+        self.setAccessibleName("Raw bytes")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setFrameShape(QAbstractScrollArea.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+
+    def show_bytes(self, data: memoryview | bytes) -> None:
+        """Show these; the scroll position stays."""
+        self._data = memoryview(data)
+        self._arrange()
+        self.viewport().update()
+
+    def text(self) -> str:
+        """All of it as lines."""
+        count = self.per_line()
+        return "\n".join(
+            "  ".join(hex_line(self._data, at, count)) for at in range(0, len(self._data), count)
+        )
+
+    def per_line(self) -> int:
+        """Bytes in a line at this width."""
+        sign = QFontMetricsF(self._theme.font("code")).horizontalAdvance("0")
+        return WIDE if self.viewport().width() >= (6 + WIDE * 4 + 3) * sign + 2 * EDGE else NARROW
+
+    def _height(self) -> int:
+        return round(self._theme.scaled(20))
+
+    def _arrange(self) -> None:
+        lines = -(-len(self._data) // self.per_line())
+        bar = self.verticalScrollBar()
+        bar.setPageStep(max(1, self.viewport().height() // self._height()))
+        bar.setRange(0, max(0, lines - bar.pageStep()))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._arrange()
+
+    def scrollContentsBy(self, _dx: int, _dy: int) -> None:
+        self.viewport().update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self.viewport())
+        painter.fillRect(self.viewport().rect(), self._theme.colour("panel"))
+        font = self._theme.font("code")
+        painter.setFont(font)
+        sign = QFontMetricsF(font).horizontalAdvance("0")
+        count, height = self.per_line(), self._height()
+        first = self.verticalScrollBar().value()
+        columns = (EDGE, EDGE + 6 * sign, EDGE + (7 + count * 3) * sign)
+        for row in range(self.viewport().height() // height + 1):
+            offset = (first + row) * count
+            if offset >= len(self._data):
+                break
+            parts = zip(
+                hex_line(self._data, offset, count), columns, ("textTertiary", "text", "ok"), strict=True
+            )
+            for words, x, role in parts:
+                painter.setPen(self._theme.colour(role))
+                box = QRectF(x, 4 + row * height, self.viewport().width(), height)
+                painter.drawText(box, int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter), words)
+        painter.end()

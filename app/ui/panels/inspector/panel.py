@@ -1,0 +1,321 @@
+"""Inspector: the newest message of one topic as a tree, or its bytes; found, compared, copied."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QModelIndex, QPoint, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QVBoxLayout
+
+from app.core.messages.reader import Reader, Reading
+from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
+from app.ui.panels.inspector.actions import InspectorActions
+from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE, InspectorBody
+from app.ui.panels.inspector.compare import count_changes
+from app.ui.panels.inspector.diff import OFF
+from app.ui.panels.inspector.footer import (
+    LARGE_BYTES,
+    image_summary,
+    live_words,
+    message_facts,
+    payload_or,
+    tells_its_shape,
+)
+from app.ui.widgets import Chip, IconButton
+from app.ui.widgets.menus import Menu
+from nep.errors import NepError
+
+if TYPE_CHECKING:
+    from app.core.messages.lazy_json import JsonIndex
+    from app.core.network.topics import Topic
+    from app.core.network.watches import Look, Watch
+    from nep.messages.message import Message
+
+FIRST_ROWS = 24
+BEFORE, PINNED = "Message before", "Pinned message"
+
+
+class InspectorPanel(PanelWidget):
+    """Shows one topic: Tree or Raw, what changed, the path of the chosen value, and the message's facts."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Inspector")
+        self.clock = time.monotonic
+        self._topic = ""
+        self._watch: Watch | None = None
+        self._shown: Message | None = None
+        self._allowed: Message | None = None  # a large message that a person wants to read
+        self._reading: Reading | None = None  # what the tree shows, when it was read elsewhere
+        self._raw_wanted = False
+        self._since_ns = 0  # when the panel began to look
+        self._facts_of: tuple[Message | None, str] = (None, "")
+        self._value: object = None
+        self._before: object = OFF  # what stood here before, of the same topic
+        self._pinned: object = OFF
+        self.reader = Reader()
+        self.body = InspectorBody(self.theme, self._looked_through)
+        self._make_header()
+        self._make_body()
+        self._say_nothing()
+
+    # -- its parts ----------------------------------------------------------------------------------------
+
+    def _make_header(self) -> None:
+        theme = self.theme
+        self.live = Chip(theme, "", "info", "")
+        self.freeze = IconButton(theme, "snowflake", "Freeze this panel", checkable=True, size=26)
+        self.pin = IconButton(theme, "pin", "Pin this message and compare with it", checkable=True, size=26)
+        self.freeze.toggled.connect(lambda _on: self.refresh())
+        self.pin.toggled.connect(self._pin)
+        self.header = [self.live, self.freeze, self.pin]
+
+    def _make_body(self) -> None:
+        body = self.body
+        self.model, self.tree, self.finder = body.model, body.tree, body.finder
+        self.mode, self.strip, self.foot, self.bytes = body.mode, body.strip, body.foot, body.bytes
+        self.own = InspectorActions(
+            self.theme, self, body, lambda: self._shown, find=self.focus_filter, toast=self.context.toast
+        )
+        self.foot.copy_value.clicked.connect(self.own.copy_value)
+        self.foot.copy_path.clicked.connect(self.own.copy_path)
+        self.tree.selectionModel().currentChanged.connect(self._chosen)
+        self.tree.customContextMenuRequested.connect(self._show_menu)
+        self.mode.changed.connect(self._set_mode)
+        self.compare = body.compare
+        self.compare.toggled.connect(lambda _on: self._show_value())
+        self.strip.only_changed.connect(lambda _on: self._show_value())
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(body)
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def show_topic(self, name: str) -> None:
+        """Look at another topic."""
+        if name == self._topic:
+            return
+        self._leave()
+        self._topic = name
+        self._shown = self._allowed = self._reading = None
+        self._value, self._before, self._pinned = None, OFF, OFF
+        self._raw_wanted = False
+        self.model.clear()
+        self.foot.clear()
+        for button in (self.freeze, self.pin):
+            button.setChecked(False)
+        self.set_title("Inspector", name)
+        if name:
+            self._since_ns = time.time_ns()
+            self._watch = self.session.watch(name)
+            self.session.topics.mark_seen(name)
+        self._say_nothing()
+
+    def refresh(self) -> None:
+        if not self._topic:
+            return
+        topic = self.session.topics.get(self._topic)
+        self.live.set(*live_words(topic, self.frozen))
+        newest = topic.newest if topic is not None and topic.gone_s is None else None
+        if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
+            self._take(topic, newest)
+        if self.body.page == NOTHING:
+            self.body.say_waiting(self._topic, topic is not None and topic.publishers > 0)
+        done = self.reader.take()
+        if done is not None and not self._raw_wanted:
+            self._show_read(done)
+        self.foot.show_next_facts(self.clock())
+        if self.body.page == TREE and self.tree.fading():
+            self.tree.viewport().update()
+
+    def _take(self, topic: Topic, message: Message) -> None:
+        large = message.size_bytes > LARGE_BYTES and message.codec != "image"
+        if self._raw_wanted:
+            self._show_raw(message, "")
+        elif large and message.codec != "json" and message is not self._allowed:
+            self._offer_large(message)
+        elif large:
+            self._read_elsewhere(message)
+        elif tells_its_shape(message) or message is not topic.newest or self.session.topics.check(topic):
+            self._show_decoded(message)
+        else:
+            self._show_raw(message, topic.decode_error or "")
+
+    def _show_decoded(self, message: Message) -> None:
+        """Show it as a tree; a message that is held may be bad although the newest one is not."""
+        try:
+            value = image_summary(message) if message.codec == "image" else message.payload
+        except NepError as error:
+            self._show_raw(message, str(error))
+        else:
+            self._show_tree(message, value, None)
+
+    def _read_elsewhere(self, message: Message) -> None:
+        """Let the reader's thread look into it; until then what was there stays."""
+        if not self.reader.ask_at_leisure(message, self.clock()):
+            return
+        if self._shown is None or self.body.page == LARGE:
+            self.body.say_large(message.size_bytes, "It is being read.")
+            self._page(LARGE)
+
+    def _show_read(self, done: Reading) -> None:
+        if done.error is not None:
+            self._show_raw(done.message, done.error)
+        else:
+            self._show_tree(done.message, done.value, done)
+
+    def _show_tree(self, message: Message, value: object, reading: Reading | None) -> None:
+        fresh = message is not self._shown
+        self._shown, self._reading = message, reading
+        if fresh:
+            self._before, self._value = (self._value if self._value is not None else OFF), value
+            topic = self.session.topics.get(self._topic)
+            if reading is None and topic is not None and topic.previous is not None:
+                self._before = payload_or(topic.previous, self._before)
+            self.finder.forget()
+        self._value = value
+        self._show_value()
+        self.foot.show_facts(self._facts(message), self.clock())
+        self._page(TREE)
+
+    def _facts(self, message: Message) -> str:
+        """What is said of a message stays as it was when it came, however long it is looked at."""
+        if message is not self._facts_of[0]:
+            self._facts_of = (message, message_facts(message, self._since_ns))
+        return self._facts_of[1]
+
+    def _show_value(self) -> None:
+        """Put the message into the tree, compared or not."""
+        if self._shown is None or self._value is None:
+            return
+        first = not self.model.rowCount()
+        base: object = OFF
+        if self.comparing:
+            base = self._pinned if self.pin.isChecked() else self._before
+            self.strip.say(PINNED if self.pin.isChecked() else BEFORE, *count_changes(self._value, base))
+        self.strip.setVisible(self.comparing and self.body.page == TREE)
+        only = self.comparing and base is not OFF and self.strip.only.isChecked()
+        self.model.set_value(self._value, self.clock(), base, changes_only=only)
+        if first:
+            self.tree.expand_small(FIRST_ROWS)
+
+    def _show_raw(self, message: Message, sentence: str) -> None:
+        self._shown = message
+        self.foot.show_facts(self._facts(message), self.clock())
+        self.bytes.show_bytes(message.data)
+        self.body.sentence.setText(f"This can't be read as {message.codec}: {sentence}." if sentence else "")
+        self._page(RAW)
+
+    def _offer_large(self, message: Message) -> None:
+        self._shown = message
+        words = f"Messages of {message.codec} above 1 MB are read only when you ask for it."
+        self.body.say_large(message.size_bytes, words, self._read_large)
+        self._page(LARGE)
+
+    def _read_large(self) -> None:
+        """Read the message that is shown, and hold it: the next one would hide it again."""
+        if self._shown is not None:
+            self._allowed = self._shown
+            self.freeze.setChecked(True)
+            self.reader.ask(self._shown)
+            self.body.say_large(self._shown.size_bytes, "It is being read.")
+
+    def _page(self, page: int) -> None:
+        self.body.show_page(page, comparing=self.comparing)
+        self.own.set_enabled(page == TREE)
+
+    def _say_nothing(self) -> None:
+        self.body.say_nothing(self._topic, lambda: self.context.run("panel.topics"))
+        if not self._topic:
+            self.live.set("")
+        for button in (self.freeze, self.pin):
+            button.setVisible(bool(self._topic))
+        self._page(NOTHING)
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    @property
+    def frozen(self) -> bool:
+        """Whether this panel holds its message."""
+        return self.freeze.isChecked()
+
+    @property
+    def comparing(self) -> bool:
+        """Whether the tree shows how the message differs from another one."""
+        return self.compare.isChecked() or self.pin.isChecked()
+
+    def _pin(self, pinned: bool) -> None:
+        self._pinned = self._value if pinned and self._value is not None else OFF
+        self._show_value()
+
+    def _set_mode(self, mode: str) -> None:
+        self._raw_wanted = mode == "raw"
+        topic, shown = self.session.topics.get(self._topic), self._shown
+        if shown is None:
+            return
+        if self._reading is not None and self._reading.message is shown and not self._raw_wanted:
+            self._show_read(self._reading)
+        elif topic is not None:
+            self._take(topic, shown)
+
+    def _chosen(self, index: QModelIndex) -> None:
+        self.foot.show_path(self.model.node(index).path if index.isValid() else "")
+
+    def _looked_through(self) -> tuple[object, JsonIndex | None]:
+        return self.model.value(), self._reading.index if self._reading is not None else None
+
+    def _show_menu(self, at: QPoint) -> None:
+        menu = Menu(self.theme, self)
+        menu.addActions(self.own.listed())
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(self.tree.viewport().mapToGlobal(at))
+
+    def more_actions(self) -> list[QAction]:
+        return self.own.listed()
+
+    def focus_filter(self) -> bool:
+        if self.body.bar.isVisible():
+            self.finder.field.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            self.finder.field.selectAll()
+        return self.body.bar.isVisible()
+
+    def theme_changed(self) -> None:
+        self.tree.row_height = round(self.theme.scaled(self.theme.size("row", "tree")))
+        self.tree.doItemsLayout()
+
+    def save_state(self) -> dict[str, object]:
+        return {
+            "topic": self._topic,
+            "compare": self.compare.isChecked(),
+            "changes_only": self.strip.only.isChecked(),
+        }
+
+    def restore_state(self, state: Mapping[str, object]) -> None:
+        topic = state.get("topic")
+        if isinstance(topic, str):
+            self.show_topic(topic)
+        self.compare.setChecked(state.get("compare") is True)
+        self.strip.only.setChecked(state.get("changes_only") is True)
+
+    def _leave(self) -> None:
+        self.reader.forget()
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
+
+    def wake(self) -> None:
+        if self._watch is not None and self._watch.resting:
+            self._since_ns = time.time_ns()
+        super().wake()
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._watch,)
+
+    def shut(self) -> None:
+        self._leave()
+        self.reader.close()
+
+
+PANEL = Panel("inspector", "Inspector", "list-tree", (ANY_TYPE,), InspectorPanel)

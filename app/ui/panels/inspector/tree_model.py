@@ -1,0 +1,278 @@
+"""A lazy tree over one decoded message: nodes are made when they are seen, and stay when the next one comes.
+
+So what is expanded stays expanded, the scroll position stays, and a value that differs from the one before is
+marked with the time of its change. It may be compared with another message: then every node has its mark.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
+
+from app.ui.panels.inspector.diff import MISSING, OFF, Mark, Part, differs, parts_of
+from app.ui.panels.inspector.values import is_container, keys_of, size_of, values_of, words_of
+from app.ui.text import plain
+
+Index = QModelIndex | QPersistentModelIndex
+PAGE = 500
+NODE_ROLE = int(Qt.ItemDataRole.UserRole)
+_ROOT = QModelIndex()
+
+
+@dataclass(slots=True, eq=False)
+class Node:
+    """One value of the message: ``children`` is None until somebody looked into it.
+
+    ``base`` is the value that it is compared with (`OFF`: nothing is compared), ``mark`` how they differ;
+    ``total`` is how many children there are, once they were looked at.
+    """
+
+    key: str | int
+    value: object
+    parent: Node | None
+    row: int = 0
+    depth: int = 0
+    children: list[Node] | None = None
+    changed_s: float | None = None
+    base: object = OFF
+    mark: Mark = ""
+    total: int = 0
+
+    @property
+    def is_container(self) -> bool:
+        """Whether it can have children."""
+        return is_container(self.value)
+
+    @property
+    def path(self) -> str:
+        """Where it is in the message: ``people[0].name``."""
+        if self.parent is None:
+            return ""
+        above = self.parent.path
+        if isinstance(self.key, int):
+            return f"{above}[{self.key}]"
+        return f"{above}.{self.key}" if above else self.key
+
+
+class TreeModel(QAbstractItemModel):
+    """The newest message as rows of one column; `set_value` puts the next message into the same rows."""
+
+    def __init__(self) -> None:
+        """Nothing is shown yet."""
+        super().__init__()
+        self._root = Node("", {}, None, depth=-1, children=[])
+        self.changed_at_s: float | None = None
+        self._changing = False
+        self._changes_only = False
+
+    # -- Qt's questions ---------------------------------------------------------------------------------
+
+    def index(self, row: int, column: int, parent: Index = _ROOT) -> QModelIndex:
+        above = self.node(parent)
+        if above.children is None or not 0 <= row < len(above.children) or column != 0:
+            return QModelIndex()
+        return self.createIndex(row, column, above.children[row])
+
+    def parent(self, index: Index = _ROOT) -> QModelIndex:  # type: ignore[override]
+        above = self.node(index).parent if index.isValid() else None
+        if above is None or above is self._root:
+            return QModelIndex()
+        return self.createIndex(above.row, 0, above)
+
+    def rowCount(self, parent: Index = _ROOT) -> int:
+        return len(self.node(parent).children or ()) if parent.column() <= 0 else 0
+
+    def columnCount(self, _parent: Index = _ROOT) -> int:
+        return 1
+
+    def hasChildren(self, parent: Index = _ROOT) -> bool:
+        node = self.node(parent)
+        return parent.column() <= 0 and (bool(node.children) or self._size(node) > 0)
+
+    def canFetchMore(self, parent: Index) -> bool:
+        node = self.node(parent)
+        # While rows are being changed a view may ask; it gets more when the change is complete.
+        return parent.column() <= 0 and not self._changing and len(node.children or ()) < self._size(node)
+
+    def fetchMore(self, parent: Index) -> None:
+        if self._changing:
+            return
+        node = self.node(parent)
+        have = len(node.children or ())
+        self._load(node, have + PAGE)
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        if not index.isValid():
+            return None
+        node = self.node(index)
+        if role == NODE_ROLE:
+            return node
+        if role == Qt.ItemDataRole.DisplayRole:
+            return str(node.key)
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return plain.tip(node.path)
+        if role == Qt.ItemDataRole.AccessibleTextRole:
+            return ", ".join(part for part in (str(node.key), words_of(node.value), node.mark) if part)
+        return None
+
+    # -- what the inspector asks and says ---------------------------------------------------------------
+
+    def node(self, index: Index) -> Node:
+        """The node of an index; the invisible root for an invalid one."""
+        inside = index.internalPointer() if index.isValid() else None
+        return inside if isinstance(inside, Node) else self._root
+
+    def index_of(self, node: Node) -> QModelIndex:
+        """The index of a node."""
+        return QModelIndex() if node is self._root else self.createIndex(node.row, 0, node)
+
+    def value(self) -> object:
+        """The whole message that is shown."""
+        return self._root.value
+
+    def clear(self) -> None:
+        """Show nothing; the next message begins anew."""
+        self.beginResetModel()
+        self._root = Node("", {}, None, depth=-1, children=[])
+        self.changed_at_s = None
+        self.endResetModel()
+
+    def set_value(self, value: object, now: float, base: object = OFF, *, changes_only: bool = False) -> None:
+        """Show the next message; values that differ are marked as changed at ``now`` (monotonic s).
+
+        A message that is no container is shown as one row called ``value``. The first message marks nothing.
+        With a ``base`` every node is marked by how it differs from that message, and ``changes_only`` leaves
+        out what does not.
+        """
+        first = not self._root.children
+        shown = _as_container(value)
+        self._changes_only = changes_only
+        self._changing = True
+        try:
+            self._update(self._root, (0, shown, _as_container(base), ""), None if first else now)
+            if not self._root.children:
+                self._load(self._root, PAGE)
+        finally:
+            self._changing = False
+
+    def _size(self, node: Node) -> int:
+        """How many children a node has, or (compared, and not looked at yet) whether it has any."""
+        if node.base is OFF:
+            return size_of(node.value)
+        return node.total if node.children is not None else size_of(node.value) or size_of(node.base)
+
+    def _parts(self, node: Node, count: int) -> list[Part]:
+        """The first ``count`` children as they are to be shown."""
+        if node.base is OFF:
+            pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
+            return [(key, value, OFF, "") for key, value in pairs]
+        only = self._changes_only
+        parts, node.total = parts_of(node.value, node.base, node.mark, count, changes_only=only)
+        return parts
+
+    def _update(self, node: Node, part: Part, now: float | None) -> None:
+        _key, value, base, mark = part
+        before, node.value = node.value, value
+        marked, node.mark, node.base = node.mark != mark, mark, base
+        loaded = node.children
+        if loaded is None:
+            if now is not None and not is_container(value) and differs(before, value):
+                node.changed_s = self.changed_at_s = now
+            if marked:
+                self._tell(node, node)
+            return
+        parts = self._parts(node, max(len(loaded), PAGE) if loaded or is_container(value) else 0)
+        wanted = [each[0] for each in parts]
+        if [child.key for child in loaded] != wanted[: len(loaded)] or len(wanted) < len(loaded):
+            self._fit(node, loaded, parts)
+        elif len(wanted) > len(loaded):
+            self._load(node, len(wanted))
+        if not is_container(value) and node is not self._root:
+            node.children = None
+            return
+        for child, newer in zip(loaded, parts, strict=False):
+            self._update(child, newer, now)
+        rows = [child.row for child in loaded if child.changed_s == now and now is not None]
+        if rows:
+            self._tell(loaded[rows[0]], loaded[rows[-1]])
+
+    def _tell(self, first: Node, last: Node) -> None:
+        if first is not self._root:
+            roles = [Qt.ItemDataRole.DisplayRole]
+            self.dataChanged.emit(self.index_of(first), self.index_of(last), roles)
+
+    def _load(self, node: Node, count: int) -> None:
+        """Have ``count`` children, or as many as there are."""
+        parts = self._parts(node, count)
+        if node.children is None:
+            node.children = []
+        first = len(node.children)
+        if len(parts) <= first:
+            return
+        fresh = [_made(node, row, parts[row]) for row in range(first, len(parts))]
+        before, self._changing = self._changing, True  # who is told now must not fetch the same rows
+        self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
+        node.children.extend(fresh)
+        self._changing = before
+        self.endInsertRows()
+
+    def _fit(self, node: Node, loaded: list[Node], parts: Sequence[Part]) -> None:
+        """Children came, went or changed places: those that stay keep what is expanded in them."""
+        wanted = [part[0] for part in parts]
+        keep = set(wanted)
+        for row in range(len(loaded) - 1, -1, -1):
+            if loaded[row].key not in keep:
+                self.beginRemoveRows(self.index_of(node), row, row)
+                del loaded[row]
+                _number(loaded)
+                self.endRemoveRows()
+        have = {child.key for child in loaded}
+        if [key for key in wanted if key in have] != [child.key for child in loaded]:
+            self._reorder(loaded, wanted)
+        for row, part in enumerate(parts):
+            if part[0] not in have:
+                self.beginInsertRows(self.index_of(node), row, row)
+                loaded.insert(row, _made(node, row, part))
+                _number(loaded)
+                self.endInsertRows()
+
+    def _reorder(self, loaded: list[Node], wanted: Sequence[str | int]) -> None:
+        place = {key: number for number, key in enumerate(wanted)}
+        self.layoutAboutToBeChanged.emit()
+        before = self.persistentIndexList()
+        nodes = [self.node(index) for index in before]
+        loaded.sort(key=lambda child: place[child.key])
+        _number(loaded)
+        self.changePersistentIndexList(before, [self.index_of(node) for node in nodes])
+        self.layoutChanged.emit()
+
+    def reveal(self, path: Sequence[str | int]) -> QModelIndex:
+        """The index of a value, loading what leads to it; invalid when it is not there."""
+        node = self._root
+        for key in path:
+            keys: list[str | int] = keys_of(node.value, size_of(node.value))
+            if key not in keys:
+                return QModelIndex()
+            self._load(node, max(keys.index(key) + 1, min(PAGE, len(keys))))
+            below = next((child for child in node.children or () if child.key == key), None)
+            if below is None:
+                return QModelIndex()  # it is left out as it has not changed
+            node = below
+        return self.index_of(node)
+
+
+def _made(parent: Node, row: int, part: Part) -> Node:
+    key, value, base, mark = part
+    return Node(key, value, parent, row, parent.depth + 1, base=base, mark=mark)
+
+
+def _as_container(value: object) -> object:
+    """A message that is no container gets one row, ``value``."""
+    return value if value is OFF or value is MISSING or is_container(value) else {"value": value}
+
+
+def _number(nodes: Sequence[Node]) -> None:
+    for row, node in enumerate(nodes):
+        node.row = row

@@ -1,0 +1,222 @@
+"""How the inspector's tree looks: key left, value right, what changed with a bar and a tint that fade."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QMouseEvent, QPainter, QPen
+from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem, QTreeView
+
+from app.ui.panels.inspector.diff import OFF
+from app.ui.panels.inspector.tree_model import NODE_ROLE, Node, TreeModel
+from app.ui.panels.inspector.values import is_container, size_of, words_of
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+
+Index = QModelIndex | QPersistentModelIndex
+INDENT, LEFT_EDGE, CHEVRON, VALUE_EDGE = 14, 8, 14, 10
+BAR = 3
+BARS = {"": "changed", "changed": "changed", "added": "ok", "removed": "error"}
+SIGNS = {"added": "+ ", "removed": "\u2212 "}
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+
+
+def mixed(under: QColor, over: QColor, share: float) -> QColor:
+    """``share`` (0 to 1) of ``over`` upon ``under``."""
+    keep = 1.0 - share
+    return QColor.fromRgbF(
+        under.redF() * keep + over.redF() * share,
+        under.greenF() * keep + over.greenF() * share,
+        under.blueF() * keep + over.blueF() * share,
+    )
+
+
+class _Height(QStyledItemDelegate):
+    """Rows of one height; everything else is painted by the view."""
+
+    def __init__(self, view: TreeView) -> None:
+        super().__init__(view)
+        self._view = view
+
+    def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
+        return QSize(80, self._view.row_height)
+
+
+class TreeView(QTreeView):
+    """The tree of one message."""
+
+    def __init__(self, theme: Theme, model: TreeModel, clock: Callable[[], float] = time.monotonic) -> None:
+        """Show ``model``; ``clock`` is that of the changes' times."""
+        super().__init__()
+        self.theme = theme
+        self._clock = clock
+        self._tree = model
+        self.row_height = theme.size("row", "tree")
+        self._keyboard = False
+        self.setModel(model)
+        self.setItemDelegate(_Height(self))
+        self.setHeaderHidden(True)
+        self.setUniformRowHeights(True)
+        self.setIndentation(INDENT)
+        self.setRootIsDecorated(True)
+        self.setVerticalScrollMode(QTreeView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setEditTriggers(QTreeView.EditTrigger.NoEditTriggers)
+        self.setExpandsOnDoubleClick(False)
+        self.setMouseTracking(True)
+
+    def share_changed(self, node: Node) -> float:
+        """How strongly a node is marked now: 1 just changed, 0 long ago."""
+        if node.mark:
+            return 1.0
+        if node.changed_s is None or node.base is not OFF:
+            return 0.0
+        fade_s = self.theme.duration("changedFade") / 1000
+        age = self._clock() - node.changed_s
+        if fade_s <= 0:  # reduced motion: no fade, shown for a second
+            return 1.0 if age < 1.0 else 0.0
+        return max(0.0, 1.0 - age / fade_s)
+
+    def fading(self) -> bool:
+        """Whether any mark may still be fading: then the view wants to be painted again."""
+        changed = self._tree.changed_at_s
+        return changed is not None and self._clock() - changed < 1.2
+
+    def expand_small(self, rows: int) -> None:
+        """Open the small parts of a message, upper levels first, while at most ``rows`` rows are shown."""
+        waiting, shown = [QModelIndex()], self._tree.rowCount()
+        while waiting:
+            above = waiting.pop(0)
+            for row in range(self._tree.rowCount(above)):
+                index = self._tree.index(row, 0, above)
+                node = self._tree.node(index)
+                size = size_of(node.value)
+                few = 0 < size <= (8 if isinstance(node.value, Mapping) else 1)
+                if few and node.depth < 3 and shown + size <= rows:
+                    shown += size
+                    self._tree.fetchMore(index)
+                    self.expand(index)
+                    waiting.append(index)
+
+    def drawBranches(self, _painter: QPainter, _rect: QRect, _index: Index) -> None:
+        return
+
+    def drawRow(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        node = index.data(NODE_ROLE)
+        if not isinstance(node, Node):
+            return
+        rect = QRect(option.rect)
+        rect.setLeft(0)
+        chosen = index == self.currentIndex()
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        ground = self.theme.colour("selected" if chosen else "panel")
+        if chosen:
+            painter.fillRect(rect, ground)
+        share = self.share_changed(node)
+        if share > 0:
+            bar = mixed(ground, self.theme.colour(BARS[node.mark]), share)
+            painter.fillRect(QRect(0, rect.top() + 4, BAR, rect.height() - 8), bar)
+        key_end = self._paint_key(painter, rect, node, chosen=chosen)
+        if not node.is_container:
+            self._paint_value(painter, rect, node, key_end, ground, share)
+        if chosen and self._keyboard and self.hasFocus():
+            painter.setPen(QPen(self.theme.colour("focus"), 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(QRectF(rect).adjusted(1, 1, -1, -1), 4, 4)
+        painter.restore()
+
+    def _paint_key(self, painter: QPainter, rect: QRect, node: Node, *, chosen: bool) -> float:
+        theme = self.theme
+        left = LEFT_EDGE + node.depth * INDENT
+        if node.is_container and self._tree.hasChildren(self._tree.index_of(node)):
+            name = "chevron-down" if self.isExpanded(self._tree.index_of(node)) else "chevron-right"
+            box = QRectF(left, rect.center().y() - CHEVRON / 2 + 0.5, CHEVRON, CHEVRON)
+            paint_icon(painter, box, name, theme.colour("textSecondary"))
+        font = theme.font("code")
+        font.setStrikeOut(node.mark == "removed")
+        metrics = QFontMetricsF(font)
+        x = float(left + CHEVRON + 4)
+        room = rect.width() - x - VALUE_EDGE
+        said = SIGNS.get(node.mark, "") + str(node.key)
+        key = metrics.elidedText(said, Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
+        painter.setFont(font)
+        role = BARS[node.mark] if node.mark in SIGNS else "selectedText" if chosen else "text"
+        painter.setPen(theme.colour(role))
+        width = metrics.horizontalAdvance(key)
+        painter.drawText(QRectF(x, rect.top(), width + 2, rect.height()), LEFT, key)
+        x += width
+        if node.is_container:
+            count = words_of(node.value)
+            painter.setPen(theme.colour("accentText" if chosen else "textTertiary"))
+            painter.drawText(QRectF(x + 7, rect.top(), 90, rect.height()), LEFT, count)
+        return x
+
+    def _paint_value(
+        self, painter: QPainter, rect: QRect, node: Node, key_end: float, ground: QColor, share: float
+    ) -> None:
+        theme = self.theme
+        metrics = QFontMetricsF(theme.font("code"))
+        right = rect.right() - VALUE_EDGE - 5
+        room = max(30.0, right - key_end - 16)
+        text = metrics.elidedText(words_of(node.value), Qt.TextElideMode.ElideRight, room)
+        width = metrics.horizontalAdvance(text)
+        colour = theme.colour(_role(node.value))
+        if share > 0 and node.mark not in SIGNS:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(mixed(ground, theme.colour("changedTint"), share))
+            painter.drawRoundedRect(
+                QRectF(right - width - 5, rect.top() + 3, width + 10, rect.height() - 6), 4, 4
+            )
+            colour = mixed(colour, theme.colour("changed"), share)
+        if node.mark in SIGNS:
+            colour = theme.colour(BARS[node.mark])
+        painter.setFont(theme.font("code"))
+        painter.setPen(colour)
+        painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
+        self._paint_before(painter, rect, node, right - width - 10, key_end + 12)
+
+    def _paint_before(self, painter: QPainter, rect: QRect, node: Node, right: float, left: float) -> None:
+        """The value that a compared one had before, where there is room for it."""
+        if node.mark != "changed" or is_container(node.base):
+            return
+        text = f"{words_of(node.base)} \u2192"
+        width = QFontMetricsF(painter.font()).horizontalAdvance(text)
+        if right - width >= left:
+            painter.setPen(self.theme.colour("textTertiary"))
+            painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._keyboard = False
+        index = self.indexAt(event.position().toPoint())
+        node = index.data(NODE_ROLE) if index.isValid() else None
+        if isinstance(node, Node) and event.button() == Qt.MouseButton.LeftButton:
+            self.setCurrentIndex(index)
+            self.setFocus(Qt.FocusReason.MouseFocusReason)
+            if node.is_container and _on_chevron(event.position(), node):
+                self.setExpanded(index, not self.isExpanded(index))
+            return
+        super().mousePressEvent(event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        index = self.indexAt(event.position().toPoint())
+        node = index.data(NODE_ROLE) if index.isValid() else None
+        if isinstance(node, Node) and node.is_container and not _on_chevron(event.position(), node):
+            self.setExpanded(index, not self.isExpanded(index))
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        self._keyboard = event.reason() != Qt.FocusReason.MouseFocusReason
+        super().focusInEvent(event)
+
+
+def _on_chevron(position: QPointF, node: Node) -> bool:
+    left = LEFT_EDGE + node.depth * INDENT
+    return left - 4 <= position.x() <= left + CHEVRON + 4
+
+
+def _role(value: object) -> str:
+    if isinstance(value, str):
+        return "ok"
+    return "textTertiary" if value is None else "text"

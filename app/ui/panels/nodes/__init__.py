@@ -1,0 +1,3 @@
+"""Nodes: the programs that are there, with what they publish and subscribe."""
+
+from app.ui.panels.nodes.panel import PANEL as PANEL

@@ -1,0 +1,139 @@
+"""Nodes: the programs that are there, natives and originals, with what they publish and subscribe."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QModelIndex, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QVBoxLayout
+
+from app.core.network.source import NODE_NAME
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, limits_of, rows_of
+from app.ui.panels.table_panel import TablePanel
+from app.ui.text.numbers import rate_words
+from app.ui.widgets import Scrolled
+from app.ui.widgets.table.model import TableModel
+from app.ui.widgets.table.view import TableView
+
+if TYPE_CHECKING:
+    from app.core.network.nodes import NodeEntry
+
+SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
+LIVELY = frozenset({"cpu"})
+
+
+class NodesPanel(TablePanel[NodeRow]):
+    """The table of nodes, a filter in the title, what is known of the chosen one below."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "node", "network")
+        self.table.selectionModel().currentChanged.connect(self._chosen)
+        self._about = Scrolled(self.foot)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget, stretch in ((self.pages, 1), (self.line, 0), (self._about, 0), (self.doctor, 0)):
+            column.addWidget(widget, stretch)
+        self._opened: set[str] = set()
+        self._seen: tuple[object, ...] = ()
+        self._values = -1
+        self._ticks = 0
+        self._gone = False
+
+    def make_model(self) -> TableModel[NodeRow]:
+        return TableModel(columns(self._own), lambda row: row.key)
+
+    def make_table(self, model: TableModel[NodeRow]) -> TableView[NodeRow]:
+        table = _NodeTable(self.theme, model, "node")
+        table.fold_wanted.connect(self._fold)
+        return table
+
+    def _own(self, node: NodeEntry) -> bool:
+        """Whether it is Studio, or a virtual robot that Studio itself started."""
+        return node.name in {NODE_NAME, *self.session.companions.virtual_robots}
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        nodes = self.session.nodes
+        order = self.table.order.column
+        due = order is not None and order.name in LIVELY and self._ticks % SORT_EVERY == 0
+        if due or (nodes.revision, self.session.master.kind) != self._seen:
+            self.rebuild()
+        if nodes.values_revision != self._values or (self._gone and self._ticks % SORT_EVERY == 0):
+            self._values = nodes.values_revision
+            self.table.tell_visible_changed()
+
+    def rebuild(self) -> None:
+        nodes = self.session.nodes
+        self._seen = (nodes.revision, self.session.master.kind)
+        self._gone = any(node.gone_s is not None for node in nodes)
+        words = self.filter_words()
+        found = [node for node in nodes if all(word in _haystack(node) for word in words)]
+        self.model.set_rows(rows_of(found, self._opened, self.table.order, self._rate))
+        self.filter.setVisible(len(nodes) > 0)
+        self.table.tell_visible_changed()
+        self.show_table(bool(found), bool(words))
+        self._say_chosen()
+
+    def _rate(self, name: str) -> str:
+        topic = self.session.topics.get(name)
+        return rate_words(topic.rate_hz) if topic is not None else ""
+
+    def say_empty(self) -> None:
+        self.empty.say("No nodes yet", "Programs appear here as soon as they join the master.", "network")
+        self.empty.set_actions([])
+
+    def _chosen(self, _now: QModelIndex, _before: QModelIndex) -> None:
+        self._say_chosen()
+
+    def _say_chosen(self) -> None:
+        row = self.model.row_at(self.table.currentIndex())
+        shown = self.pages.currentIndex() == 0
+        words = "Open a node to see its topics" if row is None else facts_of(row.node)
+        limits = limits_of(row.node) if row is not None else ""
+        self.foot.setText(f"{words}.\n{limits}" if limits else words)
+        self._about.setVisible(shown)
+        self.line.setVisible(shown)
+
+    def open_row(self, key: str) -> None:
+        row = self.model.row_at(self.model.index_of(key))
+        if row is None:
+            return
+        if row.topic:
+            self.session.topics.mark_seen(row.topic)
+            self.context.open_topic(row.topic)
+        else:
+            self.session.nodes.mark_seen(row.node.id)
+            self._fold(key, row.node.id not in self._opened)
+
+    def _fold(self, key: str, opened: bool) -> None:
+        row = self.model.row_at(self.model.index_of(key))
+        if row is None or (opened and row.topic):
+            return
+        (self._opened.add if opened else self._opened.discard)(row.node.id)
+        self.rebuild()
+        self.table.choose(NodeRow(row.node).key)
+
+
+class _NodeTable(TableView[NodeRow]):
+    """Right opens the chosen node, Left closes it."""
+
+    fold_wanted = Signal(str, bool)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key = self.chosen_key()
+        if key is not None and event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
+            self.keyboard = True
+            self.fold_wanted.emit(key, event.key() == Qt.Key.Key_Right)
+        else:
+            super().keyPressEvent(event)
+
+
+def _haystack(node: NodeEntry) -> str:
+    topics = " ".join((*node.publishes, *node.subscribes))
+    return f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {topics}".casefold()
+
+
+PANEL = Panel("nodes", "Nodes", "network", (), NodesPanel)

@@ -1,0 +1,187 @@
+"""The rows of the table of nodes: a node, and when it is opened what it publishes and subscribes."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, replace
+
+from app.core.network.nodes import NodeEntry
+from app.ui.text.numbers import age_words
+from app.ui.widgets.table.model import Cell, Column, Order
+
+PUBLISHES, SUBSCRIBES = "publishes", "subscribes"
+INDENT = 19
+GENERATIONS = {
+    "native": "native",
+    "A": "NEP to 0.5.4.5",
+    "B": "NEP 0.5.4.8",
+}
+UNSERVED = frozenset({"0.5.4.6", "0.5.4.7"})
+NOT_SERVED = "NEP {version} is not served: nobody understands its messages. Install 0.5.4.8 or 0.5.4.5."
+LIMITS = (
+    "A program of the original NEP{version}: it sends no numbers and no times, so what was lost and how old "
+    "a message is can't be known."
+)
+VERSIONS = {"A": " up to 0.5.4.5", "B": " 0.5.4.8"}
+
+
+@dataclass(frozen=True, slots=True)
+class NodeRow:
+    """A node, or below it one of its topics. ``rate`` is the topic's, in words."""
+
+    node: NodeEntry
+    opened: bool = False
+    way: str = ""
+    topic: str = ""
+    rate: Callable[[str], str] | None = None
+
+    @property
+    def key(self) -> str:
+        """Names the row for ever."""
+        return f"{self.node.id} {self.way} {self.topic}"
+
+
+def rows_of(
+    nodes: Iterable[NodeEntry],
+    opened: Collection[str],
+    order: Order[NodeRow],
+    rate: Callable[[str], str],
+) -> list[NodeRow]:
+    """The nodes in their order; below each of those ``opened`` (ids) its topics."""
+    rows: list[NodeRow] = []
+    for head in order.sort([NodeRow(node, node.id in opened) for node in nodes]):
+        rows.append(head)
+        if head.opened:
+            node = head.node
+            rows += [NodeRow(node, way=PUBLISHES, topic=topic, rate=rate) for topic in node.publishes]
+            rows += [NodeRow(node, way=SUBSCRIBES, topic=topic, rate=rate) for topic in node.subscribes]
+    return rows
+
+
+def generation_words(node: NodeEntry) -> str:
+    """Native, or which versions of the original NEP."""
+    return GENERATIONS.get(node.generation, f"NEP {node.generation}")
+
+
+def limits_of(node: NodeEntry) -> str:
+    """What an original program can't do, in words; empty for a native one."""
+    if node.generation in UNSERVED:
+        return NOT_SERVED.format(version=node.generation)
+    return LIMITS.format(version=VERSIONS.get(node.generation, "")) if node.is_original else ""
+
+
+def facts_of(node: NodeEntry) -> str:
+    """Where it runs and since when, in one line: what a narrow table has no column for."""
+    parts = [node.name]
+    if node.host:
+        parts.append("on this computer" if node.host == platform.node() else f"on {node.host}")
+    if node.pid is not None:
+        parts.append(f"pid {node.pid}")
+    if node.language:
+        parts.append(node.language)
+    if node.since_ns:
+        parts.append(f"here since {time.strftime('%H:%M:%S', time.localtime(node.since_ns / 1e9))}")
+    return ", ".join(parts)
+
+
+def cpu_words(ratio: float | None) -> str:
+    """The share of a core: 0.4 %, 12 %, 130 %; blank when not known."""
+    if ratio is None:
+        return ""
+    percent = ratio * 100
+    return f"{percent:.1f} %" if percent < 9.95 else f"{round(percent)} %"
+
+
+def _ink(row: NodeRow, role: str) -> str:
+    return role if row.node.gone_s is None else "textDisabled"
+
+
+def name_cell(row: NodeRow) -> Cell:
+    """The node's name with its arrow, bold while new; or a topic further in."""
+    gone = row.node.gone_s is not None
+    if row.topic:
+        return Cell(row.topic, role=_ink(row, "text"), mono=True, struck=gone, indent=INDENT, middle=True)
+    chip = "new" if row.node.new and not gone else None
+    icon = "chevron-down" if row.opened else "chevron-right"
+    return Cell(row.node.name, icon, _ink(row, "text"), bold=bool(chip), struck=gone, chip=chip)
+
+
+def generation_cell(row: NodeRow) -> Cell:
+    """Native or original; of a topic what the node does with it, and how often."""
+    if row.topic:
+        rate = row.rate(row.topic) if row.rate is not None and row.way == PUBLISHES else ""
+        return Cell(f"{row.way} {rate}/s" if rate else row.way, role=_ink(row, "textTertiary"))
+    if row.node.generation in UNSERVED:
+        return Cell(generation_words(row.node), "triangle-alert", _ink(row, "warn"))
+    icon = "plug" if row.node.is_original else None
+    return Cell(generation_words(row.node), icon, _ink(row, "textSecondary"))
+
+
+def _of_node(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable[[NodeRow], Cell]:
+    return lambda row: Cell() if row.topic else Cell(cell(row.node), role=_ink(row, role))
+
+
+def _cpu(node: NodeEntry) -> str:
+    return cpu_words(node.cpu_ratio) if node.gone_s is None else f"gone {int(node.gone_s)} s"
+
+
+def _since(node: NodeEntry) -> str:
+    if not node.since_ns or node.gone_s is not None:
+        return ""
+    return age_words(max(0.0, time.time() - node.since_ns / 1e9))
+
+
+def _name_tip(row: NodeRow) -> str:
+    return f"{row.node.name} {row.way} {row.topic}" if row.topic else facts_of(row.node)
+
+
+def _generation_tip(row: NodeRow) -> str:
+    if row.topic:
+        return _name_tip(row)
+    return (
+        limits_of(row.node) or "Made with nep: nothing is lost unseen, every message has its number and time"
+    )
+
+
+def _cpu_tip(_row: NodeRow) -> str:
+    return "The share of one processor core that its process used in the last second"
+
+
+COLUMNS: tuple[Column[NodeRow], ...] = (
+    Column("node", "Node", 108, name_cell, lambda r: r.node.name.casefold(), stretch=True, tip=_name_tip),
+    Column(
+        "generation", "Generation", 116, generation_cell,
+        lambda r: (r.node.is_original, r.node.generation), tip=_generation_tip,
+    ),
+    Column(
+        "language", "Language", 78, _of_node(lambda n: n.language, "textSecondary"),
+        lambda r: r.node.language, yields=4,
+    ),
+    Column("host", "Host", 110, _of_node(lambda n: n.host, "textSecondary"), lambda r: r.node.host, yields=3),
+    Column(
+        "pid", "PID", 66, _of_node(lambda n: str(n.pid) if n.pid is not None else ""),
+        lambda r: r.node.pid, figures=True, yields=5,
+    ),
+    Column("cpu", "CPU", 66, _of_node(_cpu), lambda r: r.node.cpu_ratio, figures=True, tip=_cpu_tip),
+    Column(
+        "publishes", "Publishes", 80, _of_node(lambda n: str(len(n.publishes))),
+        lambda r: len(r.node.publishes), figures=True, yields=1,
+    ),
+    Column(
+        "subscribes", "Subscribes", 86, _of_node(lambda n: str(len(n.subscribes))),
+        lambda r: len(r.node.subscribes), figures=True, yields=2,
+    ),
+    Column("since", "Here for", 62, _of_node(_since), lambda r: r.node.since_ns, figures=True, yields=6),
+)  # fmt: skip
+
+
+def columns(own: Callable[[NodeEntry], bool]) -> tuple[Column[NodeRow], ...]:
+    """The columns; what is Studio's ``own`` is no news."""
+
+    def named(row: NodeRow) -> Cell:
+        cell = name_cell(row)
+        return replace(cell, bold=False, chip=None) if cell.chip and own(row.node) else cell
+
+    return (replace(COLUMNS[0], cell=named), *COLUMNS[1:])

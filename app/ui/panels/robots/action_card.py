@@ -1,0 +1,183 @@
+"""A card for one action of a robot: its form, Try, what it does now, how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.robots.description.description import Action
+from app.ui.panels.robots.controls.chooser import Pictures
+from app.ui.panels.robots.form import ActionForm
+from app.ui.panels.robots.tries import end_words, left_words, now_words, output_words, progress_of
+from app.ui.panels.robots.try_list import TryList
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, set_role
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.labels import Tile
+
+if TYPE_CHECKING:
+    from app.core.robots.robot_link import Invocation
+
+RISKS = {"moves": "moves the robot", "locomotes": "moves the robot"}
+
+
+class ActionCard(Card):
+    """`tried` with the form's input, `cancelled` when a person ends it early."""
+
+    tried = Signal(dict)
+    cancelled = Signal()
+
+    def __init__(
+        self,
+        theme: Theme,
+        action: Action,
+        options: Callable[[str], Sequence[str]],
+        *,
+        folded: bool = False,
+        pictures: Pictures | None = None,
+        title_of: Callable[[str], str] = str,
+    ) -> None:
+        """``title_of`` gives the words for the name of another action of the robot."""
+        super().__init__(theme)
+        self.action = action
+        self._title_of = title_of
+        self._running = False
+        self._given: Mapping[str, object] = {}
+        self._folded = False
+        self.form = ActionForm(theme, action, options, pictures)
+        self.form.changed.connect(self._say_summary)
+        self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
+        self.summary = Elided("bodyLarge", "textSecondary")
+        self.risk = Chip(theme, RISKS.get(action.risk or "", ""), "warn")
+        self.words = Elided("body", "textSecondary", 60)
+        self.left = label("", "body", role="textTertiary")
+        self.result = Chip(theme)
+        self.try_button = Button(theme, "Try", "play")
+        self.try_button.setAccessibleName(f"Try {action.title}")
+        self.try_button.clicked.connect(self._press)
+        self.past = IconButton(theme, "history", f"Last tries of {action.title}", size=30)
+        self.past.setCheckable(True)
+        self.past.toggled.connect(self._show_past)
+        self.past.hide()
+        self.fold = IconButton(theme, "chevron-down", "Show its values", size=30)
+        self.fold.clicked.connect(lambda: self.set_folded(not self._folded))
+        self.fold.setVisible(folded and bool(action.parameters))
+        self.error = label("", "small", role="error", wrap=True)
+        self.progress = Bar(theme)
+        self.tries = TryList(theme, action)
+        self.tries.chosen.connect(self._take_back)
+        self.tries.hide()
+        self._lay_out(theme)
+        self.set_folded(folded)
+        self.show_invocation(None)
+
+    def _lay_out(self, theme: Theme) -> None:
+        head = Flow()
+        before: tuple[QWidget, ...] = (Tile(theme, self.action.icon), self.title, self.risk)
+        after: tuple[QWidget, ...] = (self.left, self.result, self.past, self.try_button, self.fold)
+        below: tuple[QWidget, ...] = (self.form, self.error, self.progress, self.tries)
+        for widget in before:
+            head.addWidget(widget)
+        head.add_elastic(self.summary)
+        head.push()
+        head.add_elastic(self.words)
+        for widget in after:
+            head.addWidget(widget)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(16, 13, 16, 13)
+        column.setSpacing(8)
+        column.addLayout(head)
+        for widget in below:
+            column.addWidget(widget)
+
+    def set_folded(self, folded: bool) -> None:
+        """Hide or show the form."""
+        self._folded = folded
+        self.form.setVisible(not folded and bool(self.action.parameters))
+        self.fold.set_icon("chevron-down" if folded else "chevron-up")
+        self.fold.set_name("Show its values" if folded else "Hide its values")
+        self._say_summary()
+
+    def _say_summary(self) -> None:
+        self.summary.setText(self.form.summary() if self._folded else "")
+        self.summary.setVisible(self._folded)
+
+    def set_first(self, first: bool) -> None:
+        """Whether this card has the focus: its border, and its Try is the filled one."""
+        border = "accent" if first else "border"
+        if border != self.border:
+            self.border = border
+            self.update()
+        self.try_button.set_kind("primary" if first and not self._running else "plain")
+        self.try_button.fill_icon = first
+
+    def _press(self) -> None:
+        if self._running:
+            self.cancelled.emit()
+        else:
+            self._given = self.form.input()
+            self.tried.emit(dict(self._given))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and held and not self._running:
+            self._press()
+        else:
+            super().keyPressEvent(event)
+
+    def _show_past(self, on: bool) -> None:
+        self.tries.setVisible(on)
+
+    def _take_back(self, given: Mapping[str, object]) -> None:
+        """Put the values of an earlier try into the form."""
+        self.set_folded(False)
+        self.form.set_input(given)
+        self.form.show_problems(())
+
+    def show_problems(self, sentences: Sequence[str]) -> None:
+        """The input was refused."""
+        if sentences and self._folded:
+            self.set_folded(False)
+        self.form.show_problems(sentences)
+
+    def show_tries(self, tries: Sequence[Invocation]) -> None:
+        """The robot's last tries; those of this action are listed behind the button with the clock."""
+        self.tries.show_tries(tries)
+        self.past.setVisible(bool(self.tries.rows))
+
+    def show_invocation(self, invocation: Invocation | None, *, may_move: bool = False) -> None:
+        """What became of the newest try; ``may_move``: its robot is not proven to stand still."""
+        self._running = invocation is not None and invocation.running
+        can_cancel = self._running and (
+            self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))
+        )
+        self.try_button.set_word("Cancel" if can_cancel else "Try", "x" if can_cancel else "play")
+        self.try_button.setAccessibleName(f"{self.try_button.text()} {self.action.title}")
+        self.try_button.setEnabled(can_cancel or not self._running)
+        self.set_first(self.border == "accent")
+        share, words, left = None, "", ""
+        if invocation is not None and self._running:
+            share = progress_of(self.action, self._given or invocation.given, invocation.feedback)
+            words = now_words(self.action, invocation, self._title_of)
+            left = left_words(invocation)
+        self.progress.setVisible(share is not None)
+        self.progress.set_fraction(share)
+        self.words.setText(words)
+        self.left.setText(left)
+        self.left.setVisible(bool(left))
+        self._say_end(None if self._running else invocation, may_move)
+
+    def _say_end(self, invocation: Invocation | None, may_move: bool) -> None:
+        said, status, sentence = ("", "ok", "")
+        if invocation is not None:
+            said, status, sentence = end_words(invocation, may_move=may_move)
+        self.result.set(said, status)
+        if invocation is not None and invocation.state == "succeeded":
+            self.words.setText(output_words(self.action, invocation.output))
+        set_role(self.error, "textSecondary" if status == "off" else "error")
+        self.error.setText(sentence)
+        self.error.setVisible(bool(sentence))

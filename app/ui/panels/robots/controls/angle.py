@@ -1,0 +1,176 @@
+"""An angle as a drawing that can be turned: where the robot looks now, and how far it will turn."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF, QWheelEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.ui.theme.theme import Theme
+
+SIDE = 44
+PAGE_STEPS = 10
+WHEEL_NOTCH = 120
+
+
+class AngleDial(QWidget):
+    """Drag, wheel (with the focus), arrow keys, Page, Home and End turn it; a double click is the default.
+
+    Seen from above: straight up is ahead, positive angles go to the left. An ``upright`` one is seen from the
+    robot's left side: ahead is to the left, positive angles go down.
+    """
+
+    changed = Signal(float)
+
+    def __init__(
+        self,
+        theme: Theme,
+        minimum: float,
+        maximum: float,
+        *,
+        step: float = 1.0,
+        value: float = 0.0,
+        default: float | None = None,
+        name: str = "",
+        upright: bool = False,
+    ) -> None:
+        super().__init__()
+        self._theme, self._minimum, self._maximum, self._step = theme, minimum, maximum, step
+        self._default = default if default is not None else value
+        self._value, self._upright = value, upright
+        self._grip: float | None = None
+        self.setAccessibleName(name)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", SIDE // 2)
+        self.setToolTip("Drag to turn; a double click sets it back")
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    @property
+    def value(self) -> float:
+        """The angle now, in degrees."""
+        return self._value
+
+    def set_value(self, value: float) -> None:
+        """Show an angle without telling."""
+        self._value = value
+        self.setAccessibleDescription(f"{value:g}°")
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        side = round(self._theme.scaled(SIDE))
+        return QSize(side, side)
+
+    def direction(self, angle_deg: float) -> QPointF:
+        """The unit vector on the screen in which an angle points."""
+        turned = math.radians(angle_deg)
+        if self._upright:
+            return QPointF(-math.cos(turned), math.sin(turned))
+        return QPointF(-math.sin(turned), -math.cos(turned))
+
+    def _angle_at(self, point: QPointF) -> float:
+        away = point - QPointF(self.rect().center())
+        if self._upright:
+            return math.degrees(math.atan2(away.y(), -away.x()))
+        return math.degrees(math.atan2(-away.x(), -away.y()))
+
+    def _choose(self, value: float) -> None:
+        steps = round((value - self._minimum) / self._step)
+        stepped = round(self._minimum + steps * self._step, 6)
+        wanted = min(max(stepped, self._minimum), self._maximum)
+        if wanted != self._value:
+            self.set_value(wanted)
+            self.changed.emit(wanted)
+
+    # -- hands ------------------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._grip = self._value
+            self._turn_to(self._angle_at(event.position()))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._grip is not None:
+            self._turn_to(self._angle_at(event.position()))
+
+    def _turn_to(self, pointed: float) -> None:
+        """The angle of that direction which is nearest to the hand's last one: whole turns add up."""
+        last = self._grip if self._grip is not None else self._value
+        self._grip = pointed + 360.0 * round((last - pointed) / 360.0)
+        self._grip = min(max(self._grip, self._minimum - 90.0), self._maximum + 90.0)
+        self._choose(self._grip)
+
+    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
+        self._grip = None
+
+    def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
+        self._grip = None
+        self._choose(self._default)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self.hasFocus():
+            self._choose(self._value + self._step * event.angleDelta().y() / WHEEL_NOTCH)
+            event.accept()
+        else:
+            event.ignore()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        left, right = Qt.Key.Key_Left, Qt.Key.Key_Right
+        by = {
+            (right if self._upright else left): self._step,
+            (left if self._upright else right): -self._step,
+            Qt.Key.Key_Up: -self._step if self._upright else self._step,
+            Qt.Key.Key_Down: self._step if self._upright else -self._step,
+            Qt.Key.Key_PageUp: PAGE_STEPS * self._step,
+            Qt.Key.Key_PageDown: -PAGE_STEPS * self._step,
+            Qt.Key.Key_Home: self._minimum - self._value,
+            Qt.Key.Key_End: self._maximum - self._value,
+        }.get(Qt.Key(event.key()))
+        if by is None:
+            super().keyPressEvent(event)
+        else:
+            self._choose(self._value + by)
+
+    # -- the drawing ------------------------------------------------------------------------------
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        half = min(self.width(), self.height()) / 2 - 1.5
+        middle = QRectF(self.rect()).center()
+        disc = QRectF(middle.x() - half, middle.y() - half, 2 * half, 2 * half)
+        painter.setPen(QPen(theme.colour("controlBorder"), 1))
+        painter.setBrush(theme.colour("sunken" if theme.dark else "panel"))
+        painter.drawEllipse(disc)
+        self._paint_sector(painter, disc)
+        painter.setPen(QPen(theme.colour("borderStrong"), 1, Qt.PenStyle.DashLine))
+        painter.drawLine(middle, middle + self.direction(0.0) * (half - 3))
+        ink = theme.colour("accent" if self.isEnabled() else "textDisabled")
+        hand = self.direction(self._value)
+        tip = middle + hand * (half - 4)
+        painter.setPen(QPen(ink, 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.drawLine(middle, tip)
+        side = QPointF(-hand.y(), hand.x())
+        back = tip - hand * 6.5
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(ink)
+        painter.drawPolygon(QPolygonF([tip + hand * 1.5, back + side * 4, back - side * 4]))
+        painter.drawEllipse(middle, 3.2, 3.2)
+        painter.end()
+
+    def _paint_sector(self, painter: QPainter, disc: QRectF) -> None:
+        """From ahead to the angle, in the accent's tint; a whole turn and more fills the disc."""
+        tint = self._theme.colour("selected")
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(tint)
+        inner = disc.adjusted(2, 2, -2, -2)
+        turn = min(360.0, abs(self._value))
+        if turn >= 360.0:
+            painter.drawEllipse(inner)
+            return
+        # Qt counts sixteenths of a degree, anticlockwise from three o'clock.
+        start, sense = (180.0, 1.0) if self._upright else (90.0, 1.0)
+        sweep = math.copysign(turn, self._value) * sense
+        painter.drawPie(inner, round(start * 16), round(sweep * 16))

@@ -1,0 +1,88 @@
+"""The control for one typed parameter of an action: slider, dial, segments, switch, swatches, field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from app.robots.description.description import Parameter
+from app.ui.panels.robots.controls.base import ROW_HEIGHT, Control, connect, sentence_case
+from app.ui.panels.robots.controls.colour import colour_control
+from app.ui.panels.robots.controls.number import number_control
+from app.ui.panels.robots.controls.picture import NoPictures, Pictures, picture_control
+from app.ui.panels.robots.controls.text import text_control
+from app.ui.panels.robots.input_text import NUMBERS
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Choice, Segments, Switch
+
+__all__ = [
+    "NUMBERS", "ROW_HEIGHT", "Control", "NoPictures", "Pictures", "control_for", "sentence_case",
+]  # fmt: skip
+
+SEGMENTS_AT_MOST = 4
+SEGMENT_LETTERS = 44
+
+
+def control_for(
+    theme: Theme, parameter: Parameter, options: Sequence[str] = (), pictures: Pictures | None = None
+) -> Control:
+    """The control of a parameter; ``options`` are the words that the robot offers for it now."""
+    if parameter.choices or options:
+        return _choice(theme, parameter, options)
+    if parameter.kind in NUMBERS:
+        return number_control(theme, parameter)
+    if parameter.kind == "boolean":
+        return _switch(theme, parameter)
+    if parameter.kind == "colour":
+        return colour_control(theme, parameter)
+    if parameter.kind == "image":
+        return picture_control(theme, parameter, pictures if pictures is not None else NoPictures())
+    return text_control(theme, parameter)
+
+
+def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Control:
+    pairs = [(str(choice.value), choice.title) for choice in parameter.choices] or [(o, o) for o in options]
+    values: dict[str, object] = {str(choice.value): choice.value for choice in parameter.choices}
+    made: Control
+    if len(pairs) <= SEGMENTS_AT_MOST and sum(len(words) for _, words in pairs) <= SEGMENT_LETTERS:
+        segments = Segments(
+            theme,
+            [(value, sentence_case(title), None) for value, title in pairs],
+            check=True,
+            size="form",
+            name=parameter.title,
+            wraps=True,
+        )
+        made = Control(
+            segments,
+            lambda: _chosen(values, segments.value),
+            lambda value: segments.set_value(str(value)),
+            lambda tell: connect(segments.changed, tell),
+        )
+    else:
+        combo = Choice(theme, pairs, name=parameter.title)
+        made = Control(
+            combo,
+            lambda: _chosen(values, combo.value),
+            lambda value: combo.set_value(str(value)),
+            lambda tell: connect(combo.currentIndexChanged, tell),
+        )
+    if parameter.default is not None:
+        made.show_value(parameter.default)
+    return made
+
+
+def _chosen(values: dict[str, object], key: str) -> object:
+    """The value behind a word; 0 is a value, no word is none."""
+    return values.get(key, key) if key else None
+
+
+def _switch(theme: Theme, parameter: Parameter) -> Control:
+    switch = Switch(theme, "yes" if parameter.default is True else "no", parameter.default is True)
+    switch.setAccessibleName(parameter.title)
+    switch.toggled.connect(lambda on: switch.setText("yes" if on else "no"))
+    return Control(
+        switch,
+        switch.isChecked,
+        lambda value: switch.setChecked(value is True),
+        lambda tell: connect(switch.toggled, tell),
+    )

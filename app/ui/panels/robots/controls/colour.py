@@ -1,0 +1,215 @@
+"""A colour: swatches with names, and any other one from a strip or by its number."""
+
+from __future__ import annotations
+
+import re
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QLinearGradient, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+
+from app.robots.description.description import Parameter
+from app.ui.panels.robots.controls.base import Control, connect, line_field
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, ColourSwatches, label
+from app.ui.widgets.flow_layout import Flow
+
+_HEX = re.compile(r"#?([0-9a-fA-F]{6})")
+STRIP = QSize(168, 34)
+HUES = 360
+HUE_STEP, LIGHT_STEP = 5, 0.05
+PALEST, DARKEST = 0.95, 0.15
+
+
+class HueStrip(QWidget):
+    """All hues from left to right, pale above and dark below; press, drag or arrow keys choose."""
+
+    changed = Signal(str)
+
+    def __init__(self, theme: Theme, name: str) -> None:
+        super().__init__()
+        self._theme = theme
+        self._hue, self._light = 0.55, 0.6
+        self.setAccessibleName(name)
+        self.setToolTip("Press a colour; arrow keys go through them")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.setCursor(Qt.CursorShape.CrossCursor)
+
+    def sizeHint(self) -> QSize:
+        return STRIP
+
+    def show_colour(self, colour: QColor) -> None:
+        """Put the mark where this colour is, about."""
+        if colour.hslHueF() >= 0:
+            self._hue = colour.hslHueF()
+        self._light = min(PALEST, max(DARKEST, colour.lightnessF()))
+        self.update()
+
+    def _choose(self, hue: float, light: float) -> None:
+        self._hue, self._light = min(max(hue, 0.0), 0.999), min(max(light, DARKEST), PALEST)
+        self.update()
+        self.changed.emit(QColor.fromHslF(self._hue, 0.9, self._light).name())
+
+    def _press(self, at: QPointF) -> None:
+        light = PALEST - at.y() / self.height() * (PALEST - DARKEST)
+        self._choose(at.x() / self.width(), light)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._press(event.position())
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._press(event.position())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        by = {
+            Qt.Key.Key_Left: (-HUE_STEP, 0.0),
+            Qt.Key.Key_Right: (HUE_STEP, 0.0),
+            Qt.Key.Key_Up: (0, LIGHT_STEP),
+            Qt.Key.Key_Down: (0, -LIGHT_STEP),
+        }.get(Qt.Key(event.key()))
+        if by is None:
+            super().keyPressEvent(event)
+        else:
+            self._choose(self._hue + by[0] / HUES, self._light + by[1])
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        rect = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+        radius = self._theme.radius("control")
+        hues = QLinearGradient(rect.topLeft(), rect.topRight())
+        for part in range(13):
+            hues.setColorAt(part / 12, QColor.fromHslF(min(part / 12, 0.999), 0.9, 0.55))
+        shade = QLinearGradient(rect.topLeft(), rect.bottomLeft())
+        shade.setColorAt(0.0, QColor(255, 255, 255, 220))
+        shade.setColorAt(0.5, QColor(128, 128, 128, 0))
+        shade.setColorAt(1.0, QColor(0, 0, 0, 170))
+        painter.setPen(Qt.PenStyle.NoPen)
+        for brush in (hues, shade):
+            painter.setBrush(brush)
+            painter.drawRoundedRect(rect, radius, radius)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(self._theme.colour("controlBorder"), 1))
+        painter.drawRoundedRect(rect, radius, radius)
+        y = (PALEST - self._light) / (PALEST - DARKEST) * self.height()
+        mark = QPointF(self._hue * self.width(), min(max(y, 5.0), self.height() - 5.0))
+        painter.setPen(QPen(self._theme.colour("text"), 3))
+        painter.drawEllipse(mark, 5, 5)
+        painter.setPen(QPen(self._theme.colour("panel"), 1.4))
+        painter.drawEllipse(mark, 5, 5)
+        painter.end()
+
+
+class ColourChoice(QWidget):
+    """Swatches; "Other" opens the strip and a field for its number, where a wrong one stays as typed."""
+
+    changed = Signal()
+    finished = Signal()
+
+    def __init__(self, theme: Theme, parameter: Parameter) -> None:
+        super().__init__()
+        start = parameter.default if isinstance(parameter.default, str) else "#ffffff"
+        self.setAccessibleName(parameter.title)
+        self.swatches = ColourSwatches(theme, start, name=parameter.title)
+        self.swatches._other.hide()  # noqa: SLF001  ours has a strip beside the number
+        self.other = Button(theme, "Other", "palette", kind="ghost", size="small")
+        self.other.setAccessibleName(f"Another colour for {parameter.title}")
+        self.other.setCheckable(True)
+        self.strip = HueStrip(theme, f"{parameter.title}, all colours")
+        self.field = line_field(theme, parameter)
+        self.field.setAccessibleName(f"{parameter.title}, as a number like #33aaff")
+        self.field.setPlaceholderText("#33aaff")
+        self.field.setFixedWidth(round(theme.scaled(96)))
+        self.sentence = ""
+        self._wrong = label("", "small", role="error", wrap=True)
+        self._lay_out()
+        self.other.toggled.connect(self._open)
+        self.swatches.changed.connect(self._from_swatch)
+        self.strip.changed.connect(self._from_strip)
+        self.field.textEdited.connect(lambda _text: self._typed(final=False))
+        self.field.editingFinished.connect(lambda: self._typed(final=True))
+
+    def _lay_out(self) -> None:
+        first = Flow(gap=6)
+        first.addWidget(self.swatches)
+        first.addWidget(self.other)
+        self._more = QWidget()
+        second = Flow(self._more)
+        second.setContentsMargins(4, 0, 0, 0)
+        second.addWidget(self.strip)
+        second.addWidget(self.field)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(first)
+        column.addWidget(self._more)
+        column.addWidget(self._wrong)
+        self._more.hide()
+        self._wrong.hide()
+
+    def value(self) -> str:
+        """The colour, ``#rrggbb``, or what was typed when it is none."""
+        return self.field.text() if self.sentence else self.swatches.value
+
+    def set_value(self, value: object) -> None:
+        """Show a colour without telling; what is none changes nothing."""
+        if isinstance(value, str) and _HEX.fullmatch(value):
+            self.swatches.set_value(value)
+            self._show_number()
+
+    def _open(self, on: bool) -> None:
+        self._more.setVisible(on)
+        if on:
+            self._show_number()
+            self.strip.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _show_number(self) -> None:
+        self.field.setText(self.swatches.value)
+        self.strip.show_colour(QColor(self.swatches.value))
+        self._judge("")
+
+    def _from_swatch(self, _value: str) -> None:
+        self._show_number()
+        self.changed.emit()
+
+    def _from_strip(self, value: str) -> None:
+        self.swatches.set_value(value)
+        self.field.setText(value)
+        self._judge("")
+        self.changed.emit()
+
+    def _typed(self, *, final: bool) -> None:
+        found = _HEX.fullmatch(self.field.text().strip())
+        if found is not None:
+            self.swatches.set_value(f"#{found[1].lower()}")
+            self.strip.show_colour(QColor(self.swatches.value))
+        self._judge("" if found is not None else "A colour is written like #33aaff.", quiet=not final)
+        self.changed.emit()
+        if final:
+            self.finished.emit()
+
+    def _judge(self, sentence: str, *, quiet: bool = False) -> None:
+        self.sentence = sentence
+        shown = bool(sentence) and not quiet
+        self._wrong.setText(sentence if shown else "")
+        self._wrong.setVisible(shown)
+        self.field.setProperty("wrong", "true" if shown else "false")
+        self.field.style().unpolish(self.field)
+        self.field.style().polish(self.field)
+
+
+def colour_control(theme: Theme, parameter: Parameter) -> Control:
+    """The control of a colour."""
+    choice = ColourChoice(theme, parameter)
+    return Control(
+        choice,
+        choice.value,
+        choice.set_value,
+        lambda tell: connect(choice.changed, tell),
+        finished=lambda tell: connect(choice.finished, tell),
+        sentence=lambda: choice.sentence,
+    )

@@ -1,0 +1,194 @@
+"""Numbers: a slider with its field between two limits, else a field alone; angles with a drawing."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.robots.description.description import Parameter
+from app.ui.panels.robots.controls.angle import AngleDial
+from app.ui.panels.robots.controls.base import VALUE_WIDTH, Control, Tell, connect
+from app.ui.theme.theme import Theme
+from app.ui.widgets import NumberField, SliderWithUnit, label
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.slider import decimals_of
+from app.ui.widgets.plain_key import is_plain
+
+COARSE_FROM = 20
+UPRIGHT = ("pitch", "tilt", "down", "up", "nod")
+PAGE_STEPS = 10
+
+
+def number_control(theme: Theme, parameter: Parameter) -> Control:
+    """The control of a number, a whole number or an angle."""
+    low, high = parameter.minimum, parameter.maximum
+    if low is None or high is None or high <= low:
+        return _open_number(theme, parameter)
+    slider = SliderWithUnit(
+        theme,
+        low,
+        high,
+        step=step_of(parameter),
+        value=_number(parameter.default),
+        default=_number(parameter.default),
+        unit=parameter.unit or "",
+        name=parameter.title,
+    )
+    dial = _dial(theme, parameter, slider) if parameter.kind == "angle" else None
+
+    def show(given: object) -> None:
+        number = _number(given)
+        if number is not None and low <= number <= high:
+            slider.set_value(number)
+            if dial is not None:
+                dial.set_value(number)
+
+    def changed(tell: Tell) -> None:
+        connect(slider.changed, tell)
+        connect(slider.field.textEdited, tell)
+
+    return Control(
+        slider if dial is None else _beside(dial, slider, parameter.title),
+        lambda: _value_of(slider, parameter),
+        show,
+        changed,
+        finished=lambda tell: connect(slider.field.editingFinished, tell),
+        sentence=lambda: slider.field.sentence,
+    )
+
+
+def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
+    """What the slider says, or what was typed beside it, also when that is wrong."""
+    whole = parameter.kind == "integer"
+    typed = slider.field.text()
+    if typed != f"{slider.value:.{decimals_of(step_of(parameter))}f}":
+        return read_number(typed, whole=whole)
+    return round(slider.value) if whole else float(slider.value)
+
+
+def step_of(parameter: Parameter) -> float:
+    """The step of its description, else one that suits its range."""
+    if parameter.step is not None and parameter.step > 0:
+        return parameter.step
+    span = (parameter.maximum or 0.0) - (parameter.minimum or 0.0)
+    if parameter.kind == "integer" or span > COARSE_FROM or span <= 0:
+        return 1.0
+    return 0.01 if span <= 2 else 0.1
+
+
+def read_number(typed: str, *, whole: bool) -> object:
+    """What was typed as a number; None for nothing, the text itself when it is none."""
+    text = typed.strip().replace(",", ".")
+    if not text:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        return typed  # the check of the action says what is wrong with it
+    return int(number) if whole and number.is_integer() else number
+
+
+def _dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDial:
+    words = f"{parameter.name} {parameter.title}".casefold().split()
+    dial = AngleDial(
+        theme,
+        parameter.minimum or 0.0,
+        parameter.maximum or 0.0,
+        step=step_of(parameter),
+        value=slider.value,
+        default=_number(parameter.default),
+        name=parameter.title,
+        upright=any(word in words for word in UPRIGHT),
+    )
+
+    def from_dial(value: float) -> None:
+        slider.set_value(value)
+        slider.changed.emit(value)
+
+    dial.changed.connect(from_dial)
+    slider.changed.connect(dial.set_value)
+    return dial
+
+
+def _beside(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
+    row = QWidget()
+    row.setAccessibleName(name)
+    inner = Flow(row)
+    inner.addWidget(dial)
+    inner.add_elastic(slider, greedy=True)
+    return row
+
+
+class OpenNumber(NumberField):
+    """A number without limits on both sides: arrow keys step, Page by ten; empty is allowed."""
+
+    def __init__(self, theme: Theme, parameter: Parameter) -> None:
+        self._parameter = parameter
+        self._by = step_of(parameter)
+        super().__init__(
+            theme, parameter.minimum, parameter.maximum, parameter.unit or "", decimals_of(self._by)
+        )
+        self.setAccessibleName(parameter.title)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        steps = {
+            Qt.Key.Key_Up: 1,
+            Qt.Key.Key_Down: -1,
+            Qt.Key.Key_PageUp: PAGE_STEPS,
+            Qt.Key.Key_PageDown: -PAGE_STEPS,
+        }.get(Qt.Key(event.key()))
+        now = read_number(self.text() or "0", whole=False)
+        if steps is None or not is_plain(event) or not isinstance(now, (int, float)):
+            super().keyPressEvent(event)
+            return
+        low, high = self._parameter.minimum, self._parameter.maximum
+        wanted = now + steps * self._by
+        wanted = max(wanted, low) if low is not None else wanted
+        self.show_number(min(wanted, high) if high is not None else wanted)
+        self.textEdited.emit(self.text())
+
+    def _read(self) -> None:
+        if self.text().strip():
+            super()._read()
+        else:
+            self._judge("")
+
+
+def _open_number(theme: Theme, parameter: Parameter) -> Control:
+    field = OpenNumber(theme, parameter)
+    field.setMinimumWidth(VALUE_WIDTH)
+    field.setMaximumWidth(2 * VALUE_WIDTH)
+    wrong = label("", "small", role="error", wrap=True)
+    wrong.hide()
+    field.problem.connect(wrong.setText)
+    field.problem.connect(lambda said: wrong.setVisible(bool(said)))
+    column = QWidget()
+    column.setAccessibleName(parameter.title)
+    inner = QVBoxLayout(column)
+    inner.setContentsMargins(0, 0, 0, 0)
+    inner.setSpacing(4)
+    inner.addWidget(field, 0, Qt.AlignmentFlag.AlignLeft)
+    inner.addWidget(wrong)
+
+    def show(given: object) -> None:
+        number = _number(given)
+        if number is None:
+            field.setText("" if given is None else f"{given}")
+        else:
+            field.setText(f"{number:g}")
+
+    show(parameter.default)
+    return Control(
+        column,
+        lambda: read_number(field.text(), whole=parameter.kind == "integer"),
+        show,
+        lambda tell: connect(field.textChanged, tell),
+        finished=lambda tell: connect(field.editingFinished, tell),
+        sentence=lambda: field.sentence,
+    )
+
+
+def _number(value: object) -> float | None:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if good else None  # type: ignore[arg-type]

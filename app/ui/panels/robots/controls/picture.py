@@ -1,0 +1,242 @@
+"""A picture for a robot: a file, the newest picture of a topic, or an address; its thumbnail beside it.
+
+An address that was typed is sent as it is, a picture as `app.ui.panels.robots.controls.picture_file.encoded`
+makes it.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from PySide6.QtCore import Qt, QTimer, QUrl, Signal
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
+from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
+
+from app.robots.description.description import Parameter
+from app.ui.panels.robots.controls.base import Control, connect, line_field
+from app.ui.panels.robots.controls.picture_file import FILES, encoded, image_of, read_picture
+from app.ui.panels.robots.controls.thumbnail import Thumbnail
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, label
+from app.ui.widgets.file_dialogs import show_free
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.menus import Menu, drop_below
+from nep.errors import DecodeError
+
+if TYPE_CHECKING:
+    from app.core.messages.image_streams import ImageStream
+
+LOOK_MS = 200
+
+
+class Pictures(Protocol):
+    """Where pictures come from: the topics of the session."""
+
+    def topics(self) -> Sequence[str]:
+        """The picture topics that there are now."""
+
+    def stream(self, topic: str) -> ImageStream:
+        """Look at one until it is closed."""
+
+
+class NoPictures:
+    """No session, no topics."""
+
+    def topics(self) -> Sequence[str]:
+        """None."""
+        return ()
+
+    def stream(self, topic: str) -> ImageStream:
+        """There is none to look at: KeyError."""
+        raise KeyError(topic)
+
+
+class PictureChoice(QWidget):
+    """Thumbnail, name or address, and the buttons for a file and for a camera; files can be dropped on it."""
+
+    changed = Signal()
+
+    def __init__(self, theme: Theme, parameter: Parameter, pictures: Pictures) -> None:
+        super().__init__()
+        self._theme, self._parameter, self._pictures = theme, parameter, pictures
+        self._stream: ImageStream | None = None
+        self._seen: object = None
+        self._file: Path | None = None
+        self._image: QImage | None = None
+        self.sentence = ""
+        self.setAccessibleName(parameter.title)
+        self.setAcceptDrops(True)
+        self.thumbnail = Thumbnail(theme)
+        self.field = line_field(theme, parameter)
+        self.field.setPlaceholderText("A file, a camera, or an address")
+        self.choose = Button(theme, "File", "folder-open", size="form")
+        self.choose.setAccessibleName(f"Choose a file for {parameter.title}")
+        self.camera = Button(theme, "Camera", "camera", size="form")
+        self.camera.setAccessibleName(f"Take {parameter.title} from a camera")
+        self._wrong = label("", "small", role="error", wrap=True)
+        self._wrong.hide()
+        self._lay_out()
+        self._timer = QTimer(self)
+        self._timer.setInterval(LOOK_MS)
+        self._timer.timeout.connect(self._look)
+        self.field.textEdited.connect(self._typed)
+        self.choose.clicked.connect(self._ask)
+        self.camera.clicked.connect(self._offer)
+
+    def _lay_out(self) -> None:
+        row = Flow()
+        row.addWidget(self.thumbnail)
+        row.add_elastic(self.field, greedy=True)
+        row.addWidget(self.choose)
+        row.addWidget(self.camera)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(row)
+        column.addWidget(self._wrong)
+
+    # -- what it gives ------------------------------------------------------------------------------------
+
+    def value(self) -> str | None:
+        """The picture as the robot wants it, or the address that was typed; None while there is none."""
+        if self._stream is not None:
+            self._look()
+            if self._stream.awaits_picture:
+                return None  # the last picture may be from before its panel was hidden
+        if self._image is not None:
+            return encoded(self._image, bare=self._parameter.bare)
+        return None if self._stream is not None else self.field.text().strip() or None
+
+    def set_value(self, value: object) -> None:
+        """Show an address or a file."""
+        self.close_stream()
+        self._show_none()
+        text = "" if value is None else str(value)
+        if text.startswith("data:"):
+            self._image = _image_in(text)
+            self.thumbnail.show_image(self._image)
+            self.field.setText("the picture of that time" if self._image is not None else "")
+        else:
+            self._typed(text)
+            self.field.setText(text)
+
+    # -- a file -------------------------------------------------------------------------------------------
+
+    def _ask(self) -> None:
+        dialog = QFileDialog(self, "Choose a picture", "", FILES)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.fileSelected.connect(lambda chosen: self.use_file(Path(chosen)))
+        show_free(dialog)
+
+    def use_file(self, path: Path) -> None:
+        """Take a picture file; one that can't be read is named and says why."""
+        self.close_stream()
+        self._image, said = read_picture(path)
+        self.thumbnail.show_image(self._image)
+        self.field.setText(path.name if self._image is not None else str(path))
+        self.field.setToolTip(plain.tip(str(path)))
+        self._judge(said)
+        self.changed.emit()
+
+    def _typed(self, text: str) -> None:
+        self.close_stream()
+        self._show_none()
+        url = QUrl(text.strip())
+        path = Path(url.toLocalFile() if url.isLocalFile() else text.strip())
+        if text.strip() and path.suffix and path.is_file():
+            self._image, said = read_picture(path)
+            self.thumbnail.show_image(self._image)
+            self._judge(said)
+        self.changed.emit()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if any(url.isLocalFile() for url in event.mimeData().urls()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        files = [url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile()]
+        if files:
+            self.use_file(Path(files[0]))
+            event.acceptProposedAction()
+
+    # -- a camera -----------------------------------------------------------------------------------------
+
+    def _offer(self) -> None:
+        menu = Menu(self._theme, self)
+        topics = list(self._pictures.topics())
+        for topic in topics:
+            menu.addAction(plain.entry(topic)).triggered.connect(
+                lambda _on=False, topic=topic: self.use_topic(topic)
+            )
+        if not topics:
+            menu.addAction("No camera sends pictures now").setEnabled(False)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        drop_below(menu, self.camera)
+
+    def use_topic(self, topic: str) -> None:
+        """Show a topic's pictures; the newest one at the moment of Try is sent."""
+        self.close_stream()
+        self._show_none()
+        self._stream = self._pictures.stream(topic)
+        self.field.setText(f"newest picture of {topic}")
+        self._timer.start()
+        self.changed.emit()
+
+    def _look(self) -> None:
+        stream = self._stream
+        if stream is None:
+            return
+        picture = stream.picture
+        if picture is not None and picture is not self._seen and not stream.awaits_picture:
+            self._seen = picture
+            data = picture.bgra.data
+            rows, columns = picture.bgra.shape[:2]
+            held = QImage(data, columns, rows, QImage.Format.Format_RGB32)
+            self._image = held.copy()
+            self.thumbnail.show_image(self._image)
+        self._judge(f"{stream.error}." if stream.error else "")
+
+    def close_stream(self) -> None:
+        """Look at no topic any more."""
+        self._timer.stop()
+        if self._stream is not None:
+            self._stream.close()
+        self._stream, self._seen = None, None
+
+    def _show_none(self) -> None:
+        self._image = None
+        self.thumbnail.show_image(None)
+        self.field.setToolTip("")
+        self._judge("")
+
+    def _judge(self, sentence: str) -> None:
+        self.sentence = sentence
+        self._wrong.setText(sentence)
+        self._wrong.setVisible(bool(sentence))
+
+
+def _image_in(address: str) -> QImage | None:
+    """The picture that stands in a ``data:`` address; None when none can be read."""
+    try:
+        return image_of(base64.b64decode(address.partition(",")[2]))
+    except (ValueError, DecodeError):
+        return None
+
+
+def picture_control(theme: Theme, parameter: Parameter, pictures: Pictures) -> Control:
+    """The control of a picture."""
+    choice = PictureChoice(theme, parameter, pictures)
+    show: Callable[[object], None] = choice.set_value
+    show(parameter.default)
+    return Control(
+        choice,
+        choice.value,
+        show,
+        lambda tell: connect(choice.changed, tell),
+        sentence=lambda: choice.sentence,
+        close=choice.close_stream,
+    )

@@ -1,0 +1,93 @@
+"""Texts and lists of words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.robots.description.description import Parameter
+from app.robots.description.inputs import from_words, to_words
+from app.ui.panels.robots.controls.base import Control, connect, line_field
+from app.ui.theme.theme import Theme
+from app.ui.widgets.long_text import LongText
+
+LONG_FROM = 200
+"""A text that may have as many characters gets several lines."""
+
+
+def text_control(theme: Theme, parameter: Parameter) -> Control:
+    """One line, or several for a text that may be long; a list is words with commas between them.
+
+    An object, and a list of lists or objects, is written as JSON.
+    """
+    if parameter.kind in ("list", "object"):
+        return _list(theme, parameter)
+    if (parameter.max_length or 0) >= LONG_FROM or parameter.widget == "multiline":
+        return _long(theme, parameter)
+    field = line_field(theme, parameter)
+    made = Control(
+        field,
+        lambda: _given(parameter, field.text()),
+        lambda given: field.setText(_words(given)),
+        lambda tell: connect(field.textChanged, tell),
+        finished=lambda tell: connect(field.editingFinished, tell),
+    )
+    made.show_value(parameter.default)
+    return made
+
+
+def _long(theme: Theme, parameter: Parameter) -> Control:
+    field = LongText(theme, parameter.title)
+    made = Control(
+        field,
+        lambda: _given(parameter, field.text()),
+        lambda given: field.set_text(_words(given)),
+        lambda tell: connect(field.changed, tell),
+        finished=lambda tell: connect(field.finished, tell),
+    )
+    made.show_value(parameter.default)
+    return made
+
+
+def _list(theme: Theme, parameter: Parameter) -> Control:
+    field = line_field(theme, parameter)
+    field.setPlaceholderText(_hint(parameter))
+
+    def value() -> object:
+        words = field.text().strip()
+        if not words and not parameter.required and (parameter.nullable or parameter.kind == "object"):
+            return None
+        return from_words(parameter, words)
+
+    made = Control(
+        field,
+        value,
+        lambda given: field.setText(_words(given)),
+        lambda tell: connect(field.textChanged, tell),
+        finished=lambda tell: connect(field.editingFinished, tell),
+    )
+    made.show_value(parameter.default)
+    return made
+
+
+def _given(parameter: Parameter, text: str) -> str | None:
+    """What is left empty is left out, unless the robot must have it: then the check says so."""
+    return text if text or parameter.required else None
+
+
+def _hint(parameter: Parameter) -> str:
+    if parameter.kind == "object":
+        names = ", ".join(f'"{field.name}": …' for field in parameter.fields) or '"name": …'
+        return f"{{{names}}}"
+    held = [parameter.each] if parameter.each is not None else list(parameter.places)
+    if any(each.kind in ("list", "object") for each in held):
+        return "[…, …]"
+    if parameter.places:
+        return ", ".join(each.kind for each in parameter.places)
+    is_number = parameter.each is not None and parameter.each.kind in ("number", "integer", "angle")
+    return "Numbers with commas between them" if is_number else "Words with commas between them"
+
+
+def _words(given: object) -> str:
+    if isinstance(given, (list, tuple, Mapping)):
+        return to_words(given)
+    return "" if given is None else str(given)

@@ -1,0 +1,198 @@
+"""A form for an action of a robot, made from its typed parameters; it gives the input to try it with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
+
+from app.robots.description.description import Action, Parameter
+from app.robots.description.inputs import wrong_value
+from app.ui.panels.robots.controls.chooser import ROW_HEIGHT, Control, Pictures, control_for, sentence_case
+from app.ui.panels.robots.controls.colour import ColourChoice
+from app.ui.panels.robots.input_text import input_words
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Segments, label
+from app.ui.widgets.long_text import LongText
+
+LABEL_WIDTH = 92
+ROW_GAP = 10
+TALL_ROW = 60  # a row with a drawing: its name stands in the middle
+
+
+class ActionForm(QWidget):
+    """One row for each parameter; the advanced ones come with "More". `changed` when a person changed one."""
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        theme: Theme,
+        action: Action,
+        options: Callable[[str], Sequence[str]] = lambda _property: (),
+        pictures: Pictures | None = None,
+    ) -> None:
+        """``options`` gives the words that a property of the robot offers now, ``pictures`` cameras."""
+        super().__init__()
+        self.action = action
+        self.controls: dict[str, Control] = {}
+        self._sentences: dict[str, QLabel] = {}
+        self._rows: dict[str, tuple[QWidget, QWidget]] = {}
+        self._heights: dict[QWidget, int] = {}
+        self._stacked = False
+        self._theme, self._pictures = theme, pictures
+        self._grid = QGridLayout()
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(10)
+        self._grid.setVerticalSpacing(ROW_GAP)
+        self._fit()
+        theme.changed.connect(self._fit)
+        self._grid.setColumnStretch(1, 1)
+        self.more = Button(theme, "More", "chevron-down", kind="ghost", size="small")
+        self.more.setCheckable(True)
+        self.more.toggled.connect(self._show_advanced)
+        self.problem = label("", "small", role="error", wrap=True)
+        self.problem.hide()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(ROW_GAP)
+        column.addLayout(self._grid)
+        column.addWidget(self.more)
+        column.addWidget(self.problem)
+        for parameter in sorted(action.parameters, key=lambda one: one.advanced):
+            self._add(parameter, options(parameter.options_from) if parameter.options_from else ())
+        self.more.setVisible(any(parameter.advanced for parameter in action.parameters))
+        self._show_advanced(False)
+
+    def _add(self, parameter: Parameter, options: Sequence[str]) -> None:
+        control = control_for(self._theme, parameter, options, self._pictures)
+        # with a buddy, an & would underline the next letter
+        words = plain.entry(sentence_case(parameter.title))
+        name = label(words, "bodyLarge", role="textSecondary", wrap=True)
+        name.setBuddy(control.widget)
+        wrong = label("", "small", role="error", wrap=True)
+        wrong.hide()
+        cell = QWidget()
+        inside = QVBoxLayout(cell)
+        inside.setContentsMargins(0, 0, 0, 0)
+        inside.setSpacing(4)
+        inside.addWidget(control.widget)
+        inside.addWidget(wrong)
+        control.widget.setMinimumHeight(ROW_HEIGHT)
+        self._heights[name] = max(ROW_HEIGHT, min(TALL_ROW, control.widget.sizeHint().height()))
+        self._put(2 * len(self._rows), name, cell)
+        self.controls[parameter.name] = control
+        self._sentences[parameter.name] = wrong
+        self._rows[parameter.name] = (name, cell)
+        control.changed(self._told)
+        control.finished(lambda: self._left(parameter))
+
+    # -- its rows ---------------------------------------------------------------------------------
+
+    def _fit(self) -> None:
+        """Names beside their controls where every control has its room there, else above them."""
+        beside = round(self._theme.scaled(LABEL_WIDTH))
+        stacked = self.width() < beside + self._grid.horizontalSpacing() + self._control_width()
+        self._grid.setColumnMinimumWidth(0, 0 if stacked else beside)
+        if stacked != self._stacked:
+            self._stacked = stacked
+            for place, (name, cell) in enumerate(self._rows.values()):
+                self._put(2 * place, name, cell)
+
+    def _control_width(self) -> int:
+        """The room that the widest control wants; those that can have several rows want one."""
+        each = [one.widget for one in self.controls.values()]
+        in_one_row = (one.sizeHint().width() for one in each if isinstance(one, Segments | ColourChoice))
+        return max((*in_one_row, *(one.minimumSizeHint().width() for one in each)), default=0)
+
+    def _put(self, row: int, name: QWidget, cell: QWidget) -> None:
+        for widget in (name, cell):
+            self._grid.removeWidget(widget)
+        name.setMinimumHeight(0 if self._stacked else self._heights[name])
+        if self._stacked:
+            self._grid.addWidget(name, row, 0, 1, 2)
+            self._grid.addWidget(cell, row + 1, 0, 1, 2)
+        else:
+            self._grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
+            self._grid.addWidget(cell, row, 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def minimumSizeHint(self) -> QSize:
+        """As wide as the widest control alone: names can stand above."""
+        least = max((cell.minimumSizeHint().width() for _, cell in self._rows.values()), default=0)
+        return QSize(least, super().minimumSizeHint().height())
+
+    def _told(self) -> None:
+        self.show_problems(())
+        self.changed.emit()
+
+    def _left(self, parameter: Parameter) -> None:
+        """A person has left a field: what is wrong with it stands below it, before anything is tried."""
+        value = self.controls[parameter.name].value()
+        wrong = None if value is None else wrong_value(parameter, value)
+        said = [] if wrong is None else [f"{parameter.title} {wrong}"]
+        self._judge(parameter, said)
+
+    def _show_advanced(self, on: bool) -> None:
+        self.more.set_word("Fewer" if on else "More", "chevron-up" if on else "chevron-down")
+        for parameter in self.action.parameters:
+            if parameter.advanced:
+                for widget in self._rows[parameter.name]:
+                    widget.setVisible(on)
+
+    def input(self) -> dict[str, object]:
+        """What the form says now, as the action's input; what is left empty is left out."""
+        given = {name: control.value() for name, control in self.controls.items()}
+        return {name: value for name, value in given.items() if value is not None}
+
+    def set_input(self, given: Mapping[str, object]) -> None:
+        """Show these values."""
+        for name, value in given.items():
+            if name in self.controls:
+                self.controls[name].show_value(value)
+
+    def show_problems(self, sentences: Sequence[str]) -> None:
+        """Put each sentence (``turn: angle must be a number``) below its row; others stand at the end."""
+        left = list(sentences)
+        for parameter in self.action.parameters:
+            mine = [one for one in left if one.startswith(f"{self.action.name}: {parameter.title} ")]
+            left = [one for one in left if one not in mine]
+            self._judge(parameter, [one.split(": ", 1)[1] for one in mine])
+        self._say(self.problem, left)
+
+    def _judge(self, parameter: Parameter, said: Sequence[str]) -> None:
+        control = self.controls[parameter.name]
+        self._say(self._sentences[parameter.name], () if control.sentence else said)
+        self._mark(control.widget, wrong=bool(said or control.sentence))
+        if said and parameter.advanced:
+            self.more.setChecked(True)
+
+    def _say(self, place: QLabel, sentences: Sequence[str]) -> None:
+        place.setText(" ".join(f"{sentence_case(one)}." for one in sentences))
+        place.setVisible(bool(sentences))
+
+    def _mark(self, widget: QWidget, *, wrong: bool) -> None:
+        if isinstance(widget, LongText):
+            widget.mark(wrong=wrong)
+            return
+        for field in [widget, *widget.findChildren(QLineEdit)]:
+            if isinstance(field, QLineEdit) and (field.property("wrong") == "true") != wrong:
+                field.setProperty("wrong", "true" if wrong else "false")
+                field.style().unpolish(field)
+                field.style().polish(field)
+
+    def summary(self) -> str:
+        """The values in a few words: "happy, for 2 s"."""
+        given = {name: control.value() for name, control in self.controls.items()}
+        return input_words(self.action, given, texts=False)
+
+    def shut(self) -> None:
+        """The form goes: its controls look at nothing any more."""
+        for control in self.controls.values():
+            control.close()

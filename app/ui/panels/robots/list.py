@@ -1,0 +1,140 @@
+"""The robots at the left of the Robots panel, and what to do when one is not among them."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.ui.text import plain
+from app.ui.text.dates import when_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Card, label
+from app.ui.widgets.menus import Menu
+from app.ui.widgets.robot_item import LIST_WIDTH, RobotItem
+
+if TYPE_CHECKING:
+    from app.core.robots.fleet import Fleet
+    from app.core.robots.known import KnownRobot
+    from app.core.robots.robot_link import RobotLink
+
+
+TURTLE = "diffdrive"
+
+
+def seen_words(seen_s: float, now: dt.datetime | None = None) -> str:
+    """Say "seen today, 8:12", "seen yesterday, 16:20", "seen 17 November, 16:20"."""
+    now = now or dt.datetime.now().astimezone()
+    words = when_words(dt.datetime.fromtimestamp(seen_s, tz=now.tzinfo), now)
+    return f"seen {words[:1].lower()}{words[1:]}"
+
+
+class RobotList(QWidget):
+    """One row for each robot; `chosen` and `forgotten` tell the name of one."""
+
+    chosen = Signal(str)
+    forgotten = Signal(str)
+
+    def __init__(self, theme: Theme, run: Callable[[str], object]) -> None:
+        """``run`` does a command by its name."""
+        super().__init__()
+        self._theme = theme
+        self._run = run
+        self._known: dict[str, KnownRobot] = {}
+        self.items: dict[str, RobotItem] = {}
+        self.away: dict[str, RobotItem] = {}
+        self.setFixedWidth(LIST_WIDTH)
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(8, 8, 8, 8)
+        self._column.setSpacing(2)
+        self._column.addStretch(1)
+        self._column.addWidget(self._make_help(run))
+
+    def _make_help(self, run: Callable[[str], object]) -> QWidget:
+        card = Card(self._theme, fill="sunken")
+        column = QVBoxLayout(card)
+        column.setContentsMargins(14, 12, 14, 12)
+        column.setSpacing(6)
+        column.addWidget(label("Robot not in the list?", "label"))
+        said = "Check that it is on and that its driver runs."
+        column.addWidget(label(said, "body", role="textSecondary", wrap=True))
+        self.why = Button(self._theme, "Find out why", "stethoscope", size="small")
+        self.why.clicked.connect(lambda: run("help.doctor"))
+        self.turtle = Button(self._theme, "Use a virtual Turtle", "bot", kind="ghost", size="small")
+        self.turtle.setAccessibleName("Use the virtual Turtle")
+        self.turtle.clicked.connect(lambda: run("robots.turtle"))
+        for button in (self.why, self.turtle):  # below each other: large text needs the width
+            column.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
+        return card
+
+    @property
+    def count(self) -> int:
+        """How many robots are in the list."""
+        return len(self.items) + len(self.away)
+
+    def show_fleet(self, fleet: Fleet) -> list[str]:
+        """Show the robots of this start, then those that were here at another one; the names of the first."""
+        self._known = {robot.name: robot for robot in fleet.known.robots}
+        links = [link for link in fleet.links if link.connected or link.virtual or link.name in self._known]
+        names = [link.name for link in links]
+        self._show(links, [robot for name, robot in self._known.items() if name not in names])
+        return names
+
+    def seen(self, name: str) -> str:
+        """When a real robot was seen last, in words."""
+        return seen_words(self._known[name].seen_s) if name in self._known else ""
+
+    def _show(self, links: Sequence[RobotLink], away: Sequence[KnownRobot]) -> None:
+        gone = {robot.name: robot for robot in away}
+        for name in [name for name in self.items if name not in {link.name for link in links}]:
+            self._drop(self.items.pop(name))
+        for name in [name for name in self.away if name not in gone]:
+            self._drop(self.away.pop(name))
+        for link in links:
+            if link.name not in self.items:
+                item = self._make_item(link.name, len(self.items))
+                item.clicked.connect(lambda _on=False, name=link.name: self.chosen.emit(name))
+                self.items[link.name] = item
+        for robot in away:
+            if robot.name not in self.away:
+                item = self._make_item(robot.name, len(self.items) + len(self.away))
+                item.clicked.connect(partial(self._open_below, item))
+                self.away[robot.name] = item
+            self.away[robot.name].show_away(seen_words(robot.seen_s))
+        self.turtle.setVisible(not any(link.robot.model == TURTLE and link.connected for link in links))
+
+    def _make_item(self, name: str, place: int) -> RobotItem:
+        item = RobotItem(self._theme, name)
+        item.menu_wanted.connect(lambda at: self._open_menu(item, at))
+        self._column.insertWidget(place, item)
+        return item
+
+    def _drop(self, item: RobotItem) -> None:
+        self._column.removeWidget(item)
+        item.hide()
+        item.deleteLater()
+
+    # -- the menu of one that is away ---------------------------------------------------------------------
+
+    def _open_below(self, item: RobotItem) -> None:
+        self._open_menu(item, item.mapToGlobal(item.rect().bottomLeft()))
+
+    def _open_menu(self, item: RobotItem, at: QPoint) -> None:
+        menu = self.menu_of(item)
+        if menu is not None:
+            menu.popup(at)
+
+    def menu_of(self, item: RobotItem) -> Menu | None:
+        """What can be done about a robot that is away; None for one that is here, or virtual."""
+        if not item.may_be_forgotten:
+            return None
+        menu = Menu(self._theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addAction("Find out why").triggered.connect(lambda: self._run("help.doctor"))
+        forget = menu.addAction(plain.entry(f"Forget {item.name}"))
+        forget.triggered.connect(lambda: self.forgotten.emit(item.name))
+        return menu

@@ -1,0 +1,308 @@
+"""Robots: what each robot can do, as forms that can be tried at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QFrame,
+    QHBoxLayout,
+    QScrollArea,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.core.robots.motion_permission import MayNotMoveError
+from app.core.robots.robot_link import NOT_STOPPED, STOPPING
+from app.errors import AppError, RobotInputError
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.robots.action_card import ActionCard
+from app.ui.panels.robots.list import RobotList
+from app.ui.panels.robots.robot_head import RobotHead
+from app.ui.panels.robots.session_pictures import SessionPictures
+from app.ui.text.numbers import plural
+from app.ui.widgets import EmptyAction, EmptyState, Line, label
+from app.ui.widgets.robot_item import LIST_WIDTH, STATUS
+
+if TYPE_CHECKING:
+    from app.core.network.watches import Look, Watch
+    from app.core.robots.robot_link import RobotLink
+
+UNFOLDED = 4
+LIST_FROM_WIDTH = 760
+FINDER_FROM_WIDTH, ABOUT_FROM_WIDTH = 620, 440
+
+
+class RobotsPanel(PanelWidget):
+    """The list of robots, and the actions of the chosen one."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "Robots")
+        self._robot = ""
+        self._revision = -1
+        self._watch: Watch | None = None
+        self.cards: dict[str, ActionCard] = {}
+        self._cards_of = ""
+        self._pictures = SessionPictures(self.session)
+        self._seen: dict[str, tuple[object, ...]] = {}
+        self._told: dict[tuple[str, str], list[str]] = {}
+        self._lay_out()
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._focus_moved)
+
+    # -- its parts ----------------------------------------------------------------------------------------
+
+    def _lay_out(self) -> None:
+        theme = self.theme
+        self.empty = EmptyState(
+            theme,
+            "bot",
+            "No robot is connected",
+            "What a robot can do appears here as soon as it is there.",
+            [
+                EmptyAction(
+                    "Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot", primary=True
+                )
+            ],
+        )
+        self.list = RobotList(theme, self.context.run)
+        self.list.chosen.connect(self.choose)
+        self.list.forgotten.connect(self.forget)
+        self.items = self.list.items
+        self._list_line = Line(theme, upright=True)
+        right = QVBoxLayout()
+        right.setSpacing(0)
+        self.head = head = RobotHead(theme)
+        self.name, self.chip, self.about = head.name, head.chip, head.about
+        self.finder, self.stop = head.finder, head.stop
+        self.finder.textChanged.connect(self._filter)
+        self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
+        right.addWidget(head)
+        right.addWidget(Line(theme))
+        right.addWidget(self._make_cards(), 1)
+        robot = QWidget()
+        robot.setLayout(right)
+        right.setContentsMargins(0, 0, 0, 0)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.empty)
+        self.pages.addWidget(robot)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.list)
+        row.addWidget(self._list_line)
+        row.addWidget(self.pages, 1)
+
+    def _make_cards(self) -> QWidget:
+        inside = QWidget()
+        inside.setProperty("bare", "true")
+        self._card_column = QVBoxLayout(inside)
+        self._card_column.setContentsMargins(16, 14, 16, 14)
+        self._card_column.setSpacing(12)
+        self.none = label("No action has these words.", "bodyLarge", role="textSecondary")
+        self.none.hide()
+        self._card_column.addWidget(self.none)
+        self._card_column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setAccessibleName("Actions")
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setWidget(inside)
+        return scroll
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        fleet = self.session.fleet
+        if fleet.revision != self._revision:
+            self._revision = fleet.revision
+            self._show_robots()
+        for name, item in self.items.items():
+            link = fleet.link(name)
+            if link is not None and self._new(name, link.state):
+                item.show_link(link, self.list.seen(name))
+        chosen = fleet.link(self._robot) if self._robot else None
+        if chosen is not None:
+            self._show_link(chosen)
+
+    def _new(self, what: str, *now: object) -> bool:
+        """Whether this differs from what was shown."""
+        changed = self._seen.get(what) != now
+        self._seen[what] = now
+        return changed
+
+    def _show_robots(self) -> None:
+        fleet = self.session.fleet
+        names = self.list.show_fleet(fleet)
+        self.pages.setCurrentIndex(1 if names else 0)
+        self._fit()
+        if names and self._robot not in names:
+            shown = fleet.shown
+            self._show_robot(shown.name if shown is not None and shown.name in names else names[0])
+        elif names:
+            self._make_forms()
+
+    def forget(self, name: str) -> None:
+        """A person does not want to see a robot that is away; it is there again when it comes."""
+        self.session.fleet.known.forget(name)
+        self._seen.pop(name, None)
+        self._show_robots()
+
+    def choose(self, name: str) -> None:
+        """A person chose another robot: its actions show here, and the panels of one robot show it too."""
+        self.session.fleet.choose(name)
+        self._show_robot(name)
+
+    def _show_robot(self, name: str) -> None:
+        self.shut()
+        self._robot, self._revision = name, self.session.fleet.revision
+        self._watch = self.session.fleet.look_at(name)
+        self._seen.pop("cards", None)
+        if name in self.items:
+            self.items[name].setChecked(True)
+        self._make_forms()
+
+    def _make_forms(self) -> None:
+        link = self.session.fleet.link(self._robot)
+        if link is None or not self._new("cards", link.name, link.robot, self._offered(link)):
+            return
+        kept = {name: card.form.input() for name, card in self.cards.items()} if self._made_for(link) else {}
+        self._drop_cards()
+        actions = [action for action in link.robot.actions if action.name != link.robot.safe_stop.action]
+        titles = {action.name: action.title for action in link.robot.actions}
+        for place, action in enumerate(actions):
+            card = ActionCard(
+                self.theme,
+                action,
+                self._options,
+                folded=place >= UNFOLDED,
+                pictures=self._pictures,
+                title_of=lambda name: titles.get(name, name.replace("_", " ")),
+            )
+            card.form.set_input(kept.get(action.name, {}))
+            card.tried.connect(lambda given, name=action.name: self.attempt(name, given))
+            card.cancelled.connect(lambda name=action.name: self.session.fleet.cancel(self._robot, name))
+            self.cards[action.name] = card
+            self._card_column.insertWidget(place, card)
+        self._cards_of = link.name
+        self._set_first(next(iter(self.cards.values()), None))
+        self.name.setText(link.name)
+        self.stop.set_word(f"Stop {link.name}")
+        kind = "virtual, " if link.virtual else ""
+        self.about.setText(f"{kind}{plural(len(actions), 'action')}")
+        self._filter()
+
+    def _made_for(self, link: RobotLink) -> bool:
+        """Whether the cards are this robot's: what was typed into them is kept then."""
+        return self._cards_of == link.name
+
+    def _drop_cards(self) -> None:
+        for card in self.cards.values():
+            card.form.shut()
+            self._card_column.removeWidget(card)
+            card.deleteLater()
+        self.cards = {}
+        self._seen = {what: seen for what, seen in self._seen.items() if not what.startswith("card ")}
+
+    def _offered(self, link: RobotLink) -> tuple[object, ...]:
+        """What the robot's properties offer to choose from now: another offer makes other forms."""
+        named = {one.options_from for action in link.robot.actions for one in action.parameters}
+        return tuple((name, tuple(self._options(name))) for name in sorted(filter(None, named)))
+
+    def _show_link(self, link: RobotLink) -> None:
+        self._make_forms()
+        if self._new("head", link.state, link.chip):
+            self.chip.set(link.chip.removeprefix("virtual, "), STATUS.get(link.state, "ok"))
+        may_move = link.state in {NOT_STOPPED, STOPPING}
+        for name, card in self.cards.items():
+            made = link.invocations.get(name)
+            now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()
+            if self._new(f"card {name}", may_move, *now):
+                card.show_invocation(made, may_move=may_move)
+                card.show_tries(tuple(link.tried))
+
+    def _options(self, name: str) -> Sequence[str]:
+        """What a property of the robot offers to choose from now."""
+        link = self.session.fleet.link(self._robot)
+        value = link.values.get(name) if link is not None else None
+        if isinstance(value, (list, tuple)):
+            self._told[self._robot, name] = [str(item) for item in value]
+        return self._told.get((self._robot, name), [])  # also while nobody looked and nothing came again yet
+
+    def _filter(self) -> None:
+        words = self.finder.text().casefold().split()
+        shown = 0
+        for name, card in self.cards.items():
+            text = f"{name} {card.action.title} {card.action.category}".casefold()
+            fits = all(word in text for word in words)
+            card.setVisible(fits)
+            shown += fits
+        self.none.setVisible(bool(self.cards) and not shown)
+
+    # -- what a person does -------------------------------------------------------------------------------
+
+    def attempt(self, action: str, given: Mapping[str, object]) -> None:
+        """Ask the robot to do it; what is wrong with the values stands below them."""
+        card = self.cards[action]
+        try:
+            self.session.fleet.invoke(self._robot, action, given)
+        except RobotInputError as error:
+            card.show_problems(error.sentences)
+        except MayNotMoveError:
+            card.show_problems(())  # the question stands over the window
+        except AppError as error:
+            card.show_problems((str(error),))
+        else:
+            card.show_problems(())
+
+    def _focus_moved(self, _old: QWidget | None, new: QWidget | None) -> None:
+        if new is not None and self.isAncestorOf(new):
+            for card in self.cards.values():
+                if card.isAncestorOf(new):
+                    self._set_first(card)
+
+    def _set_first(self, first: ActionCard | None) -> None:
+        for card in self.cards.values():
+            card.set_first(card is first)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def theme_changed(self) -> None:
+        super().theme_changed()
+        self._fit()
+
+    def _fit(self) -> None:
+        """Large text and narrow places: the actions first, then the list, then what is known of the robot."""
+        width = self.width() / self.theme.scaled(1.0)
+        count = self.list.count
+        wide = count > 1 or (count == 1 and width >= LIST_FROM_WIDTH)
+        self.list.setVisible(wide)
+        self._list_line.setVisible(wide)
+        room = width - (LIST_WIDTH if wide else 0)
+        self.finder.setVisible(room >= FINDER_FROM_WIDTH)
+        self.about.setVisible(room >= ABOUT_FROM_WIDTH)
+
+    def focus_filter(self) -> bool:
+        self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        return True
+
+    def looks(self) -> Iterable[Look | None]:
+        return (self._watch, *self._pictures.streams)
+
+    def shut(self) -> None:
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
+        for card in self.cards.values():
+            card.form.shut()
+
+
+PANEL = Panel("robots", "Robots", "bot", (), RobotsPanel)

@@ -1,0 +1,126 @@
+"""What became of a try, in words: what it waits for, what the robot tells meanwhile, how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from app.robots.description.description import Action, Field
+from app.ui.text.numbers import seconds_words
+from app.ui.text.sensor_values import number_words
+
+if TYPE_CHECKING:
+    from app.core.robots.robot_link import Invocation
+
+TO_GO = "to_go"
+SHARES = ("progress", "ratio", "share")
+PERCENT = ("percent", "percentage")
+SILENT_UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit
+
+
+def field_words(fields: Sequence[Field], told: Mapping[str, object]) -> str:
+    """The fields that a description names, with their values: "0.3 m to go", "moved 0.5 m"."""
+    parts = []
+    for field in fields:
+        value = told.get(field.name)
+        if value is None or field.name in SHARES:
+            continue
+        if isinstance(value, bool):
+            parts.append(f"{field.title} {'yes' if value else 'no'}")
+        elif isinstance(value, (int, float)):
+            words = number_words(float(round(value, 2)), field.unit)
+            if field.name == TO_GO:
+                parts.append(f"{words} {field.title}")
+            else:
+                bare = SILENT_UNITS.get(field.unit or "") == field.title
+                parts.append(words if bare else f"{field.title} {words}")
+        else:
+            parts.append(f"“{value}”")
+    return ", ".join(parts)
+
+
+def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
+    """What the robot says meanwhile: "0.3 m to go"; the fields that its description names."""
+    return field_words(action.feedback, feedback)
+
+
+def output_words(action: Action, output: Mapping[str, object]) -> str:
+    """What the robot answered; how long it took is said by the result itself."""
+    told = [field for field in action.output if SILENT_UNITS.get(field.unit or "") != field.title]
+    return field_words(told, output)
+
+
+def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
+    """How much is done, 0 to 1: what the robot calls progress, or what of the asked is done or left to do."""
+    for name in SHARES:
+        share = _number(feedback.get(name))
+        if share is not None:
+            return _within(share)
+    for field in action.feedback:
+        value = _number(feedback.get(field.name))
+        if value is None:
+            continue
+        if field.unit == "%" or field.name in PERCENT:
+            return _within(value / 100)
+        asked = next(
+            (
+                _number(given.get(one.name))
+                for one in action.parameters
+                if field.unit and one.unit == field.unit
+            ),
+            None,
+        )
+        if asked:
+            done = abs(value / asked)
+            return _within(1.0 - done if field.name == TO_GO else done)
+    return None
+
+
+def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
+    """What a try that has not ended does now."""
+    if made.state == "sent":
+        return "asked"
+    if made.state == "accepted":
+        if made.waits_for:
+            return f"waits for {_listed([title_of(name) for name in made.waits_for])}"
+        return f"replaces {_listed([title_of(name) for name in made.replaces])}" if made.replaces else "asked"
+    return feedback_words(action, made.feedback) or f"for {seconds_words(made.elapsed_s)}"
+
+
+def left_words(made: Invocation) -> str:
+    """How long it may still take; empty when there is no limit."""
+    left_s = made.left_s
+    if left_s is None or not made.running:
+        return ""
+    return f"{max(0, int(left_s + 0.999))} s left"
+
+
+def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
+    """How a try ended: the words of its chip, the chip's status, and a sentence when there is one to say.
+
+    ``may_move``: the robot is not proven to stand still, so nothing is called stopped.
+    """
+    took = seconds_words(made.elapsed_s)
+    if made.state == "succeeded":
+        return f"done in {took}", "ok", ""
+    if made.state == "canceled":
+        reason = made.error if made.error and made.error != "stopped" else ""
+        return f"{'ended' if may_move else 'stopped'} after {took}", "off", _sentence(reason)
+    return "not done", "error", _sentence(made.error or "The robot did not say why")
+
+
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') or not words else '.'}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _number(value: object) -> float | None:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if good else None  # type: ignore[arg-type]
+
+
+def _within(share: float) -> float:
+    return min(1.0, max(0.0, share))

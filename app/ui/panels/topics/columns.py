@@ -1,0 +1,150 @@
+"""The columns of the table of topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from app.ui.text.numbers import age_words, bandwidth_words, grouped, plural, rate_words
+from app.ui.widgets.table.model import Cell, Column
+
+if TYPE_CHECKING:
+    from app.core.network.topics import Topic
+
+ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
+
+
+def _ink(topic: Topic, role: str) -> str:
+    return role if topic.gone_s is None else "textDisabled"
+
+
+def name_cell(topic: Topic) -> Cell:
+    """The name: bold with a chip while new, struck through when it has vanished."""
+    gone = topic.gone_s is not None
+    chip = "new" if topic.new and not gone else None
+    return Cell(topic.name, role=_ink(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip)
+
+
+def type_cell(topic: Topic) -> Cell:
+    """The type's icon and word; of "robot/answer" the last one, the tooltip has the whole."""
+    icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
+    return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"))
+
+
+def publishers_cell(topic: Topic) -> Cell:
+    """How many programs publish it."""
+    return Cell(str(topic.publishers), role=_ink(topic, "text"))
+
+
+def subscribers_cell(topic: Topic) -> Cell:
+    """How many programs subscribe it."""
+    return Cell(str(topic.subscribers) if topic.gone_s is None else "", role=_ink(topic, "text"))
+
+
+def nodes_cell(topic: Topic) -> Cell:
+    """The names of the programs that publish it."""
+    return Cell(", ".join(topic.publisher_nodes), role=_ink(topic, "textSecondary"))
+
+
+def curve_cell(topic: Topic) -> Cell:
+    """The rate of the last half minute."""
+    return Cell(role=_ink(topic, "textSecondary"), curve=tuple(topic.rates))
+
+
+def rate_cell(topic: Topic) -> Cell:
+    """Messages a second."""
+    return Cell(rate_words(topic.rate_hz), role=_ink(topic, "text"))
+
+
+def bandwidth_cell(topic: Topic) -> Cell:
+    """Bytes a second."""
+    return Cell(bandwidth_words(topic.bandwidth_Bps), role=_ink(topic, "text"))
+
+
+def age_cell(topic: Topic) -> Cell:
+    """How old the newest message is, or since when the topic is gone."""
+    if topic.gone_s is not None:
+        return Cell(f"gone {int(topic.gone_s)} s", role="textDisabled")
+    return Cell(age_words(topic.age_s))
+
+
+def loss_cell(topic: Topic) -> Cell:
+    """What was lost, with a warning when it is not nothing; blank when nobody knows."""
+    if topic.lost is None or topic.gone_s is not None:
+        return Cell()
+    if topic.lost == 0:
+        return Cell("0")
+    share = topic.loss_ratio
+    return Cell(
+        f"{share:.1%}".replace("%", " %") if share is not None else str(topic.lost), "triangle-alert", "warn"
+    )
+
+
+def _publishers_tip(topic: Topic) -> str:
+    return (
+        "Published by " + ", ".join(topic.publisher_nodes) if topic.publisher_nodes else "Nobody publishes it"
+    )
+
+
+def _curve_tip(topic: Topic) -> str:
+    if len(topic.rates) < 2:
+        return "Nobody has told a rate yet"
+    return f"Rate lately: {rate_words(min(topic.rates))} to {rate_words(max(topic.rates))} /s"
+
+
+def _shown_tip(topic: Topic) -> str:
+    """What reached the panels, where it is not everything."""
+    if not (topic.dropped or topic.missed):
+        return ""
+    shown, sent = topic.shown_of
+    return f"Shown {grouped(shown)} of {grouped(sent)} sent"
+
+
+def _rate_tip(topic: Topic) -> str:
+    return _shown_tip(topic) or "Messages a second, as the publishers tell"
+
+
+def _loss_tip(topic: Topic) -> str:
+    shown = _shown_tip(topic)
+    lost = (
+        f"{plural(topic.lost, 'message')} lost"
+        if topic.lost is not None
+        else "No subscriber tells what is lost"
+    )
+    return f"{lost}. {shown}" if shown else lost
+
+
+COLUMNS: tuple[Column[Topic], ...] = (
+    Column("topic", "Topic", 137, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
+    Column("type", "Type", 90, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
+    Column(
+        "publishers",
+        "Publishers",
+        72,
+        publishers_cell,
+        lambda t: t.publishers,
+        figures=True,
+        tip=_publishers_tip,
+        yields=4,
+    ),
+    Column(
+        "subscribers", "Subscribers", 80, subscribers_cell, lambda t: t.subscribers, figures=True, off=True
+    ),
+    Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
+    Column("curve", "", 50, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
+    Column("rate", "Rate /s", 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
+    Column("bandwidth", "Bandwidth", 75, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
+    Column("age", "Age", 58, age_cell, lambda t: t.age_s, figures=True, yields=2),
+    Column("loss", "Loss", 62, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
+)
+
+
+def columns(own: Callable[[Topic], bool]) -> tuple[Column[Topic], ...]:
+    """The columns; what is Studio's ``own`` is no news."""
+
+    def named(topic: Topic) -> Cell:
+        cell = name_cell(topic)
+        return replace(cell, bold=False, chip=None) if cell.chip and own(topic) else cell
+
+    return (replace(COLUMNS[0], cell=named), *COLUMNS[1:])

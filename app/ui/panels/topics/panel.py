@@ -1,0 +1,116 @@
+"""Topics: everything that is on the network, with its figures as the publishers tell them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QVBoxLayout
+
+from app.core.network.source import NODE_NAME
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.table_panel import TablePanel
+from app.ui.panels.topics.columns import columns
+from app.ui.text.numbers import plural
+from app.ui.widgets import EmptyAction, label
+from app.ui.widgets.table.model import TableModel
+from app.ui.widgets.table.view import TableView
+
+if TYPE_CHECKING:
+    from app.core.network.topics import Topic
+
+FOOT = "Rates come from the publishers; nothing is subscribed but what you look at"
+FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second
+SORT_EVERY = 30
+LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
+
+
+class TopicsPanel(TablePanel["Topic"]):
+    """The table of topics, a filter in the title, a line about the figures below."""
+
+    def __init__(self, context: PanelContext) -> None:
+        super().__init__(context, "topic", "radio-tower")
+        self.count = label("", "small", role="textSecondary")
+        self.header.insert(0, self.count)
+        self.foot.setText(FOOT)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget, stretch in ((self.pages, 1), (self.line, 0), (self.foot, 0), (self.doctor, 0)):
+            column.addWidget(widget, stretch)
+        self._seen = (-1, -1, "")
+        self._ours: tuple[str, ...] = ()
+        self._ticks = 0
+        self._wanted = ""
+
+    def make_model(self) -> TableModel[Topic]:
+        return TableModel(columns(self._own), lambda topic: topic.name)
+
+    def make_table(self, model: TableModel[Topic]) -> TableView[Topic]:
+        return TableView(self.theme, model, "topic")
+
+    def _own(self, topic: Topic) -> bool:
+        """Whether only virtual robots that Studio itself started publish it, or Studio."""
+        if not topic.publisher_nodes:
+            return topic.name.startswith(tuple(f"/{robot}/" for robot in self._ours))
+        return {*self._ours, NODE_NAME}.issuperset(topic.publisher_nodes)
+
+    def refresh(self) -> None:
+        self._ticks += 1
+        topics = self.session.topics
+        facts = (topics.revision, len(topics), self.session.master.kind)
+        order = self.table.order.column
+        lively = order is not None and order.name in LIVELY
+        if facts != self._seen or (lively and self._ticks % SORT_EVERY == 0):
+            self.rebuild()
+        if self._ticks % FIGURES_EVERY == 0 and self.model.rowCount():
+            self.table.tell_visible_changed()
+
+    def rebuild(self) -> None:
+        topics = self.session.topics
+        self._seen = (topics.revision, len(topics), self.session.master.kind)
+        self._ours = self.session.companions.virtual_robots
+        words = self.filter_words()
+        rows = [topic for topic in topics if all(word in _haystack(topic) for word in words)]
+        self.model.set_rows(self.table.order.sort(rows))
+        if self._wanted:
+            self.show_topic(self._wanted)
+        self._say_counts(len(topics), len(rows) if words else None)
+        self.show_table(bool(rows), bool(words))
+        self.foot.setVisible(bool(rows))
+        self.line.setVisible(bool(rows))
+
+    def _say_counts(self, known: int, found: int | None) -> None:
+        graph = self.session.graph
+        words = plural(known, "topic") if found is None else f"{found} of {plural(known, 'topic')}"
+        if graph is not None and graph.nodes:
+            words += f", {plural(len(graph.nodes), 'node')}"
+        self.count.setText(words if known else "")
+        self.filter.setVisible(known > 0)
+
+    def say_empty(self) -> None:
+        if self.session.master.kind == "searching":
+            self.empty.say("Looking for a master", f"At {self.session.master.address}.", "radio-tower")
+            self.empty.set_actions([])
+        else:
+            self.empty.say("No topics yet", "They appear as soon as a program publishes.", "list")
+            self.empty.set_actions(
+                [EmptyAction("Use the virtual robot", self._use_virtual, "bot", primary=True)]
+            )
+
+    def _use_virtual(self) -> None:
+        self.context.run("robots.virtual")
+
+    def open_row(self, key: str) -> None:
+        self.session.topics.mark_seen(key)
+        self.context.open_topic(key)
+
+    def show_topic(self, name: str) -> None:
+        self._wanted = "" if self.model.index_of(name).isValid() else name  # its row may still come
+        self.table.choose(name)
+
+
+def _haystack(topic: Topic) -> str:
+    return f"{topic.name} {topic.msg_type} {' '.join(topic.publisher_nodes)}".casefold()
+
+
+PANEL = Panel("topics", "Topics", "list", (), TopicsPanel)

@@ -1,0 +1,1 @@
+"""Pictures of a stream: how they are shown, zoomed, and marked with what was recognised."""

@@ -1,0 +1,67 @@
+"""What was recognised in a picture, and how it is marked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPen
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+# Boxes lie on pictures, whatever the theme: two bright colours with dark words.
+BOX_COLOURS = ("#FFC53D", "#5FD4F4", "#7BE0A0", "#F79AC0")
+BOX_INK = "#1C1B19"
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Something that was recognised: its words, its confidence (0 to 1 or None), its place as shares."""
+
+    words: str
+    confidence: float | None
+    place: QRectF
+    kind: int = 0
+
+
+def boxes_of(detections: object, kind: int = 0) -> tuple[Box, ...]:
+    """The boxes in a detections sensor's value; whatever is none is left out."""
+    if not isinstance(detections, Mapping):
+        return ()
+    width, height = _number(detections.get("width")), _number(detections.get("height"))
+    items = detections.get("items")
+    if not width or not height or not isinstance(items, Sequence) or isinstance(items, str):
+        return ()
+    found = []
+    for item in items:
+        place = item.get("box") if isinstance(item, Mapping) else None
+        if isinstance(item, Mapping) and isinstance(place, Sequence) and len(place) == 4:
+            x, y, w, h = (_number(part) or 0.0 for part in place)
+            area = QRectF(x / width, y / height, w / width, h / height)
+            found.append(Box(str(item.get("name", "")), _number(item.get("confidence")), area, kind))
+    return tuple(found)
+
+
+def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: Box) -> None:
+    """A box around ``place`` (pixels of the view), with its words upright above it."""
+    colour = QColor(BOX_COLOURS[box.kind % len(BOX_COLOURS)])
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(QPen(colour, 2.5))
+    painter.drawRoundedRect(place, 2, 2)
+    words = box.words if box.confidence is None else f"{box.words} {box.confidence:.2f}"
+    font = theme.font("caption")
+    font.setWeight(font.Weight.DemiBold)
+    width = paint.width_of(font, words) + 12
+    high = max(18.0, paint.height_of(font) + 2)
+    top = place.top() - high - 1 if place.top() - high - 1 >= 0 else place.top()
+    tag = QRectF(place.left() - 1.25, top, width, high)
+    paint.box(painter, tag, 2, colour)
+    paint.words(painter, tag.adjusted(6, 0, 0, 0), words, font, QColor(BOX_INK))
+
+
+def _number(value: object) -> float | None:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if good else None  # type: ignore[arg-type]

@@ -1,0 +1,229 @@
+"""Pictures of a stream: fitting or zoomed, turned, with boxes, and the value under the mouse."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.ui.pictures.boxes import Box, paint_box
+from app.ui.pictures.placement import PicturePlace
+from app.ui.pictures.silent import grey, paint_around, paint_silent
+from app.ui.text.numbers import age_words
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+if TYPE_CHECKING:
+    from app.core.messages.image_streams import ImageStream
+    from app.core.messages.picture import Picture, Pixel
+
+SILENT_AFTER_S = 2.0
+LABEL_EDGE = 8
+SHARP_FROM = 2.0  # so many pixels of the screen for one of the picture: then it has edges
+AGE_EVERY = 8  # refreshes: nobody reads an age 30 times a second
+OLDEST_S = 3600.0
+
+
+def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
+    """``shown 30 of 60/s``; empty while neither is known."""
+    if arriving_hz is None:
+        return ""
+    shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
+    return f"shown {round(shown)} of {round(arriving_hz)}/s"
+
+
+def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
+    """``(16, 8)  196 198 190  #C4C6BE``; of grey and depth the number."""
+    if pixel is None:
+        return f"({x}, {y})"
+    if isinstance(pixel, int | float):
+        return f"({x}, {y})  {pixel:.6g}" if isinstance(pixel, float) else f"({x}, {y})  {pixel}"
+    red, green, blue = pixel
+    return f"({x}, {y})  {red} {green} {blue}  #{red:02X}{green:02X}{blue:02X}"
+
+
+class PictureView(QWidget):
+    """The newest picture of a stream; `take` is called at each refresh and paints only what is new."""
+
+    def __init__(self, theme: Theme, *, fill: bool = False, labelled: bool = True) -> None:
+        """``fill`` lets the picture fill the view where its edges may be cut by a tenth; no black is by it.
+
+        Without a label (``labelled``) a person reads in its middle that no new picture comes.
+        """
+        super().__init__()
+        self._theme = theme
+        self._fill, self._labelled = fill, labelled
+        self.place = PicturePlace()
+        self._picture: Picture | None = None
+        self._image: QImage | None = None
+        self._grey: QImage | None = None  # of the last picture, when no new one comes
+        self._boxes: tuple[Box, ...] = ()
+        self._rate = self._state = self._age = ""
+        self.mouse: QPointF | None = None  # where a person points, when it matters
+        self._takes = 0
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(80, 60)
+
+    # -- what it shows ------------------------------------------------------------------------------------
+
+    @property
+    def words(self) -> str:
+        """The label at the lower left."""
+        picture = self._picture
+        if picture is None:
+            return ""
+        under = self._under_mouse()
+        size = "" if self._state else f"{picture.width}\u00d7{picture.height}"
+        zoom = f"{round(self.scale() * 100)} %" if self.place.zoom is not None else ""
+        facts = (under, zoom) if under else (size, zoom, "" if self._state else self._age)
+        return "  ".join(part for part in (self._state or self._rate, *facts) if part)
+
+    @property
+    def boxes(self) -> tuple[Box, ...]:
+        """What is marked now."""
+        return self._boxes
+
+    @property
+    def picture(self) -> Picture | None:
+        """What is shown."""
+        return self._picture
+
+    def clear(self) -> None:
+        """Show nothing."""
+        self._picture = self._image = self._grey = None
+        self._boxes = ()
+        self._rate = self._state = self._age = ""
+        self.update()
+
+    def take(self, stream: ImageStream, boxes: tuple[Box, ...] = ()) -> None:
+        """Show what the stream has now."""
+        before = (self.words, self._boxes)
+        picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
+        self._takes += 1
+        self._rate = rate_sentence(stream.shown_hz, stream.arriving_hz)
+        if picture is not None and (self._takes % AGE_EVERY == 1 or not self._age):
+            self._age = _age_of(picture)
+        if stream.held:
+            self._state = f"Frozen, {age_words(stream.age_s)} old"
+        else:
+            silent = silent_s is not None and silent_s > SILENT_AFTER_S
+            self._state = f"Last picture, {age_words(stream.age_s)} old" if silent else ""
+        if picture is not self._picture and picture is not None:
+            self._picture = picture
+            rows, columns = picture.bgra.shape[:2]
+            # QImage does not copy the bytes: self._picture keeps them.
+            self._grey = None
+            self._image = QImage(picture.bgra.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32)
+            if not stream.held:
+                stream.shown()
+            self.update()
+        if not stream.held or picture is not shown:
+            self._boxes = boxes  # those on a frozen picture are frozen, too
+        stream.want(self._wish())
+        if (self.words, self._boxes) != before:
+            self.setAccessibleDescription(self.words)
+            self.update()
+
+    def _wish(self) -> tuple[int, int] | None:
+        """How many pixels the picture has on the screen; None when each of its own is wanted."""
+        if self.mouse is not None:
+            return None
+        ratio = self.devicePixelRatioF()
+        size = self.area().size() if self._picture is not None else QSizeF(self.size())
+        if self.place.turned % 180:
+            size = size.transposed()
+        return round(size.width() * ratio), round(size.height() * ratio)
+
+    def sizeHint(self) -> QSize:
+        return QSize(320, 240)
+
+    def picture_size(self) -> QSizeF:
+        """The whole picture's size in its own pixels."""
+        picture = self._picture
+        return QSizeF(picture.width, picture.height) if picture is not None else QSizeF(self.size())
+
+    def area(self) -> QRectF:
+        """Where the turned picture is painted; it may reach beyond the view."""
+        if self._picture is None:
+            return QRectF(self.rect())
+        return self.place.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)
+
+    def scale(self) -> float:
+        """Pixels of the screen for one of the picture."""
+        seen = self.place.seen_size(self.picture_size()).width()
+        return self.area().width() / max(1.0, seen) * self.devicePixelRatioF()
+
+    def _under_mouse(self) -> str:
+        picture = self._picture
+        if self.mouse is None or picture is None:
+            return ""
+        share = self.place.to_picture(self.mouse, self.area())
+        if not (-1e-9 <= share.x() < 1 and -1e-9 <= share.y() < 1):
+            return ""
+        x = min(int(share.x() * picture.width + 1e-6), picture.width - 1)
+        y = min(int(share.y() * picture.height + 1e-6), picture.height - 1)
+        return pixel_words(x, y, picture.pixel(x, y))
+
+    # -- painting -----------------------------------------------------------------------------------------
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        area, view = self.area(), QRectF(self.rect())
+        silent = self._state.startswith("Last")
+        image = self._grey_image() if silent and not self._labelled else self._image
+        if image is None or not area.contains(view):
+            if image is None or not self._fill:
+                painter.fillRect(self.rect(), QColor("black"))
+            else:
+                paint_around(painter, view, image)
+        if image is not None:
+            self._paint_image(painter, area, image)
+        if silent and not self._labelled:
+            paint_silent(painter, self._theme, view, self._state)
+        elif silent:
+            painter.fillRect(area, QColor(90, 90, 90, 150))
+        else:
+            shares = self.place.to_view(area)
+            for box in self._boxes:
+                paint_box(painter, self._theme, shares.mapRect(box.place), box)
+        if self._labelled and self.words:
+            self._paint_label(painter)
+        painter.end()
+
+    def _grey_image(self) -> QImage | None:
+        if self._grey is None and self._image is not None:
+            self._grey = grey(self._image)
+        return self._grey
+
+    def _paint_image(self, painter: QPainter, area: QRectF, image: QImage) -> None:
+        smooth = self.scale() < SHARP_FROM
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+        place = self.place
+        if not place.turned and not place.flipped_across and not place.flipped_down:
+            painter.drawImage(area, image)  # Qt's fast way
+            return
+        painter.save()
+        painter.setTransform(place.to_view(area), True)
+        painter.drawImage(QRectF(0, 0, 1, 1), image)
+        painter.restore()
+
+    def _paint_label(self, painter: QPainter) -> None:
+        font = self._theme.font("small")
+        font.setWeight(font.Weight.Medium)
+        high = max(20.0, paint.height_of(font) + 4)
+        width = min(paint.width_of(font, self.words) + 16, self.width() - 2 * LABEL_EDGE)
+        tag = QRectF(LABEL_EDGE, self.height() - LABEL_EDGE - high, width, high)
+        paint.box(painter, tag, 4, QColor(0, 0, 0, 190))
+        paint.words(painter, tag.adjusted(8, 0, -4, 0), self.words, font, QColor("white"))
+
+
+def _age_of(picture: Picture) -> str:
+    """How long ago it was taken, as its publisher's clock tells; blank when nobody tells."""
+    if picture.stamp_ns is None:
+        return ""
+    age_s = (time.time_ns() - picture.stamp_ns) / 1e9
+    return age_words(age_s) if 0 <= age_s < OLDEST_S else ""

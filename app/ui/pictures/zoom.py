@@ -1,0 +1,137 @@
+"""A picture that can be zoomed, moved and asked for its values, with mouse, touch pad and keyboard."""
+
+from __future__ import annotations
+
+from typing import TypeGuard
+
+from PySide6.QtCore import QEvent, QPointF, QSizeF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QWheelEvent
+
+from app.ui.pictures.view import PictureView
+from app.ui.theme.theme import Theme
+
+STEP, NOTCH = 1.25, 120
+KEY_MOVE = 40
+WAYS = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
+
+
+class ZoomablePicture(PictureView):
+    """Wheel, pinch and double click zoom where the mouse is, dragging and the arrow keys move the picture.
+
+    `place_changed` when a person did so; `key_pressed` with the name of each of ``keys`` ("Ctrl+C"), which
+    go before the window's shortcuts while the picture has the keyboard.
+    """
+
+    place_changed = Signal()
+    key_pressed = Signal(str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme)
+        self.keys: frozenset[str] = frozenset()
+        self._dragged: QPointF | None = None
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+
+    def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
+        """Zoom; what is under ``at`` (default: the middle) stays there."""
+        middle = QPointF(self.width() / 2, self.height() / 2)
+        self.place.zoom_at(factor, at or middle, QSizeF(self.size()), self.picture_size())
+        self.told()
+
+    def show_whole(self) -> None:
+        """As large as fits."""
+        self.place.set_zoom(None)
+        self.told()
+
+    def show_exact(self, at: QPointF | None = None) -> None:
+        """One pixel of the screen for each of the picture."""
+        self.zoom_by(1 / max(1e-9, self.scale()), at)
+
+    def move_by(self, dx: float, dy: float) -> None:
+        """Move the picture."""
+        self.place.move(dx, dy, QSizeF(self.size()), self.picture_size())
+        self.told()
+
+    def told(self) -> None:
+        """A person changed the place: paint, and tell."""
+        self.update()
+        self.place_changed.emit()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self.picture is None:
+            event.ignore()
+            return
+        self.zoom_by(STEP ** (event.angleDelta().y() / NOTCH), event.position())
+        event.accept()
+
+    def event(self, event: QEvent) -> bool:
+        if isinstance(event, QNativeGestureEvent):
+            if event.gestureType() == Qt.NativeGestureType.ZoomNativeGesture:
+                self.zoom_by(1.0 + event.value(), event.position())
+                return True
+        elif _is_key(event) and key_name(event) in self.keys:
+            event.accept()  # ours goes before the window's
+            return True
+        return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        name = key_name(event)
+        steps = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
+        if name in steps and self.place.zoom is not None:
+            across, down = steps[name]
+            self.move_by(across * KEY_MOVE, down * KEY_MOVE)
+        elif name in self.keys:
+            self.key_pressed.emit(name)
+        else:
+            super().keyPressEvent(event)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() in {Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton}:
+            self._dragged = event.position()
+            if self.place.zoom is not None:
+                self.setCursor(Qt.CursorShape.ClosedHandCursor)
+            self.setFocus(Qt.FocusReason.MouseFocusReason)
+        else:
+            super().mousePressEvent(event)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self._dragged = None
+        self.unsetCursor()
+        super().mouseReleaseEvent(event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            if self.place.zoom is None:
+                self.show_exact(event.position())
+            else:
+                self.show_whole()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._dragged is not None:
+            step = event.position() - self._dragged
+            self._dragged = event.position()
+            self.move_by(step.x(), step.y())
+        self.mouse = event.position()
+        self.update()
+
+    def leaveEvent(self, _event: object) -> None:
+        self.mouse = None
+        self.update()
+
+
+def _is_key(event: QEvent) -> TypeGuard[QKeyEvent]:
+    return isinstance(event, QKeyEvent) and event.type() == QEvent.Type.ShortcutOverride
+
+
+def key_name(event: QKeyEvent) -> str:
+    """A key with what is held, as a shortcut is written: Ctrl+C, R, +."""
+    held = event.modifiers()
+    text = event.text()
+    if text and text in "+-":  # on some keyboards they need Shift, or are on the number pad
+        name = text
+    else:
+        name = event.keyCombination().key().name.removeprefix("Key_")
+        name = ("Shift+" if held & Qt.KeyboardModifier.ShiftModifier else "") + name
+    names = {"Plus": "+", "Minus": "-", "Equal": "+"}
+    name = names.get(name.removeprefix("Shift+"), name)
+    return f"Ctrl+{name}" if held & Qt.KeyboardModifier.ControlModifier else name

@@ -1,0 +1,1 @@
+"""A virtual robot in its room, painted from its state."""

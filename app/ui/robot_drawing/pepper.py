@@ -1,0 +1,208 @@
+"""The virtual robot's figure, seen from the direction in which it stands, by `QPainter`.
+
+Everything sits on the body by its azimuth: what the robot has at its left is at ``sin(azimuth + heading)`` of
+the radius, narrower by the cosine, and hidden behind. So it turns smoothly and needs no view by view drawing.
+Units are those of the stage; (0, 0) is the middle of its foot, y grows downwards, it is 187 high.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPath, QPen, QPolygonF
+
+from app.ui.robot_drawing.pepper_face import HEAD_RX, HEAD_RY, paint_face
+from app.ui.robot_drawing.state import RobotState
+
+HEAD = QPointF(0.0, -152.2)
+SHOULDER_X, SHOULDER_Y = 26.2, -102.5
+ARM, ARM_WIDTH, HAND = 46.5, 14.4, 7.7
+REST_DEG, UP_DEG = 20.0, 160.0  # the limits stay beside the body and the head
+ARM_PLANE = math.radians(25.0)
+
+WHITE, LIMB, LIMB_EDGE, HAND_WHITE = "#FFFFFF", "#E2E7F0", "#CFD6E3", "#F3F5FA"
+JOINT, NECK, BAND = "#D3DAE7", "#C5CAD7", "#C8CCD8"
+
+
+@dataclass(frozen=True, slots=True)
+class Limb:
+    """One arm as it is seen: shoulder and hand, and how far its shoulder is in front (-1 to 1)."""
+
+    side: str
+    shoulder: QPointF
+    hand: QPointF
+    front: float
+
+
+def limbs(state: RobotState) -> tuple[Limb, Limb]:
+    """Left and right arm."""
+    heading = math.radians(state.theta_deg)
+    return (
+        _limb("left", 1, state.arm_left_deg, heading),
+        _limb("right", -1, state.arm_right_deg, heading),
+    )
+
+
+def _limb(side: str, sign: int, raised_deg: float, heading: float) -> Limb:
+    out = sign * math.pi / 2 + heading
+    raised = math.radians(REST_DEG + max(-20.0, min(180.0, raised_deg)) * (UP_DEG - REST_DEG) / 180.0)
+    shoulder = QPointF(SHOULDER_X * math.sin(out), SHOULDER_Y)
+    reach = math.cos(ARM_PLANE) * math.sin(out) + math.sin(ARM_PLANE) * math.sin(heading)
+    hand = shoulder + QPointF(ARM * math.sin(raised) * reach, ARM * math.cos(raised))
+    return Limb(side, shoulder, hand, math.cos(out))
+
+
+def paint_figure(p: QPainter, state: RobotState) -> None:
+    """Draw the robot; the painter's origin is the middle of its foot."""
+    heading = math.radians(state.theta_deg)
+    arms = limbs(state)
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor(50, 42, 40, 118))
+    p.drawEllipse(QPointF(0, 0), 52, 10.8)
+    for arm in arms:
+        if arm.front < -0.08:
+            _arm(p, arm, state)
+    _base(p)
+    _torso(p, heading)
+    if math.cos(heading) > 0.08:
+        _tablet(p, heading)
+    elif math.cos(heading) < -0.08:
+        _back(p, heading)
+    p.fillRect(QRectF(-6, -122, 12, 10), QColor(NECK))
+    _head(p, state, heading + math.radians(state.head_yaw_deg))
+    for arm in arms:
+        if arm.front >= -0.08:
+            _arm(p, arm, state)
+
+
+def _shade(half: float) -> QBrush:
+    across = QLinearGradient(-half, 0, half, 0)
+    across.setColorAt(0.0, QColor("#E9EDF4"))
+    across.setColorAt(0.34, QColor(WHITE))
+    across.setColorAt(0.55, QColor("#F4F6FA"))
+    across.setColorAt(1.0, QColor("#D3DAE7"))
+    return QBrush(across)
+
+
+def _base(p: QPainter) -> None:
+    skirt = QPainterPath(QPointF(-18.5, -64))
+    skirt.cubicTo(QPointF(-22, -46), QPointF(-31, -36), QPointF(-30.8, -13))
+    skirt.lineTo(-29, -1.5)
+    skirt.quadTo(QPointF(0, 6.2), QPointF(29, -1.5))
+    skirt.lineTo(30.8, -13)
+    skirt.cubicTo(QPointF(31, -36), QPointF(22, -46), QPointF(18.5, -64))
+    p.fillPath(skirt, _shade(31))
+    band = QPainterPath(QPointF(-28.4, -18))
+    band.quadTo(QPointF(0, -9.6), QPointF(30.2, -18))
+    band.lineTo(31.5, 8)
+    band.lineTo(-31.5, 8)
+    p.save()
+    p.setClipPath(skirt, Qt.ClipOperation.IntersectClip)
+    p.fillPath(band, QColor(BAND))
+    p.restore()
+
+
+def _torso(p: QPainter, heading: float) -> None:
+    half = math.hypot(27.5 * math.cos(heading), 23.0 * math.sin(heading))
+    body = QPainterPath(QPointF(0, -115.6))
+    body.cubicTo(QPointF(half * 0.55, -115.6), QPointF(half, -106), QPointF(half, -86))
+    body.cubicTo(QPointF(half, -78), QPointF(half * 0.98, -72), QPointF(half * 0.94, -65.2))
+    body.cubicTo(QPointF(half * 0.6, -60.5), QPointF(-half * 0.6, -60.5), QPointF(-half * 0.94, -65.2))
+    body.cubicTo(QPointF(-half * 0.98, -72), QPointF(-half, -78), QPointF(-half, -86))
+    body.cubicTo(QPointF(-half, -106), QPointF(-half * 0.55, -115.6), QPointF(0, -115.6))
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor(120, 130, 155, 40))
+    p.drawEllipse(QPointF(0, -61.8), half * 0.72, 3.0)
+    p.fillPath(body, _shade(half))
+
+
+def _tablet(p: QPainter, heading: float) -> None:
+    wide = math.cos(heading)
+    p.save()
+    p.translate(21.5 * math.sin(heading), -88.1)
+    p.scale(wide, 1.0)
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor("#1B1E2A"))
+    p.drawRoundedRect(QRectF(-17.5, -12.5, 35, 25), 2.6, 2.6)
+    p.setBrush(QColor("#2F4FD0"))
+    p.drawRoundedRect(QRectF(-15.4, -10.4, 30.8, 20.8), 1.2, 1.2)
+    letter = QPen(QColor(WHITE), 2.1, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
+    letter.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    p.setPen(letter)
+    points = ((-7, 3.8), (-7, -3.8), (7, 3.8), (7, -3.8))
+    p.drawPolyline(QPolygonF([QPointF(x, y) for x, y in points]))
+    p.restore()
+
+
+def _back(p: QPainter, heading: float) -> None:
+    p.save()
+    p.translate(-20.0 * math.sin(heading), 0)
+    p.scale(-math.cos(heading), 1.0)
+    p.setPen(QPen(QColor("#C3CAD8"), 0.9))
+    p.setBrush(QColor(233, 237, 244, 160))
+    p.drawRoundedRect(QRectF(-13, -104, 26, 32), 7, 7)
+    p.setPen(QPen(QColor("#B3BBCB"), 1.4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+    for line in range(4):
+        p.drawLine(QLineF(-6, -96 + 4.2 * line, 6, -96 + 4.2 * line))
+    p.restore()
+
+
+def _arm(p: QPainter, arm: Limb, state: RobotState) -> None:
+    edge = QPen(QColor(LIMB_EDGE), ARM_WIDTH + 0.9, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
+    p.setPen(edge)
+    p.drawLine(QLineF(arm.shoulder, arm.hand))
+    p.setPen(QPen(QColor(LIMB), ARM_WIDTH, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+    p.drawLine(QLineF(arm.shoulder, arm.hand))
+    p.setPen(QPen(QColor(LIMB_EDGE), 0.7))
+    p.setBrush(QColor(HAND_WHITE))
+    p.drawEllipse(arm.hand, HAND, HAND)
+    p.setPen(Qt.PenStyle.NoPen)
+    if arm.front > -0.5:
+        p.setBrush(QColor(JOINT))
+        p.drawEllipse(arm.shoulder, 8.4, 8.4)
+        # From the front the light sits where the shoulder looks at the person, so it never hides.
+        p.setBrush(QColor(state.shoulders))
+        p.drawEllipse(arm.shoulder, 4.0, 4.0)
+    if f"{arm.side}_hand" in state.touched:
+        _halo(p, arm.hand, HAND + 3)
+
+
+def _halo(p: QPainter, centre: QPointF, radius: float) -> None:
+    p.setPen(QPen(QColor("#FFB300"), 2.2))
+    p.setBrush(Qt.BrushStyle.NoBrush)
+    p.drawEllipse(centre, radius, radius)
+    p.setPen(Qt.PenStyle.NoPen)
+
+
+def _head(p: QPainter, state: RobotState, heading: float) -> None:
+    p.save()
+    p.translate(HEAD)
+    ears = [(sign, sign * math.pi / 2 + heading) for sign in (-1, 1)]
+    for _, azimuth in ears:
+        if math.cos(azimuth) <= 0.1:
+            _ear(p, azimuth)
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(_shade(HEAD_RX))
+    p.drawEllipse(QPointF(0, 0), HEAD_RX, HEAD_RY)
+    nod = HEAD_RY * 0.6 * math.sin(math.radians(max(-45.0, min(45.0, state.head_pitch_deg))))
+    p.save()
+    round_head = QPainterPath()
+    round_head.addEllipse(QPointF(0, 0), HEAD_RX, HEAD_RY)
+    p.setClipPath(round_head, Qt.ClipOperation.IntersectClip)
+    paint_face(p, state, heading, nod)
+    p.restore()
+    for _, azimuth in ears:
+        if math.cos(azimuth) > 0.1:
+            _ear(p, azimuth)
+    if "head" in state.touched:
+        _halo(p, QPointF(0, 0), HEAD_RY + 4)
+    p.restore()
+
+
+def _ear(p: QPainter, azimuth: float) -> None:
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor("#D5DAE6"))
+    centre = QPointF((HEAD_RX + 0.8) * math.sin(azimuth), 2.2)
+    p.drawEllipse(centre, 5.0 + 5.0 * abs(math.cos(azimuth)), 10.0)

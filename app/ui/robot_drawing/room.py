@@ -1,0 +1,150 @@
+"""The virtual robot's room: the stage that turns metres into pixels, the wall, the floor, what stands there.
+
+The colours are those of an illustration and belong to the drawing, not to the theme; a dark theme dims it.
+All lengths are in units of a stage of 382 x 286, the panel of the design at 1440 x 900.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPen, QPolygonF
+
+from app.ui.robot_drawing.state import Room
+
+WIDTH, HEIGHT = 382.0, 286.0
+HORIZON, WALL_FOOT, FLOOR_TOP = 91.0, 157.0, 162.8
+BACK, FRONT = 178.0, 280.0  # where things stand at the far wall and nearest to the person
+START = 250.6 - HORIZON  # where the robot of the design stands: scale 1
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place on the floor in stage units, and how large things are there."""
+
+    u: float
+    v: float
+    scale: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """How a room fills a rectangle: uniform scale, centred; wall and floor go on to the edges."""
+
+    area: QRectF
+    room: Room
+
+    @property
+    def scale(self) -> float:
+        """Pixels per stage unit."""
+        return max(0.05, min(self.area.width() / WIDTH, self.area.height() / HEIGHT))
+
+    @property
+    def origin(self) -> QPointF:
+        """The stage's upper left corner in pixels."""
+        return QPointF(
+            self.area.center().x() - WIDTH / 2 * self.scale, self.area.center().y() - HEIGHT / 2 * self.scale
+        )
+
+    def bounds(self) -> QRectF:
+        """The whole area in stage units; it may begin above and left of 0."""
+        s, o = self.scale, self.origin
+        a = self.area
+        return QRectF((a.x() - o.x()) / s, (a.y() - o.y()) / s, a.width() / s, a.height() / s)
+
+    def unit(self, point: QPointF) -> QPointF:
+        """A pixel in stage units."""
+        return (point - self.origin) / self.scale
+
+    def spot(self, x: float, y: float) -> Spot:
+        """Where the floor point (m) is seen; points outside the room are drawn at its edge.
+
+        No camera sees like this: what is far is drawn nearer than it would be, so the robot stays large.
+        """
+        room = self.room
+        depth = _clamp((x - room.x_min) / (room.x_max - room.x_min), 0.0, 1.0)
+        v = BACK + (FRONT - BACK) * depth**0.5
+        scale = (v - HORIZON) / START
+        side = 2 * _clamp((y - room.y_min) / (room.y_max - room.y_min), 0.0, 1.0) - 1
+        return Spot(WIDTH / 2 + side * _reach(scale), v, scale)
+
+    def floor(self, point: QPointF) -> tuple[float, float]:
+        """The floor point (m) seen at a pixel; always inside the room."""
+        unit = self.unit(point)
+        room = self.room
+        share = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
+        scale = (BACK + (FRONT - BACK) * share - HORIZON) / START
+        side = _clamp((unit.x() - WIDTH / 2) / _reach(scale), -1.0, 1.0)
+        return (
+            room.x_min + share**2 * (room.x_max - room.x_min),
+            room.y_min + (side + 1) / 2 * (room.y_max - room.y_min),
+        )
+
+
+def _reach(scale: float) -> float:
+    """How far from the middle the side walls are, in units, where things have this scale."""
+    return 70.0 + 96.0 * scale
+
+
+def _clamp(value: float, low: float, high: float) -> float:
+    return min(high, max(low, value))
+
+
+def paint_room(p: QPainter, bounds: QRectF) -> None:
+    """Wall, window, floor; ``p`` is in stage units and ``bounds`` is all that is to be filled."""
+    wall = QLinearGradient(0, bounds.top(), 0, WALL_FOOT)
+    wall.setColorAt(0, QColor("#E8E4DA"))
+    wall.setColorAt(1, QColor("#DCD4C8"))
+    p.fillRect(QRectF(bounds.left(), bounds.top(), bounds.width(), WALL_FOOT - bounds.top()), wall)
+    p.fillRect(QRectF(bounds.left(), WALL_FOOT, bounds.width(), FLOOR_TOP - WALL_FOOT), QColor("#F1ECE1"))
+    floor = QLinearGradient(0, FLOOR_TOP, 0, HEIGHT)
+    floor.setColorAt(0, QColor("#B89A76"))
+    floor.setColorAt(1, QColor("#CBB08D"))
+    p.fillRect(QRectF(bounds.left(), FLOOR_TOP, bounds.width(), bounds.bottom() - FLOOR_TOP), floor)
+    _planks(p, bounds)
+    _window(p)
+    _picture(p)
+
+
+def _planks(p: QPainter, bounds: QRectF) -> None:
+    p.save()
+    p.setClipRect(QRectF(bounds.left(), FLOOR_TOP, bounds.width(), bounds.bottom() - FLOOR_TOP))
+    p.setPen(QPen(QColor(140, 108, 74, 90), 1.0))
+    reach = (bounds.bottom() - HORIZON) / (HEIGHT - HORIZON)
+    count = int(bounds.width() / 25.0) + 2
+    for plank in range(-count, count + 1):
+        along = plank * 70.6 * reach
+        p.drawLine(QLineF(WIDTH / 2, HORIZON, WIDTH / 2 + along, bounds.bottom()))
+    p.restore()
+
+
+def _window(p: QPainter) -> None:
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor("#F6F3EB"))
+    p.drawRoundedRect(QRectF(27, 29, 88, 75), 2, 2)
+    pane = QRectF(31.8, 34, 78.4, 65)
+    sky = QLinearGradient(0, pane.top(), 0, pane.bottom())
+    sky.setColorAt(0, QColor("#A9CDEE"))
+    sky.setColorAt(1, QColor("#D9E8F6"))
+    p.fillRect(pane, sky)
+    p.save()
+    p.setClipRect(pane)
+    hills = QPainterPath(QPointF(31.8, 88))
+    hills.cubicTo(QPointF(42, 76), QPointF(55, 78), QPointF(64, 84.5))
+    hills.cubicTo(QPointF(74, 73), QPointF(92, 75), QPointF(110.4, 87))
+    hills.lineTo(110.4, 100)
+    hills.lineTo(31.8, 100)
+    p.fillPath(hills, QColor("#8FB38F"))
+    p.restore()
+    p.fillRect(QRectF(69.2, 33, 3.6, 67), QColor("#F6F3EB"))
+    p.fillRect(QRectF(31, 64.8, 80, 3.4), QColor("#F6F3EB"))
+
+
+def _picture(p: QPainter) -> None:
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor("#3B3F4A"))
+    p.drawRoundedRect(QRectF(283, 38.5, 62.5, 48), 1.5, 1.5)
+    p.setBrush(QColor("#E2A94F"))
+    points = ((287, 83), (303, 61.5), (315, 72), (324.5, 60.5), (341.5, 83))
+    p.drawPolygon(QPolygonF([QPointF(x, y) for x, y in points]))

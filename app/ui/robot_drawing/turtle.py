@@ -1,0 +1,154 @@
+"""The small robot on two wheels, seen a little from above from the direction in which it stands.
+
+Everything sits on its round body by its azimuth, as on the large figure (`app.ui.robot_drawing.pepper`): 0
+is towards the person, its left at +90°. Units are those of the stage; (0, 0) is its middle on the floor.
+"""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPath, QPen, QRadialGradient
+
+from app.ui.robot_drawing.state import RobotState
+
+RADIUS, FLAT = 37.0, 0.36  # of the body, and how flat a circle on the floor is seen
+LOW, HIGH = -9.0, -31.0  # its lower and upper deck
+MAST = -52.0  # the top of the camera's mast
+WHEEL = 14.0
+TOP = QPointF(0.0, -36.0)
+
+SHELL, SHELL_DARK, DECK, RUBBER, METAL = "#4E8C7A", "#376B5C", "#6FB3A0", "#2B2D33", "#C8CCD8"
+
+
+def paint_turtle(p: QPainter, state: RobotState) -> None:
+    """Draw the robot; the painter's origin is its middle on the floor."""
+    heading = math.radians(state.theta_deg)
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor(50, 42, 40, 110))
+    p.drawEllipse(QPointF(0, 0), RADIUS * 1.1, RADIUS * FLAT * 1.1)
+    wheels = [(sign, heading + sign * math.pi / 2) for sign in (-1, 1)]
+    for _, azimuth in wheels:
+        if math.cos(azimuth) < 0:
+            _wheel(p, azimuth)
+    _body(p, state)
+    for _, azimuth in wheels:
+        if math.cos(azimuth) >= 0:
+            _wheel(p, azimuth)
+    _bumper(p, heading, state.bumped)
+    _deck(p, heading, state.eyes)
+    _mast(p, heading)
+
+
+def on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
+    """The point at this azimuth (radians, 0 towards the person), at a share of the radius, so high."""
+    return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
+
+
+def _wheel(p: QPainter, azimuth: float) -> None:
+    """A wheel stands at the side, its face looks along its azimuth."""
+    wide = max(2.6, WHEEL * abs(math.cos(azimuth)))
+    middle = on_body(azimuth, 0.98, -WHEEL + 1.5)
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor(RUBBER))
+    thick = 5.0 * abs(math.sin(azimuth)) + 1.0
+    box = QRectF(middle.x() - wide - thick / 2, middle.y() - WHEEL, 2 * wide + thick, 2 * WHEEL)
+    p.drawRoundedRect(box, min(box.width() / 2, WHEEL), WHEEL)
+    if math.cos(azimuth) > 0.15:
+        p.setBrush(QColor(METAL))
+        p.drawEllipse(middle, wide * 0.5, WHEEL * 0.5)
+
+
+def _body(p: QPainter, state: RobotState) -> None:
+    """The shell: a low drum, lighter at the left."""
+    flat = RADIUS * FLAT
+    drum = QPainterPath(QPointF(-RADIUS, HIGH))
+    drum.lineTo(-RADIUS, LOW)
+    drum.arcTo(QRectF(-RADIUS, LOW - flat, 2 * RADIUS, 2 * flat), 180, 180)
+    drum.lineTo(RADIUS, HIGH)
+    drum.closeSubpath()
+    across = QLinearGradient(-RADIUS, 0, RADIUS, 0)
+    across.setColorAt(0.0, QColor(SHELL_DARK))
+    across.setColorAt(0.32, QColor(SHELL))
+    across.setColorAt(1.0, QColor(SHELL_DARK).darker(115))
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QBrush(across))
+    p.drawPath(drum)
+    ring = QColor(state.eyes)
+    ring.setAlpha(235)
+    p.setBrush(Qt.BrushStyle.NoBrush)
+    p.setPen(QPen(ring, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+    p.drawArc(QRectF(-RADIUS, LOW - 4 - flat, 2 * RADIUS, 2 * flat), 180 * 16, 180 * 16)
+
+
+def _bumper(p: QPainter, heading: float, bumped: str) -> None:
+    """A bow around the front, as far as it is seen; the side that touches something is amber."""
+    sides = {"left": (18.0, 70.0), "front": (-18.0, 18.0), "right": (-70.0, -18.0)}
+    for side, (first, last) in sides.items():
+        shape = QPainterPath()
+        drawn = False
+        for step in range(9):
+            azimuth = heading + math.radians(first + (last - first) * step / 8)
+            if math.cos(azimuth) < -0.05:
+                drawn = False
+                continue
+            point = on_body(azimuth, 1.05, LOW + 2)
+            if drawn:
+                shape.lineTo(point)
+            else:
+                shape.moveTo(point)
+            drawn = True
+        hit = bumped in {side, "front"} if side != "front" else bumped == "front"
+        p.setBrush(Qt.BrushStyle.NoBrush)
+        colour = QColor("#FFB300") if hit else QColor(RUBBER)
+        p.setPen(QPen(colour, 4.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        p.drawPath(shape)
+
+
+def _deck(p: QPainter, heading: float, light: str) -> None:
+    """The upper deck with an arrow to its front and the light in the middle."""
+    flat = RADIUS * FLAT
+    p.setPen(QPen(QColor(SHELL_DARK), 1.0))
+    p.setBrush(QColor(DECK))
+    p.drawEllipse(QPointF(0, HIGH), RADIUS, flat)
+    p.setPen(Qt.PenStyle.NoPen)
+    p.setBrush(QColor(255, 255, 255, 46))
+    p.drawEllipse(QPointF(-6, HIGH - 2), RADIUS * 0.72, flat * 0.66)
+    arrow = QPainterPath(on_body(heading, 0.9, HIGH))
+    arrow.lineTo(on_body(heading + 0.42, 0.62, HIGH))
+    arrow.lineTo(on_body(heading - 0.42, 0.62, HIGH))
+    arrow.closeSubpath()
+    p.setBrush(QColor(255, 255, 255, 215))
+    p.drawPath(arrow)
+    glow = QRadialGradient(QPointF(0, HIGH), 13)
+    shine = QColor(light)
+    glow.setColorAt(0.0, shine)
+    shine.setAlpha(0)
+    glow.setColorAt(1.0, shine)
+    p.setBrush(QBrush(glow))
+    p.drawEllipse(on_body(heading + math.pi, 0.45, HIGH), 13, 13 * FLAT + 2)
+    p.setBrush(QColor(light))
+    p.drawEllipse(on_body(heading + math.pi, 0.45, HIGH), 5.0, 3.2)
+
+
+def _mast(p: QPainter, heading: float) -> None:
+    """A short mast with the camera; its lens is seen when it looks this way."""
+    foot, top = QPointF(0, HIGH - 1), QPointF(0, MAST + 6)
+    p.setPen(QPen(QColor(METAL), 5.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+    p.drawLine(foot, top)
+    half = 10.5 - 2.5 * abs(math.sin(heading))
+    p.setPen(QPen(QColor("#9AA2B4"), 0.8))
+    p.setBrush(QColor("#E9EDF4"))
+    p.drawRoundedRect(QRectF(-half, MAST - 7, 2 * half, 14), 4.5, 4.5)
+    towards = math.cos(heading)
+    if towards > -0.2:
+        eye = QPointF(half * 0.85 * math.sin(heading), MAST)
+        wide = max(1.4, 5.0 * max(0.0, towards))
+        p.setPen(Qt.PenStyle.NoPen)
+        p.setBrush(QColor("#1B1E2A"))
+        p.drawEllipse(eye, wide, 5.0)
+        p.setBrush(QColor("#5FA8E8"))
+        p.drawEllipse(eye, wide * 0.5, 2.5)
+        p.setBrush(QColor(255, 255, 255, 220))
+        p.drawEllipse(eye + QPointF(-wide * 0.25, -1.6), wide * 0.22, 1.1)

@@ -1,0 +1,199 @@
+"""Which keys do what: those of the table of commands as a person changed them, and those that stay.
+
+Kept in the settings under "shortcuts": only what differs from the table. F12 is Stop and stays so; Stop has a
+second key, Ctrl+. at first (Cmd+. on Macs, where F12 is a key for sound).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QKeyCombination, QObject, Qt, Signal
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import QApplication
+
+from app.core.storage.settings import Settings
+from app.errors import SettingsError
+from app.ui.shell.actions.table import TABLE, Row
+from app.ui.text import plain
+from app.ui.text.numbers import spoken_key
+
+STOP, STOP_KEY = "run.stop", "F12"
+NEEDS_WITH = "A key alone is for typing. Hold Ctrl or Alt with it, or use a function key."
+ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
+HOLDS = (
+    Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """A key that can't be changed: where it works, what it does, the key as it is spelled on keys."""
+
+    place: str
+    words: str
+    key: str
+
+
+FIXED: tuple[Fixed, ...] = (
+    Fixed("Everywhere", "Close the palette or a sheet, leave a field", "Esc"),
+    Fixed("Everywhere", "Next control in the panel", "Tab"),
+    Fixed("Everywhere", "Control before it", "Shift+Tab"),
+    Fixed("Everywhere", "Press the button that has the ring", "Space"),
+    Fixed("Tables and trees", "Go to the filter", "/"),
+    Fixed("Tables and trees", "Row above or below", "Up, Down"),
+    Fixed("Tables and trees", "Open the row", "Enter"),
+    Fixed("Tables and trees", "Open or close what is inside", "Right, Left"),
+    Fixed("Inspector", "Find a key or value", "Ctrl+F"),
+    Fixed("Inspector", "Copy the value", "Ctrl+C"),
+    Fixed("Inspector", "Copy the path", "Ctrl+Shift+C"),
+    Fixed("Sliders", "One step", "Left, Right"),
+    Fixed("Sliders", "Ten steps", "PgUp, PgDown"),
+    Fixed("Sliders", "Lowest and highest", "Home, End"),
+    Fixed("Block editor", "Copy, cut, paste blocks", "Ctrl+C, Ctrl+X, Ctrl+V"),
+    Fixed("Block editor", "Delete the block", "Delete"),
+    Fixed("Block editor", "Move through blocks and gaps", "Up, Down, Left, Right"),
+    Fixed("Block editor", "Open the field or the menu of the block", "Enter"),
+    Fixed("Palette", "Choose", "Up, Down"),
+    Fixed("Palette", "Do it", "Enter"),
+    Fixed("Palette", "Change the shortcut", "Ctrl+Enter"),
+)
+
+
+def normal(key: str) -> str:
+    """A key in the one spelling that is compared and kept; "" when it is none."""
+    return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
+
+
+def key_of(pressed: QKeyCombination) -> str:
+    """The key of a key press."""
+    return QKeySequence(pressed).toString(QKeySequence.SequenceFormat.PortableText)
+
+
+class Shortcuts(QObject):
+    """The keys of all commands; `changed` when any of them did."""
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        settings: Settings,
+        complain: Callable[[str], object],
+        rows: Sequence[Row] = TABLE,
+        *,
+        platform: str = sys.platform,
+    ) -> None:
+        """``complain`` is told, in a sentence, what can't be kept; ``platform`` as `sys.platform` says it."""
+        super().__init__()
+        self._settings, self._complain, self._platform = settings, complain, platform
+        self.rows: Mapping[str, Row] = {row.name: row for row in rows}
+        self._own = self._read()
+
+    def _read(self) -> dict[str, tuple[str, ...]]:
+        """What a person changed, as far as it makes sense."""
+        kept: dict[str, object] = self._settings.get("shortcuts", {})
+        found: dict[str, tuple[str, ...]] = {}
+        for name, keys in kept.items():
+            if name in self.rows and isinstance(keys, list):
+                good = tuple(normal(key) for key in keys if isinstance(key, str) and normal(key))
+                found[name] = good
+        return found
+
+    # -- asking -----------------------------------------------------------------------------------
+
+    def default(self, name: str) -> tuple[str, ...]:
+        """The keys that the table gives a command."""
+        row = self.rows.get(name)
+        return tuple(normal(key) for key in row.keys_at_first(self._platform)) if row is not None else ()
+
+    def of(self, name: str) -> tuple[str, ...]:
+        """The keys of a command now, the first of them in menus and tooltips."""
+        keys = self._own.get(name, self.default(name))
+        if name == STOP:
+            given = {key for other, own in self._own.items() if other != STOP for key in own}
+            return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in given))
+        return tuple(key for key in keys if key != STOP_KEY)
+
+    def first(self, name: str) -> str:
+        """The first key of a command; "" when it has none."""
+        return next(iter(self.of(name)), "")
+
+    def own(self, name: str) -> bool:
+        """Whether a person changed the keys of a command."""
+        return self.of(name) != self.default(name)
+
+    def holder(self, key: str) -> str:
+        """The command that has a key; "" when none has."""
+        return next((name for name in self.rows if normal(key) in self.of(name)), "")
+
+    def refusal(self, name: str, pressed: QKeyCombination) -> str:
+        """Why a key can't be a command's, in a sentence; "" when it can."""
+        key = key_of(pressed)
+        if key == STOP_KEY:
+            return "" if name == STOP else "F12 is Stop in every program state, and stays so."
+        held = pressed.keyboardModifiers() & HOLDS
+        if not held and pressed.key() not in ALONE:
+            return NEEDS_WITH
+        for fixed in FIXED:
+            own = key in self.default(name)  # Ctrl+F finds in the Inspector there, else in the blocks
+            if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:
+                return f"{spoken_key(key)} stays “{fixed.words}” ({fixed.place})."
+        return ""
+
+    # -- changing ---------------------------------------------------------------------------------
+
+    def give(self, name: str, key: str) -> None:
+        """Give a command this key, alone; Stop gets it beside F12. Another command loses it."""
+        key, holder = normal(key), self.holder(key)
+        if holder and holder != name:
+            self._own[holder] = tuple(each for each in self.of(holder) if each != key)
+        self._own[name] = (key,) if key else ()
+        self._keep()
+
+    def swap(self, name: str, key: str) -> None:
+        """Give a command this key, and the one that had it this command's first key."""
+        holder, before = self.holder(key), self.first(name)
+        self._own[name] = (normal(key),)
+        if holder and holder != name:
+            self._own[holder] = (before,) if before and before != STOP_KEY else ()
+        self._keep()
+
+    def reset(self, name: str) -> None:
+        """Give a command the key of the table; another command that had got it loses it.
+
+        It has its own of the table again, unless somebody else has that: no swap leaves one without a key.
+        """
+        self._own.pop(name, None)
+        for key in self.default(name):
+            for other in [each for each in self._own if each != name and key in self._own[each]]:
+                self._own[other] = tuple(each for each in self._own[other] if each != key)
+                if not self._own[other] and not any(map(self.holder, self.default(other))):
+                    del self._own[other]
+        self._keep()
+
+    def reset_all(self) -> None:
+        """Every command has the key of the table again."""
+        self._own = {}
+        self._keep()
+
+    def _keep(self) -> None:
+        for name in [name for name in self._own if not self.own(name)]:
+            del self._own[name]
+        try:
+            self._settings.set("shortcuts", {name: list(keys) for name, keys in self._own.items()})
+        except SettingsError as error:
+            self._complain(str(error))
+        self.changed.emit()
+
+    # -- where they are shown ---------------------------------------------------------------------
+
+    def tell(self) -> None:
+        """Put the keys of the moment into the tooltips of all buttons that have the property ``command``."""
+        for widget in QApplication.allWidgets():
+            command = widget.property("command")
+            if isinstance(command, str):
+                said = widget.property("tip") or widget.accessibleName()
+                key = ", ".join(spoken_key(each) for each in self.of(command))
+                widget.setToolTip(plain.tip(f"{said} ({key})" if key else str(said)))

@@ -1,0 +1,257 @@
+"""The alert under the run bar: one at a time, with its next step."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from html import escape
+from typing import Protocol
+
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QWidget
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.buttons import Button, IconButton
+from app.ui.widgets.labels import label
+
+FIGURES = re.compile(r"\d+")
+LEAST_HEIGHT = 52
+ICON = 20
+STEP_ICONS = {"help.doctor": "stethoscope", "robots.virtual": "bot", "file.open": "folder-open"}
+LEAST_WORDS = 360  # px at 100 % that a sentence has beside its buttons
+BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
+
+
+class AlertLike(Protocol):
+    """What the banner needs of an alert (`app.core.alerts.Alert`)."""
+
+    @property
+    def id(self) -> str:
+        """Its identity."""
+
+    @property
+    def severity(self) -> str:
+        """Its severity: "error", "warn" or "info"."""
+
+    @property
+    def title(self) -> str:
+        """What is wrong, one sentence."""
+
+    @property
+    def detail(self) -> str:
+        """What it means."""
+
+    @property
+    def button(self) -> str | None:
+        """The words of the next step."""
+
+    @property
+    def action(self) -> str | None:
+        """The next step's name in the table of actions."""
+
+
+class Banner(QWidget):
+    """Icon, a bold sentence, a plain one, one button with the next step, perhaps a second one, and close."""
+
+    pressed = Signal()
+    second_pressed = Signal()
+    more_pressed = Signal()
+    closed = Signal()
+    mouse_left = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._status = "error"
+        self.setMinimumHeight(LEAST_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._words = ("", "")
+        self._announced = ""
+        self.words = label("", "lead", wrap=True)
+        self.words.setTextFormat(Qt.TextFormat.RichText)
+        theme.changed.connect(self._write)
+        self.more = Button(theme, "", kind="ghost", size="small")
+        self.button = Button(theme, "", size="form")
+        self.second = Button(theme, "", size="form")
+        self.close_button = IconButton(theme, "x", "Close this message", size=32)
+        self._whole = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._whole.setContentsMargins(16 + ICON + 12, 8, 12, 8)
+        self._whole.setSpacing(8)
+        self._whole.addWidget(self.words, 1)
+        self._row = QHBoxLayout()
+        self._row.setSpacing(8)
+        for widget in (self.more, self.second, self.button, self.close_button):
+            self._row.addWidget(widget)
+        self._whole.addLayout(self._row)
+        self.button.clicked.connect(self.pressed)
+        self.second.clicked.connect(self.second_pressed)
+        self.more.clicked.connect(self.more_pressed)
+        self.close_button.clicked.connect(self.closed)
+
+    def show_words(
+        self,
+        status: str,
+        title: str,
+        detail: str,
+        button: str | None,
+        others: int = 0,
+        *,
+        second: str | None = None,
+        icon: str | None = None,
+    ) -> None:
+        """Say what is wrong; ``others`` counts the alerts that wait behind this one."""
+        self.button.icon_name = icon
+        self._status = status
+        self._words = (title, detail)
+        self._write()
+        spoken = f"{title} {detail}".strip()
+        self.setAccessibleName(spoken)
+        news = FIGURES.sub("", spoken)
+        if news != self._announced:  # a count that goes on is no news
+            self._announced = news
+            paint.announce(self, spoken)
+        for widget, text in ((self.button, button), (self.second, second)):
+            widget.set_word(text or "")
+            paint.show_when(widget, bool(text))
+        self.more.set_word(f"and {others} more" if others else "")
+        paint.show_when(self.more, others > 0)
+        self.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self.mouse_left.emit()
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.LayoutRequest:
+            self._fit()
+        return super().event(event)
+
+    def _fit(self) -> None:
+        """Large or long words: the buttons go below them."""
+        beside = self.width() - self._row.sizeHint().width() >= self._theme.scaled(LEAST_WORDS)
+        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        if self._whole.direction() != wanted:
+            self._whole.setDirection(wanted)
+            right = Qt.AlignmentFlag.AlignRight
+            self._whole.setAlignment(self._row, Qt.AlignmentFlag(0) if beside else right)
+
+    def _write(self) -> None:
+        title, detail = (escape(words) for words in self._words)
+        quiet = self._theme.hex("textSecondary")
+        self.words.setText(
+            f'<span style="font-weight:600">{title}</span> <span style="color:{quiet}">{detail}</span>'
+        )
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        status = theme.status(self._status)
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        edge = theme.colour(BORDERS.get(self._status, "borderStrong"))
+        paint.box(painter, rect, theme.radius("panel"), theme.colour(status.tint or "panel"), edge)
+        square = QRectF(16, rect.center().y() - ICON / 2, ICON, ICON)
+        paint_icon(painter, square, status.icon, theme.colour(status.colour))
+        painter.end()
+
+
+class BannerPlace(QWidget):
+    """Where the banner is: shows the worst alert that was not closed, and goes when it is cured."""
+
+    def __init__(self, theme: Theme, banner: Banner | None = None) -> None:
+        super().__init__()
+        self.banner = banner if banner is not None else Banner(theme)
+        self._alert: AlertLike | None = None
+        self._alerts: Sequence[AlertLike] = ()
+        self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
+        self.on_action: Callable[[str], object] = lambda _name: None
+        self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
+        self.on_more: Callable[[], object] = lambda: None
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 8, 8, 0)
+        row.addWidget(self.banner)
+        self.banner.pressed.connect(self._next_step)
+        self.banner.second_pressed.connect(lambda: self._answer(1))
+        self.banner.more_pressed.connect(self._more)
+        self.banner.closed.connect(self._close)
+        self.banner.mouse_left.connect(lambda: self.show_alerts(self._alerts))
+        self.hide()
+
+    @property
+    def identity(self) -> str:
+        """What is shown, whatever its words say now: an alert's id, "offer", or "" for nothing."""
+        if self._offer is not None:
+            return "offer"
+        return self._alert.id if self._alert is not None else ""
+
+    @property
+    def alert(self) -> AlertLike | None:
+        """The alert that is shown."""
+        return self._alert
+
+    def offer(
+        self,
+        title: str,
+        detail: str,
+        yes: tuple[str, Callable[[], object]],
+        no: tuple[str, Callable[[], object]],
+    ) -> None:
+        """Offer something once, with two answers; alerts wait until it is answered."""
+        self._offer = (yes[1], no[1])
+        self.banner.show_words("info", title, detail, yes[0], second=no[0])
+        self.show()
+
+    def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
+        """The alerts that are active and not closed, worst first."""
+        self._alerts = alerts
+        if self._offer is not None:
+            return
+        first = self._first(alerts)
+        self._alert = first
+        if first is None:
+            self.hide()
+            return
+        others = len(alerts) - 1
+        icon = STEP_ICONS.get(first.action or "")
+        self.banner.show_words(first.severity, first.title, first.detail, first.button, others, icon=icon)
+        self.show()
+
+    def _first(self, alerts: Sequence[AlertLike]) -> AlertLike | None:
+        """The worst; while the mouse is on the banner the one that is shown, whose button may be pressed."""
+        shown = self._alert
+        if shown is not None and self.banner.underMouse():
+            still = next((alert for alert in alerts if alert.id == shown.id), None)
+            if still is not None:
+                return still
+        return alerts[0] if alerts else None
+
+    def _answer(self, which: int) -> None:
+        if self._offer is not None:
+            answer = self._offer[which]
+            self._offer = None
+            answer()
+            self.show_alerts(self._alerts)
+
+    def _next_step(self) -> None:
+        if self._offer is not None:
+            self._answer(0)
+        elif self._alert is not None and self._alert.action is not None:
+            self.on_action(self._alert.action)
+
+    def _close(self) -> None:
+        if self._offer is not None:
+            self._offer = None
+            self.show_alerts(self._alerts)
+        elif self._alert is not None:
+            closed = self._alert.id
+            self.show_alerts([alert for alert in self._alerts if alert.id != closed])
+            self.on_dismiss(closed)
+
+    def _more(self) -> None:
+        self.on_more()

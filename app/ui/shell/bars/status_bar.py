@@ -1,0 +1,192 @@
+"""The status bar: facts with their numbers; what is not known is not there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+
+from app.core.network.remote_access import words_of
+from app.core.robots.health_facts import facts_of, has_told
+from app.core.robots.robot_link import STOPPING
+from app.core.session import Session
+from app.ui.text.numbers import age_words, grouped
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Line, StatusItem, paint
+
+Fact = tuple[str, str, str | None]  # icon, words, status
+NOTHING: Fact = ("", "", None)
+TICK_MS = 33
+
+
+def counted(number: int, one: str, many: str) -> str:
+    """Say "1 node" or "7 nodes"."""
+    return f"{number} {one if number == 1 else many}"
+
+
+def _worst(found: Iterable[str]) -> tuple[str, str]:
+    """Icon and status of the worst of what was found."""
+    return ("circle-x", "error") if "error" in found else ("triangle-alert", "warn")
+
+
+class Facts:
+    """Reads the session and says it in a few words."""
+
+    def __init__(self, session: Session, clock: Callable[[float], time.struct_time] = time.localtime) -> None:
+        self._session = session
+        self._clock = clock
+        self.window_ms = 0.0
+
+    def health(self) -> Fact:
+        """Say how many alerts there are, how much Health has to look at, or that Pepper is well.
+
+        A robot that has told nothing yet is only connected.
+        """
+        alerts = [alert for alert in self._session.alerts.active if alert.severity != "info"]
+        if alerts:
+            icon, status = _worst(alert.severity for alert in alerts)
+            return icon, counted(len(alerts), "alert", "alerts"), status
+        known = self._session.fleet.links
+        links = [
+            link for link in known if link.state != "away"
+        ] or known  # Health shows one that has gone, too
+        if not links:
+            return "circle-dashed", "No robot", "off"
+        topics, now = self._session.topics, time.monotonic()
+        found = [(link, facts_of(link, topics, now, age_words)) for link in links]
+        wrong = [fact.status for _, facts in found for fact in facts if fact.to_look_at]
+        if wrong:
+            icon, status = _worst(wrong)
+            whose = links[0].name if len(links) == 1 else f"{len(links)} robots"
+            return icon, f"{whose}: {len(wrong)} to look at", status
+        if any(link.state == STOPPING for link in links):
+            return "circle-dashed", "Waiting for the answer to Stop", "off"
+        who = f"{links[0].name} is" if len(links) == 1 else f"{len(links)} robots are"
+        if all(has_told(link, facts) for link, facts in found):
+            return "circle-check", f"{who} well", "ok"
+        return "circle-dashed", f"{who} connected", "off"
+
+    def saved(self) -> Fact:
+        """When the behaviour was saved, or that it is not saved yet."""
+        document = self._session.document
+        if document.dirty:
+            return "save", "Not saved, kept safe" if document.path is None else "Changes kept safe", None
+        if document.saved_at is None:
+            return NOTHING
+        then = self._clock(document.saved_at)
+        return "save", f"Saved {then.tm_hour}:{then.tm_min:02d}", None
+
+    def topics(self) -> Fact:
+        """How many topics are live."""
+        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        return "", f"{counted(live, 'topic', 'topics')} live", None
+
+    def reach(self) -> Fact:
+        """Who can reach this master."""
+        return words_of(self._session.reach)
+
+    def reach_quietly(self) -> Fact:
+        """The same; without an icon while it is as it always is."""
+        icon, words, status = self.reach()
+        return ("" if status is None else icon), words, status
+
+    def master(self) -> Fact:
+        """Whether a master is there, and where."""
+        master = self._session.master
+        if master.kind == "connected":
+            return "circle-check", f"Master {master.address}", "ok"
+        if master.kind == "searching":
+            return "circle-dashed", f"Looking for the master {master.address}", "off"
+        return "circle-dashed", "No master", "off"
+
+    def traffic(self) -> Fact:
+        """Nodes, topics and messages per second."""
+        graph = self._session.graph
+        if graph is None:
+            return NOTHING
+        live = sum(1 for topic in self._session.topics if topic.gone_s is None)
+        words = f"{counted(len(graph.nodes), 'node', 'nodes')}, {counted(live, 'topic', 'topics')}"
+        if self._session.traffic.messages_per_s is not None:
+            words += f", {grouped(round(self._session.traffic.messages_per_s))} messages/s"
+        return "", words, None
+
+    def lost(self) -> Fact:
+        """How many messages were lost lately; nothing when none were."""
+        lost = self._session.traffic.lost_30s
+        return ("triangle-alert", f"{grouped(lost)} lost in 30 s", "warn") if lost else NOTHING
+
+    def shown(self) -> Fact:
+        """How many messages of the topics that are looked at were shown; nothing when all were."""
+        traffic = self._session.traffic
+        if traffic.shown_30s >= traffic.sent_30s:
+            return NOTHING
+        return "", f"Shown {grouped(traffic.shown_30s)} of {grouped(traffic.sent_30s)} in 30 s", None
+
+    def window(self) -> Fact:
+        """How long the last refresh of the window took."""
+        return "", f"Window {round(self.window_ms)} ms of {TICK_MS} ms", None
+
+
+class StatusBar(QWidget):
+    """26 px: facts at the left and at the right, divided by lines. `opened` is told of a press on `link`."""
+
+    opened = Signal()
+    link = ""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setMinimumHeight(theme.size("statusBar"))
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Status")
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(16, 0, 16, 0)
+        self._row.setSpacing(0)
+        self._left: list[tuple[StatusItem, Line]] = []
+        self._right: list[tuple[StatusItem, Line]] = []
+        self._row.addStretch(1)
+
+    def _grow(self, items: list[tuple[StatusItem, Line]], count: int, *, right: bool) -> None:
+        while len(items) < count:
+            item, line = StatusItem(self._theme), Line(self._theme, upright=True)
+            holder = QWidget()
+            row = QHBoxLayout(holder)
+            row.setContentsMargins(0, 0, 0, 0)
+            row.setSpacing(10)
+            for widget in (line, item) if right else (item, line):
+                row.addWidget(widget)
+            place = self._row.count() if right else len(items)
+            self._row.insertWidget(place, holder)
+            items.append((item, line))
+
+    def show_facts(self, left: Sequence[Fact], right: Sequence[Fact]) -> None:
+        """Show these facts; those without words are left out."""
+        for facts, items, at_right in ((left, self._left, False), (right, self._right, True)):
+            shown = [fact for fact in facts if fact[1]]
+            self._grow(items, len(shown), right=at_right)
+            for index, (item, line) in enumerate(items):
+                fact = shown[index] if index < len(shown) else NOTHING
+                item.set(*fact)
+                holder = item.parentWidget()
+                if holder is not None:
+                    holder.setVisible(bool(fact[1]))
+                    holder.setContentsMargins(10 if (at_right or index) else 0, 0, 0, 0)
+                paint.show_when(line, bool(fact[1]) and (at_right or index < len(shown) - 1))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        under = self.childAt(event.position().toPoint())
+        if isinstance(under, StatusItem) and under.text == self.link:
+            self.opened.emit()
+
+    def words(self) -> list[str]:
+        """All facts shown now, from left to right."""
+        return [item.text for item, _ in (*self._left, *self._right) if item.text]
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.fillRect(self.rect(), self._theme.colour("window"))
+        painter.end()

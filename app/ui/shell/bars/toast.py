@@ -1,0 +1,119 @@
+"""What the person just did, said for six seconds at the bottom right; errors are never toasts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer
+from PySide6.QtGui import QEnterEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QGraphicsDropShadowEffect, QHBoxLayout, QWidget
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.buttons import Button
+from app.ui.widgets.labels import label
+
+MARGIN = 16
+ABOVE_STATUS_BAR = 42
+CHECK_AGAIN_MS = 1000
+
+
+class Toast(QWidget):
+    """One sentence and perhaps one button; it stays while the mouse or the focus is on it."""
+
+    def __init__(self, theme: Theme, window: QWidget) -> None:
+        super().__init__(window)
+        self._theme = theme
+        self._run: Callable[[], object] | None = None
+        self._words = label("", "bodyLarge", wrap=True)
+        self.button = Button(theme, "", kind="ghost", size="small")
+        self.button.clicked.connect(self._pressed)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(16, 10, 12, 10)
+        row.setSpacing(10)
+        row.addWidget(self._words)
+        row.addWidget(self.button)
+        shadow = QGraphicsDropShadowEffect(self)
+        shadow.setBlurRadius(24)
+        shadow.setOffset(0, 6)
+        shadow.setColor(theme.colour("shadow"))
+        self.setGraphicsEffect(shadow)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self._time_is_up)
+        window.installEventFilter(self)
+        self.hide()
+
+    @property
+    def text(self) -> str:
+        """The sentence shown last."""
+        return self._words.text()
+
+    def say(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
+        """Show a sentence; ``button`` undoes or follows what it says."""
+        self._words.setText(words)
+        self.setAccessibleName(words)
+        paint.announce(self, words)
+        self._run = run
+        self.button.set_word(button)
+        paint.show_when(self.button, bool(button and run))
+        self.show()
+        self.place()
+        self.raise_()
+        self._timer.start(self._theme.duration("toastShown"))
+
+    def place(self) -> None:
+        """Go to the bottom right of the window."""
+        window = self.parentWidget()
+        if window is not None:
+            self._fit(window.width() - 2 * MARGIN)
+            left = window.width() - self.width() - MARGIN
+            self.move(max(MARGIN, left), window.height() - self.height() - ABOVE_STATUS_BAR)
+
+    def _fit(self, room: int) -> None:
+        """One line where there is room for it, else as many as it takes."""
+        aside = self.sizeHint().width() - self._words.sizeHint().width()
+        line = paint.width_of(self._words.font(), self._words.text()) + 2
+        wide = min(room, round(line) + aside)
+        layout = self.layout()
+        high = layout.totalHeightForWidth(wide) if layout is not None else 0
+        self.resize(wide, max(high, layout.minimumSize().height() if layout is not None else 0))
+
+    def event(self, event: QEvent) -> bool:
+        done = super().event(event)
+        if event.type() == QEvent.Type.LayoutRequest and self.isVisible():
+            self.place()
+        return done
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self.place()
+        return super().eventFilter(watched, event)
+
+    def enterEvent(self, event: QEnterEvent) -> None:
+        self._timer.stop()
+        super().enterEvent(event)
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self._timer.start(self._theme.duration("toastShown"))
+        super().leaveEvent(event)
+
+    def _time_is_up(self) -> None:
+        if self.button.hasFocus() or self.underMouse():
+            self._timer.start(CHECK_AGAIN_MS)
+        else:
+            self.hide()
+
+    def _pressed(self) -> None:
+        run, self._run = self._run, None
+        self.hide()
+        if run is not None:
+            run()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        painter.setPen(Qt.PenStyle.NoPen)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, theme.radius("large"), theme.colour("raised"), theme.colour("borderStrong"))
+        painter.end()

@@ -1,0 +1,107 @@
+"""The left end of the tool bar: freeze what shows, which layout this is, and its panels."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QRectF, QSize
+from PySide6.QtGui import QColor, QPainter
+
+from app.ui.shell.actions.table import Actions
+from app.ui.shell.commands.freeze import all_frozen, freezable
+from app.ui.shell.commands.menus import MenuLists
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Line, name_command, paint
+
+FREEZE = "view.freeze"
+EVERY = 8  # half ticks
+CHEVRON = 14
+ROOM_PX = 780  # what the whole bar needs at 100 % text
+GAP = 6
+
+
+class MenuButton(Button):
+    """A button that opens a menu: a chevron after its word says so."""
+
+    def sizeHint(self) -> QSize:
+        return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + GAP, 0)
+
+    def paint_content(self, painter: QPainter, ink: QColor) -> None:
+        side = self._theme.scaled(CHEVRON)
+        whole = QRectF(self.rect())
+        square = QRectF(whole.right() - side - GAP, whole.center().y() - side / 2, side, side)
+        paint_icon(painter, square, "chevron-down", ink)
+        painter.save()
+        painter.setClipRect(whole.adjusted(0, 0, -side - GAP, 0))
+        painter.translate(-(side + GAP) / 2, 0)
+        super().paint_content(painter, ink)
+        painter.restore()
+
+
+class ToggleButton(Button):
+    """A button that stays on: in the colours of what is chosen."""
+
+    def __init__(self, theme: Theme, text: str, icon: str) -> None:
+        super().__init__(theme, text, icon, size="small")
+        self.setCheckable(True)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        colour = self._theme.colour
+        if self.isChecked() and self.isEnabled():
+            return colour("selected"), colour("accent"), colour("selectedText")
+        return super()._look()
+
+
+class DeveloperTools(QObject):
+    """Puts the tools into a window's tool bar and keeps them true while the bar can be seen."""
+
+    def __init__(self, window: MainWindow, lists: MenuLists, actions: Actions) -> None:
+        super().__init__(window)
+        self._window, self._actions = window, actions
+        self._ticks = 0
+        theme = window.theme
+        self.freeze = ToggleButton(theme, "Freeze", "snowflake")
+        name_command(self.freeze, FREEZE, "Holds the Inspector and the pictures as they are")
+        self.layout = MenuButton(theme, "Developer", "panel-left", size="small")
+        self.panels = MenuButton(theme, "Panels", size="small")
+        self.panels.setToolTip("Opens and closes panels")
+        self.freeze.clicked.connect(lambda: actions.run(FREEZE))
+        self.layout.clicked.connect(lambda: lists.drop_layouts(self.layout))
+        self.panels.clicked.connect(lambda: lists.drop_panels(self.panels))
+        self._wide_only = (Line(theme, upright=True, length=24), self.layout, self.panels)
+        tools = (self.freeze, *self._wide_only)
+        for place, tool in enumerate(tools):
+            window.tool_bar.add_tool(tool, place)
+        for button in (self.freeze, self.layout, self.panels):
+            button.let_shrink()
+        window.tool_bar.installEventFilter(self)
+        theme.changed.connect(self._fit)
+        window.timer.timeout.connect(self._tick)
+        window.pages.currentChanged.connect(lambda _page: self.refresh())
+
+    def refresh(self) -> None:
+        """Say what is so now."""
+        window, frozen = self._window, all_frozen(self._window.bench)
+        self._actions[FREEZE].setChecked(frozen)
+        self.freeze.setChecked(frozen)
+        self.freeze.setEnabled(bool(freezable(window.bench)))
+        own = window.arrangements.own("developer")
+        name = own or "Developer"
+        self.layout.set_word(name)
+        self.layout.setAccessibleName(f"Layout {name}")
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:
+            self._fit()
+        return False
+
+    def _fit(self) -> None:
+        """Large text in a narrow window: layouts and panels are in the View menu."""
+        room = self._window.tool_bar.width() >= self._window.theme.scaled(ROOM_PX)
+        for tool in self._wide_only:
+            paint.show_when(tool, room)
+
+    def _tick(self) -> None:
+        self._ticks += 1
+        if self._ticks % EVERY == 0 and self._window.tool_bar.isVisible():
+            self.refresh()

@@ -1,0 +1,121 @@
+"""Menus whose entries change: recent files, panels, layouts; and what is grey because it can't be done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtWidgets import QWidget
+
+from app.ui.shell.actions.table import Actions
+from app.ui.shell.commands.availability import why_not
+from app.ui.shell.main_window import MainWindow
+from app.ui.text import plain
+from app.ui.widgets.menus import Menu, drop_below
+
+ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.reset")
+
+
+class MenuLists:
+    """Fills them anew at each opening. ``built_in`` and ``own`` show a layout by its name."""
+
+    def __init__(
+        self,
+        window: MainWindow,
+        actions: Actions,
+        menus: Mapping[str, Menu],
+        open_file: Callable[[Path], object],
+    ) -> None:
+        """Put the three lists into the File and the View menu."""
+        self._window, self.actions, self._open_file = window, actions, open_file
+        self.built_in: Callable[[str], object] = lambda _name: None
+        self.own: Callable[[str], object] = lambda _name: None
+        self._recent = Menu(window.theme, window, "Recent")
+        menus["File"].insertMenu(actions["file.save"], self._recent)
+        self._panels = Menu(window.theme, window, "Panels")
+        self._layouts = Menu(window.theme, window, "Layouts")
+        menus["View"].insertMenu(actions["layout.keep"], self._panels)
+        menus["View"].insertMenu(actions["layout.keep"], self._layouts)
+        for name, menu in menus.items():
+            menu.aboutToShow.connect(lambda name=name: self._refresh(name))
+            menu.aboutToHide.connect(actions.enable_all)
+        self._arranging = Menu(window.theme, window, "Layouts")
+        self._arranging.aboutToHide.connect(actions.enable_all)
+
+    def drop_layouts(self, anchor: QWidget) -> None:
+        """Open below a button which layouts there are, and what can be done with this one."""
+        self.actions.disable(lambda name: why_not(self._window, name))
+        self._list_layouts(self._arranging)
+        self._arranging.addSeparator()
+        for name in ARRANGING:
+            self._arranging.addAction(self.actions[name])
+        drop_below(self._arranging, anchor)
+
+    def drop_panels(self, anchor: QWidget) -> None:
+        """Open below a button which panels there are."""
+        self._list_panels()
+        drop_below(self._panels, anchor)
+
+    def _refresh(self, menu: str) -> None:
+        self.actions.disable(lambda name: why_not(self._window, name))
+        if menu == "File":
+            self._list_recent()
+        elif menu == "View":
+            self._list_panels()
+            self._list_layouts(self._layouts)
+
+    def _list_recent(self) -> None:
+        self._recent.clear()
+        recent = self._window.session.settings.recent_known
+        self._recent.menuAction().setVisible(bool(recent))
+        for file in recent:
+            words = file.name if file.there else f"{file.name} (not there any more)"
+            entry = self._recent.addAction(plain.entry(words))
+            entry.setToolTip(plain.tip(str(file.path)))
+            entry.setEnabled(file.there)
+            entry.triggered.connect(lambda _on=False, path=file.path: self._open_file(path))
+        self._recent.addSeparator()
+        self._recent.addAction(self.actions["file.forget_recent"])
+
+    def _list_layouts(self, menu: Menu) -> None:
+        menu.clear()
+        window = self._window
+        arrangements, shown = window.arrangements, window.showing
+        for layout in window.layouts:
+            entry = menu.addAction(window.theme.icon(layout.icon), layout.title)
+            entry.setCheckable(True)
+            entry.setChecked(shown == layout.name and not arrangements.own(layout.name))
+            entry.triggered.connect(lambda _on=False, name=layout.name: self.built_in(name))
+        own = arrangements.all()
+        if own:
+            menu.addSeparator()
+        for each in own:
+            entry = menu.addAction(plain.entry(each.name))
+            entry.setCheckable(True)
+            entry.setChecked(shown == each.base and arrangements.own(each.base) == each.name)
+            entry.triggered.connect(lambda _on=False, name=each.name: self.own(name))
+
+    def _list_panels(self) -> None:
+        self._panels.clear()
+        window = self._window
+        self._panels.menuAction().setVisible(window.bench is not None)
+        if window.bench is None:
+            return
+        self.actions.choose(f"layout.{window.showing}")
+        opened = window.bench.open_names()
+        for panel in sorted(window.panels.values(), key=lambda panel: panel.title):
+            if panel.name == "behaviour" and window.showing != "behaviour":
+                continue
+            entry = self._panels.addAction(window.theme.icon(panel.icon), panel.title)
+            entry.setCheckable(True)
+            entry.setChecked(panel.name in opened)
+            entry.triggered.connect(lambda on=False, name=panel.name: self._toggle(name, on))
+
+    def _toggle(self, name: str, on: bool) -> None:
+        bench = self._window.bench
+        if bench is None:
+            return
+        if on:
+            bench.open(name)
+        else:
+            bench.docks[name].close()

@@ -1,0 +1,1 @@
+"""What opens over the window: palette, settings, shortcuts and questions; Stop stays free."""

@@ -1,0 +1,249 @@
+"""The command palette: Ctrl+K finds every command, panel, topic, robot, layout and recent file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import cast
+
+from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import label, paint
+from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
+from app.ui.widgets.lists.fuzzy import Entry, Finder, Found
+
+WIDE, TOP, FIELD, FOOT = 640, 128, 56, 36
+ROWS_SHOWN = 9.5
+MOST, MOST_EMPTY, LAST_SHOWN, LAST_KEPT = 40, 8, 5, 12
+NAME = "Find a command, panel, topic, robot or file"
+
+
+class _Field(QLineEdit):
+    """The field at the top, bare in the surface: its icon at the left, Esc at the right."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setPlaceholderText(NAME)
+        self.setAccessibleName(NAME)
+        self.setProperty("bare", "true")
+        self.setProperty("ownFocus", True)
+        self.setFrame(False)
+        self.restyle()
+
+    def restyle(self) -> None:
+        font = self._theme.font("heading")
+        font.setWeight(font.Weight.Normal)
+        font.setPixelSize(round(self._theme.scaled(17)))
+        self.setFont(font)
+        self.setFixedHeight(round(self._theme.scaled(FIELD)))
+        right = round(paint.key_width(self._theme, "Esc")) + 26
+        self.setTextMargins(round(self._theme.scaled(20)) + 28, 0, right, 0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self)
+        middle, side = self.height() / 2, self._theme.scaled(20)
+        square = QRectF(18, middle - side / 2, side, side)
+        paint_icon(painter, square, "search", self._theme.colour("textSecondary"))
+        paint.key_cap(painter, self._theme, self.width() - 19, middle, "Esc")
+        paint.hairline(painter, QRectF(self.rect()), Qt.Edge.BottomEdge, self._theme.colour("border"))
+        painter.end()
+
+
+class _Foot(QWidget):
+    """Which keys do what, and how many fit."""
+
+    KEYS = ((("↑", "↓"), "choose"), (("Enter",), "run"), (("Ctrl Enter",), "change the shortcut"))
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.counted = ""
+        self.setFixedHeight(round(theme.scaled(FOOT)))
+
+    def sizeHint(self) -> QSize:
+        return QSize(100, round(self._theme.scaled(FOOT)))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        font, quiet = theme.font("body"), theme.colour("textSecondary")
+        middle, left = self.height() / 2, 18.0
+        paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, theme.colour("border"))
+        count = paint.width_of(font, self.counted)
+        for keys, said in self.KEYS:
+            wide = sum(paint.key_width(theme, key) + 5 for key in keys) + paint.width_of(font, said)
+            if left + wide > self.width() - count - 40:
+                break
+            for key in keys:
+                left = paint.key_cap(painter, theme, left + paint.key_width(theme, key), middle, key).right()
+                left += 5
+            area = QRectF(left + 1, 0, 400, self.height())
+            paint.words(painter, area, said, font, quiet)
+            left += paint.width_of(font, said) + 17
+        area = QRectF(0, 0, self.width() - 19, self.height())
+        paint.words(painter, area, self.counted, font, quiet, paint.RIGHT)
+        painter.end()
+
+
+class Palette(Overlay):
+    """640 wide, 128 from the top. ``run`` does an entry, ``rebind`` asks for a command's new key."""
+
+    top = TOP
+
+    def __init__(
+        self,
+        theme: Theme,
+        window: QWidget,
+        offers: Callable[[], Sequence[Entry]],
+        run: Callable[[Entry], object],
+        rebind: Callable[[str], object],
+    ) -> None:
+        """``offers`` is asked at each opening."""
+        super().__init__(theme, window, "Command palette")
+        self._offers, self._run, self._rebind = offers, run, rebind
+        self._finder = Finder(())
+        self.last: list[str] = []
+        self.on_last: Callable[[Sequence[str]], object] = lambda _ids: None
+        self.field = _Field(theme)
+        self.rows = EntryList(theme, "What fits")
+        self.nothing = label("", "bodyLarge", role="textSecondary", wrap=True)
+        self.nothing.setContentsMargins(20, 14, 20, 16)
+        self.foot = _Foot(theme)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 1, 1, 1)
+        column.setSpacing(0)
+        column.addWidget(self.field)
+        column.addWidget(self.nothing)
+        inner = QHBoxLayout()
+        inner.setContentsMargins(0, 2, 0, 6)
+        inner.addWidget(self.rows)
+        column.addLayout(inner, 1)
+        column.addWidget(self.foot)
+        self.field.installEventFilter(self)
+        self.field.textChanged.connect(self._search)
+        self.rows.moved.connect(self._say)
+        self.rows.pressed_row.connect(self.do_it)
+        theme.changed.connect(self._restyle)
+
+    # -- showing ----------------------------------------------------------------------------------
+
+    def first(self) -> QWidget:
+        return self.field
+
+    def open(self) -> None:
+        """Show everything that there is now, what was used last at the top."""
+        if self.isVisible():
+            self.shut()
+            return
+        self._finder = Finder(self._offers())
+        self.field.blockSignals(True)
+        self.field.clear()
+        self.field.blockSignals(False)
+        self._search()
+        super().open()
+
+    def wanted_size(self, room: QSize) -> QSize:
+        scaled = self.theme.scaled
+        rows = min(self.rows.height_of_all(), round(scaled(40) * ROWS_SHOWN)) + 8
+        shown = rows if self.rows.lines.lines else self.nothing.sizeHint().height()
+        high = self.field.height() + shown + self.foot.height() + 2
+        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), high))
+
+    def _restyle(self) -> None:
+        self.field.restyle()
+        self.foot.setFixedHeight(round(self.theme.scaled(FOOT)))
+        self.place()
+
+    def _search(self) -> None:
+        query = self.field.text().strip()
+        lines = self._for_nothing_typed() if not query else []
+        if query:
+            found, count = self._finder.find(query, MOST)
+            self.foot.counted = f"{count} of {len(self._finder.entries)}"
+            for each in found:
+                heading = Heading(TITLES[each.entry.kind])
+                if heading not in lines:
+                    lines.append(heading)
+                lines.append(each)
+        self.nothing.setText(f"Nothing is called “{query}”.")
+        paint.show_when(self.nothing, not lines)
+        paint.show_when(self.rows, bool(lines))
+        self.rows.show_lines(lines)
+        self.foot.update()
+        self.place()
+
+    def _for_nothing_typed(self) -> list[Line]:
+        """What was used last, then the first of each kind."""
+        entries = self._finder.entries
+        known = {entry.id: entry for entry in entries if entry.id in self.last}
+        last = [known[id] for id in self.last if id in known][:LAST_SHOWN]
+        lines: list[Line] = [Heading(TITLES["recent"]), *map(Found, last)] if last else []
+        kinds: dict[str, list[Found]] = {}
+        for entry in entries:
+            of_kind = kinds.setdefault(entry.kind, [])
+            if entry not in last and (entry.kind == "command" or len(of_kind) < MOST_EMPTY):
+                of_kind.append(Found(entry))
+        for kind, of_kind in kinds.items():
+            if of_kind:
+                lines += [Heading(TITLES[kind]), *of_kind]
+        self.foot.counted = f"{len(entries)} things"
+        return lines
+
+    def _say(self) -> None:
+        """A screen reader says the chosen row: the keyboard stays in the field."""
+        entry = self.rows.entry
+        if entry is not None and self.isVisible():
+            paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
+
+    # -- doing ------------------------------------------------------------------------------------
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is self.field and event.type() == QEvent.Type.KeyPress:
+            pressed = cast("QKeyEvent", event)
+            plain = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+            if plain and self.rows.handle(pressed.key()):
+                return True
+            if pressed.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+                if pressed.modifiers() & Qt.KeyboardModifier.ControlModifier:
+                    self.rebind()
+                else:
+                    self.do_it()
+                return True
+        return super().eventFilter(watched, event)
+
+    def do_it(self) -> None:
+        """Do what is chosen, unless it can't be done now."""
+        entry = self.rows.entry
+        if entry is None:
+            return
+        if entry.reason:
+            paint.announce(self.field, entry.reason)
+            return
+        self.last = [entry.id, *(id for id in self.last if id != entry.id)][:LAST_KEPT]
+        self.on_last(self.last)
+        self.shut()
+        self._run(entry)
+
+    def rebind(self) -> None:
+        """Ask for a new key of the chosen command."""
+        entry = self.rows.entry
+        if entry is not None and entry.kind == "command":
+            self.shut()
+            self._rebind(entry.name)
+
+
+TITLES = {
+    "recent": "Recently used",
+    "command": "Commands",
+    "panel": "Panels",
+    "topic": "Topics",
+    "robot": "Robots",
+    "layout": "Layouts",
+    "file": "Recent files",
+    "example": "Examples",
+}

@@ -1,0 +1,174 @@
+"""May this robot move? A card over the window, asked once for each real robot; Stop stays free and bright."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QApplication, QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
+from shiboken6 import isValid
+
+from app.core.robots.motion_permission import Moving
+from app.errors import SettingsError
+from app.ui.text import plain
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Switch, label, paint
+
+WIDE = 480
+TOP_SHARE = 0.42  # below every Stop: the run bar's and the robots' own
+TILE, EDGE, BETWEEN = 40, 20, 10
+
+
+class _Tile(QWidget):
+    """The sign of something that moves."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setFixedSize(TILE, TILE)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, theme.radius("panel"), theme.colour("warnTint"), theme.colour("warnBorder"))
+        inset = TILE * 0.24
+        paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), "footprints", theme.colour("warn"))
+        painter.end()
+
+
+class MoveQuestion(QWidget):
+    """Shows the question of `Moving` while it stands; Escape is "Not now".
+
+    The keyboard is on "Not now" first: an Enter that was meant for something else moves nothing.
+    """
+
+    def __init__(
+        self, theme: Theme, window: QWidget, moving: Moving, complain: Callable[[str], object]
+    ) -> None:
+        """``complain`` is told when an "always" can't be kept."""
+        super().__init__(window)
+        self._theme, self._moving = theme, moving
+        self._seen = moving.revision
+        self._before: QWidget | None = None
+        self._complain = complain
+        self._always_for = ""
+        self.title = label("", "heading", wrap=True)
+        self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
+        self.always = Switch(theme, "")
+        self.let = Button(theme, "Let it move", "footprints", kind="primary", size="form")
+        self.not_now = Button(theme, "Not now", size="form")
+        self.let.clicked.connect(lambda: self._answer(let=True))
+        self.not_now.clicked.connect(lambda: self._answer(let=False))
+        self._lay_out(theme)
+        shadow = QGraphicsDropShadowEffect(self)
+        shadow.setBlurRadius(32)
+        shadow.setOffset(0, 8)
+        shadow.setColor(theme.colour("shadow"))
+        theme.changed.connect(lambda: shadow.setColor(theme.colour("shadow")))
+        self.setGraphicsEffect(shadow)
+        window.installEventFilter(self)
+        self.hide()
+
+    def _lay_out(self, theme: Theme) -> None:
+        words = QVBoxLayout()
+        words.setSpacing(4)
+        words.addWidget(self.title)
+        words.addWidget(self.sentence)
+        top = QHBoxLayout()
+        top.setSpacing(14)
+        top.addWidget(_Tile(theme), 0, Qt.AlignmentFlag.AlignTop)
+        top.addLayout(words, 1)
+        foot = QHBoxLayout()
+        foot.setSpacing(BETWEEN)
+        foot.addWidget(self.always)
+        foot.addStretch(1)
+        foot.addWidget(self.not_now)
+        foot.addWidget(self.let)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(EDGE, 18, EDGE, 16)
+        column.setSpacing(16)
+        column.addLayout(top)
+        column.addLayout(foot)
+
+    def refresh(self) -> None:
+        """Show the question that stands now, or nothing."""
+        if self._moving.revision == self._seen:
+            return
+        self._seen = self._moving.revision
+        question = self._moving.question
+        if question is None:
+            self._put_away()
+            return
+        names = list(question.moves)
+        self.title.setText(plain.breakable(question.title))
+        self.sentence.setText(plain.breakable(question.sentence))
+        self._always_for = f"Always for {names[0]}" if len(names) == 1 else "Always for these"
+        self.always.setAccessibleName(self._always_for)
+        self.always.setChecked(False)
+        self.let.set_word("Let it move" if len(names) == 1 else "Let them move")
+        self.setAccessibleName(question.title)
+        self.setAccessibleDescription(question.sentence)
+        if not self.isVisible():
+            self._before = QApplication.focusWidget()
+        self.show()  # first: fonts and margins of the style sheet come with it
+        self._place()
+        self.raise_()
+        self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
+
+    def _put_away(self) -> None:
+        focus = QApplication.focusWidget()
+        had_focus = focus is not None and self.isAncestorOf(focus)
+        self.hide()
+        before, self._before = self._before, None
+        if had_focus and before is not None and isValid(before) and before.isVisible():
+            before.setFocus(Qt.FocusReason.PopupFocusReason)
+
+    def _answer(self, *, let: bool) -> None:
+        try:
+            self._moving.answer(let=let, always=let and self.always.isChecked())
+        except SettingsError as error:
+            self._complain(error.sentence)
+        self.refresh()
+
+    def _place(self) -> None:
+        window = self.parentWidget()
+        if window is None:
+            return
+        wide = min(round(self._theme.scaled(WIDE)), window.width() - 32)
+        self.setFixedWidth(wide)
+        self._name_always(wide)
+        layout = self.layout()
+        if layout is not None:
+            layout.invalidate()
+            layout.activate()
+        high = layout.heightForWidth(wide) if layout is not None else -1
+        self.resize(wide, max(high, self.minimumSizeHint().height()))
+        top = round(window.height() * TOP_SHARE)
+        self.move((window.width() - wide) // 2, min(top, max(8, window.height() - self.height() - 8)))
+
+    def _name_always(self, wide: int) -> None:
+        """The robot's name on the switch where there is room for all of it; the title has it anyway."""
+        self.always.setText(self._always_for)
+        buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()
+        if self.always.sizeHint().width() > wide - 2 * EDGE - 2 * BETWEEN - buttons:
+            self.always.setText("Always")
+        self.always.updateGeometry()
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._place()
+        return False
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self._answer(let=False)
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        edge = theme.colour("warnBorder")
+        paint.box(painter, QRectF(self.rect()), theme.radius("card"), theme.colour("raised"), edge)
+        painter.end()

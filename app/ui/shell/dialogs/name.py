@@ -1,0 +1,99 @@
+"""Asks for a name: one field, one button, and a sentence when the name can't be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, label, paint
+from app.ui.widgets.menus import EditMenu
+
+WIDE = 420
+
+
+class NameSheet(Overlay):
+    """Opened once for one question."""
+
+    top = 128
+
+    def __init__(self, theme: Theme, window: QWidget) -> None:
+        super().__init__(theme, window, "Name")
+        self._refusal: Callable[[str], str] = lambda _name: ""
+        self._take: Callable[[str], object] = lambda _name: None
+        self.heading = label("", "heading")
+        self.field = QLineEdit()
+        self.field.setProperty("focusRadius", theme.radius("control"))
+        EditMenu(theme, self.field)
+        self.wrong = label("", "body", role="error", wrap=True)
+        self.button = Button(theme, "", kind="primary", size="form")
+        cancel = Button(theme, "Leave it", size="form")
+        cancel.clicked.connect(self.shut)
+        row = QHBoxLayout()
+        row.addStretch(1)
+        row.addWidget(cancel)
+        row.addWidget(self.button)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(20, 16, 20, 16)
+        column.setSpacing(10)
+        for widget in (self.heading, self.field, self.wrong):
+            column.addWidget(widget)
+        column.addLayout(row)
+        self.field.textEdited.connect(lambda _text: self._complain(""))
+        self.button.clicked.connect(self._done)
+
+    def ask(
+        self,
+        question: str,
+        verb: str,
+        refusal: Callable[[str], str],
+        take: Callable[[str], object],
+        name: str = "",
+    ) -> None:
+        """``refusal`` says why a name can't be, ``take`` gets one that can."""
+        self._refusal, self._take = refusal, take
+        self.setAccessibleName(question)
+        self.heading.setText(question)
+        self.field.setAccessibleName(question)
+        self.field.setText(name)
+        self.field.selectAll()
+        self.button.set_word(verb)
+        self._complain("")
+        self.open()
+
+    def first(self) -> QWidget:
+        return self.field
+
+    def wanted_size(self, room: QSize) -> QSize:
+        wide = min(room.width(), round(self.theme.scaled(WIDE)))
+        layout = self.layout()
+        high = layout.totalHeightForWidth(wide) if layout is not None else 0
+        return QSize(wide, min(room.height(), max(high, self.sizeHint().height())))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._done()
+        super().keyPressEvent(event)
+
+    def _complain(self, sentence: str) -> None:
+        self.wrong.setText(sentence)
+        paint.show_when(self.wrong, bool(sentence))
+        self.field.setProperty("wrong", "true" if sentence else "false")
+        self.field.style().unpolish(self.field)
+        self.field.style().polish(self.field)
+        self.place()
+        if sentence:
+            paint.announce(self.wrong, sentence)
+
+    def _done(self) -> None:
+        name = self.field.text().strip()
+        sentence = self._refusal(name)
+        if sentence:
+            self._complain(sentence)
+            return
+        self.shut()
+        self._take(name)

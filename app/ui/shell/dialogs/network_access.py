@@ -1,0 +1,137 @@
+"""Lets other computers connect, or no more: at which address, what it means, and what they type."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.core.network.remote_access import Reach
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Choice, IconButton, label, paint
+
+WIDE = 520
+WARNING = (
+    "Everybody in that network can then read what the robots say and command them. There is no password: do"
+    " this only in a network that you trust, and never in a public one."
+)
+
+
+class OthersSheet(Overlay):
+    """Opened by the command "Let other computers connect" and from the status bar."""
+
+    top = 128
+
+    def __init__(self, theme: Theme, window: QWidget, reach: Reach) -> None:
+        super().__init__(theme, window, "Other computers")
+        self._reach = reach
+        self.heading = label("", "heading", wrap=True)
+        self.warning = label("", "bodyLarge", role="textSecondary", wrap=True)
+        self.where = QHBoxLayout()
+        self.where_word = label("At the address", "bodyLarge", role="textSecondary")
+        self.choice: Choice | None = None
+        self.typed_word = label("Programs there need this setting:", "body", role="textSecondary")
+        self.typed = label("", "code")
+        self.typed.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.copy = IconButton(theme, "copy", "Copy the setting")
+        self.copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.typed.text()))
+        self.yes = Button(theme, "Let them connect", "wifi", kind="primary", size="form")
+        self.no = Button(theme, "Not now", size="form")
+        self.end = Button(theme, "This computer only", "lock", size="form")
+        self.yes.clicked.connect(self._let_in)
+        self.no.clicked.connect(self.shut)
+        self.end.clicked.connect(self._let_nobody_in)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(20, 16, 20, 16)
+        column.setSpacing(12)
+        column.addWidget(self.heading)
+        column.addWidget(self.warning)
+        self.where.addWidget(self.where_word)
+        self.where.addStretch(1)
+        column.addLayout(self.where)
+        typed = QHBoxLayout()
+        typed.setSpacing(8)
+        typed.addWidget(self.typed)
+        typed.addWidget(self.copy)
+        typed.addStretch(1)
+        column.addWidget(self.typed_word)
+        column.addLayout(typed)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addStretch(1)
+        for button in (self.end, self.no, self.yes):
+            row.addWidget(button)
+        column.addLayout(row)
+
+    def first(self) -> QWidget:
+        return self.no
+
+    def wanted_size(self, room: QSize) -> QSize:
+        layout = self.layout()
+        hint = self.sizeHint()
+        wide = min(room.width(), max(round(self.theme.scaled(WIDE)), self.minimumSizeHint().width()))
+        high = layout.totalHeightForWidth(wide) if layout is not None else hint.height()
+        return QSize(wide, min(room.height(), high))
+
+    def open(self) -> None:
+        """Show what is so now."""
+        self._show()
+        super().open()
+
+    def _show(self) -> None:
+        reach = self._reach
+        addresses = reach.addresses()
+        is_open, can_open = bool(reach.hosts), reach.is_near and bool(addresses)
+        self.heading.setText(self._heading(is_open=is_open, can_open=can_open))
+        self.warning.setText(self._words(is_open=is_open, can_open=can_open))
+        if self.choice is not None:
+            self.where.removeWidget(self.choice)
+            self.choice.deleteLater()
+            self.choice = None
+        if can_open and not is_open:
+            options = [(own.host, f"{own.host} ({own.interface})") for own in addresses]
+            self.choice = Choice(self.theme, options, name="Address")
+            self.choice.currentIndexChanged.connect(lambda _index: self._say_chosen())
+            self.where.insertWidget(1, self.choice)
+        paint.show_when(self.where_word, self.choice is not None)
+        self._say_typed(reach.hosts[0] if is_open else addresses[0].host if addresses else "")
+        for shown in (self.typed, self.copy, self.typed_word):
+            paint.show_when(shown, is_open or can_open)
+        paint.show_when(self.yes, can_open and not is_open)
+        paint.show_when(self.end, is_open and reach.is_near)
+        self.no.set_word("Leave it so" if is_open or not can_open else "Not now")
+        self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
+
+    def _heading(self, *, is_open: bool, can_open: bool) -> str:
+        if not self._reach.is_near:
+            return f"The master is on another computer, {self._reach.master_host}"
+        if is_open:
+            return f"Other computers can connect at {', '.join(self._reach.hosts)}"
+        return "Let other computers connect?" if can_open else "This computer is in no network"
+
+    def _words(self, *, is_open: bool, can_open: bool) -> str:
+        if not self._reach.is_near:
+            return "Who may connect is decided there."
+        if is_open or can_open:
+            return WARNING
+        return "Join a Wi-Fi or plug in a cable, then open this again."
+
+    def _say_typed(self, host: str) -> None:
+        self.typed.setText(self._reach.typed_by_others(host))
+
+    def _say_chosen(self) -> None:
+        if self.choice is not None:
+            self._say_typed(self.choice.value)
+
+    def _let_in(self) -> None:
+        if self.choice is not None:
+            self._reach.let_in((self.choice.value,))
+        self.shut()
+
+    def _let_nobody_in(self) -> None:
+        self._reach.let_in(())
+        self.shut()

@@ -1,0 +1,246 @@
+"""What opens over the window: a surface with a shadow, and a scrim that leaves every Stop bright."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import (
+    QEasingCurve,
+    QEvent,
+    QObject,
+    QPoint,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+    QVariantAnimation,
+    Signal,
+)
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QRegion
+from PySide6.QtWidgets import QApplication, QGraphicsOpacityEffect, QWidget
+from shiboken6 import isValid
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import StopButton, paint
+from app.ui.widgets.focus_chain import tab_stops
+from app.ui.widgets.menus import round_region
+
+SHADOW_PX = 28
+SHADOW_DOWN = 10
+EDGE = 16
+BELOW_STOP = 5
+STOP_INSET = 4  # the button keeps that much free around its body for its ring
+
+
+def stops_in(window: QWidget) -> list[StopButton]:
+    """Each Stop that can be seen in a window."""
+    return [stop for stop in window.findChildren(StopButton) if stop.isVisible() and stop.window() is window]
+
+
+class Scrim(QWidget):
+    """Darkens a window except its Stop buttons, which can be pressed as ever; a press elsewhere closes."""
+
+    pressed = Signal()
+
+    def __init__(self, theme: Theme, window: QWidget) -> None:
+        super().__init__(window)
+        self._theme = theme
+        self.strength = 0.0
+        self.surface: QWidget | None = None
+        self.hide()
+
+    def cover(self) -> None:
+        """Lie over the whole window, with a hole over each Stop that can be seen."""
+        window = self.parentWidget()
+        if window is None:
+            return
+        self.setGeometry(window.rect())
+        whole = QRegion(self.rect())
+        for stop in stops_in(window):
+            body = stop.size() - QSize(2 * STOP_INSET, 2 * STOP_INSET)
+            hole = round_region(body, float(stop.property("focusRadius") or 0))
+            whole -= hole.translated(stop.mapTo(window, QPoint(STOP_INSET, STOP_INSET)))
+        self.setMask(whole)
+        self.update()
+
+    def set_strength(self, strength: float) -> None:
+        """How dark, 0 to 1."""
+        self.strength = strength
+        self.update()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        event.accept()
+        self.pressed.emit()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        dark = self._theme.colour("scrim")
+        dark.setAlphaF(dark.alphaF() * self.strength)
+        painter.fillRect(self.rect(), dark)
+        if self.surface is not None:
+            self._paint_shadow(painter, QRectF(self.surface.geometry()))
+        painter.end()
+
+    def _paint_shadow(self, painter: QPainter, over: QRectF) -> None:
+        """Many thin boxes on each other: an effect would paint the whole surface again at each key."""
+        steps = SHADOW_PX // 2
+        shade = self._theme.colour("shadow")
+        shade.setAlphaF(min(1.0, shade.alphaF() * self.strength * 2.2 / steps))
+        radius = self._theme.radius("palette")
+        for step in range(steps):
+            out = 2.0 * step - SHADOW_PX / 2
+            box = over.translated(0, SHADOW_DOWN).adjusted(-out, -out, out, out)
+            paint.box(painter, box, radius + max(0.0, out), shade)
+
+
+class Overlay(QWidget):
+    """A surface over a window: takes the keyboard, Esc or a press beside it closes it and gives it back.
+
+    Subclasses say in `wanted_size` how large they are, and in `first` where the keyboard goes.
+    """
+
+    closed = Signal()
+    top = EDGE
+
+    def __init__(self, theme: Theme, window: QWidget, name: str) -> None:
+        """An overlay called ``name`` for screen readers; `open` shows it."""
+        super().__init__(window)
+        self.theme = theme
+        self.setAccessibleName(name)
+        self._scrim = Scrim(theme, window)
+        self._scrim.surface = self
+        self._scrim.pressed.connect(self.shut)
+        self._before: QWidget | None = None
+        self._opening = QVariantAnimation(self)
+        self._opening.setStartValue(0.0)
+        self._opening.setEndValue(1.0)
+        self._opening.setEasingCurve(QEasingCurve.Type.OutCubic)
+        self._opening.valueChanged.connect(self._move_on)
+        self._opening.finished.connect(self._arrived)
+        theme.changed.connect(self.place)
+        self.hide()
+
+    def wanted_size(self, room: QSize) -> QSize:
+        """The size in a window that leaves ``room`` beside and below."""
+        return self.sizeHint().boundedTo(room)
+
+    def first(self) -> QWidget:
+        """Where the keyboard goes."""
+        return self
+
+    def open(self) -> None:
+        """Show it; nothing moves under reduced motion."""
+        if self.isVisible():
+            return
+        self._before = QApplication.focusWidget()
+        window = self.window_below()
+        window.installEventFilter(self)
+        self.place()
+        self._scrim.show()
+        self._scrim.raise_()
+        duration = self.theme.duration("palette")
+        if duration:
+            self.setGraphicsEffect(QGraphicsOpacityEffect(self))
+            self._move_on(0.0)
+            self._opening.setDuration(duration)
+            self._opening.start()
+        else:
+            self._scrim.set_strength(1.0)
+        self.show()
+        self.raise_()
+        self.first().setFocus(Qt.FocusReason.PopupFocusReason)
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._focus_changed)
+
+    def shut(self) -> None:
+        """Close it and give the keyboard back to where it was."""
+        if not self.isVisible():
+            return
+        inside = self._has_keyboard()
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.disconnect(self._focus_changed)
+        self.window_below().removeEventFilter(self)
+        self._opening.stop()
+        self._arrived()
+        before = self._before
+        if inside and before is not None and isValid(before) and before.isVisible():
+            before.setFocus(Qt.FocusReason.PopupFocusReason)
+        self.hide()
+        self._scrim.hide()
+        self.closed.emit()
+
+    def window_below(self) -> QWidget:
+        """The window that it lies over."""
+        parent = self.parentWidget()
+        return parent if parent is not None else self
+
+    def place(self) -> None:
+        """Go to the middle of the window, `top` below its upper edge, or lower so that no Stop is covered."""
+        window = self.window_below()
+        place = self._placed(self.top)
+        stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
+        covered = [stop for stop in stops if stop.intersects(place)]
+        if covered:
+            place = self._placed(max(stop.bottom() for stop in covered) + BELOW_STOP)
+        if place != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
+            self.setGeometry(place)
+            self._scrim.cover()
+
+    def _placed(self, top: int) -> QRect:
+        window = self.window_below()
+        size = self.wanted_size(QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE))
+        return QRect(QPoint((window.width() - size.width()) // 2, top), size)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and watched is self.parentWidget():
+            self.place()
+        return super().eventFilter(watched, event)
+
+    def event(self, event: QEvent) -> bool:
+        done = super().event(event)
+        if event.type() == QEvent.Type.LayoutRequest and self.isVisible():
+            self.place()
+        return done
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.shut()
+        event.accept()  # nothing that is typed here is meant for the window below
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        """Tab stays inside."""
+        focus = QApplication.focusWidget()
+        step: QWidget = focus if focus is not None and self.isAncestorOf(focus) else self
+        stop = next(tab_stops(self, step, forward=forward), None)
+        if stop is not None:
+            reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
+            stop.setFocus(reason)
+        return True
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        theme = self.theme
+        fill, edge = theme.colour("raised"), theme.colour("borderStrong")
+        paint.box(painter, QRectF(self.rect()), theme.radius("palette"), fill, edge)
+        painter.end()
+
+    def _has_keyboard(self) -> bool:
+        focus = QApplication.focusWidget()
+        return focus is not None and (focus is self or self.isAncestorOf(focus))
+
+    def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
+        if new is None or QApplication.activePopupWidget() is not None or new.window() is not self.window():
+            return
+        if new is not self and not self.isAncestorOf(new):
+            self.shut()
+
+    def _move_on(self, share: object) -> None:
+        strength = float(share) if isinstance(share, float) else 1.0
+        self._scrim.set_strength(strength)
+        effect = self.graphicsEffect()
+        if isinstance(effect, QGraphicsOpacityEffect):
+            effect.setOpacity(max(0.01, strength))
+
+    def _arrived(self) -> None:
+        self.setGraphicsEffect(None)  # type: ignore[arg-type]  # None takes the effect away
+        self._scrim.set_strength(1.0)

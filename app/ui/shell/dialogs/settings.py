@@ -1,0 +1,148 @@
+"""The settings: look, size of text, contrast, motion, shortcuts, and where pictures are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from app.core.messages import snapshots
+from app.core.storage.settings import Settings
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.shell.window_state import WindowState
+from app.ui.theme.system import WISHES
+from app.ui.theme.theme import MODES, Theme
+from app.ui.widgets import Button, Elided, IconButton, Segments, label
+from app.ui.widgets.file_dialogs import show_free
+
+WIDE = 620
+MODE_WORDS = {"light": ("Light", "sun"), "dark": ("Dark", "moon"), "system": ("As the system", "monitor")}
+WISH_WORDS = {"system": "As the system", "on": "On", "off": "Off"}
+TEXT_SIZES = ("100", "125", "150", "175", "200")
+
+
+class SettingsSheet(Overlay):
+    """Everything applies at once and is kept; there is nothing to confirm."""
+
+    top = 72
+
+    def __init__(self, theme: Theme, window: QWidget, state: WindowState, settings: Settings) -> None:
+        super().__init__(theme, window, "Settings")
+        self._state, self._settings = state, settings
+        self.mode = Segments(
+            theme, [(mode, *MODE_WORDS[mode]) for mode in MODES], check=True, size="form", name="Look"
+        )
+        self.text = Segments(
+            theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name="Text size"
+        )
+        wishes = [(wish, WISH_WORDS[wish], None) for wish in WISHES]
+        self.contrast = Segments(theme, wishes, check=True, size="form", name="High contrast")
+        self.motion = Segments(theme, wishes, check=True, size="form", name="Less motion")
+        self.shortcuts = Button(theme, "Change the shortcuts", "keyboard", size="form")
+        self.folder = Elided("bodyLarge", "textSecondary")
+        self.choose = Button(theme, "Choose a folder", "folder-open", size="form")
+        self.mode.changed.connect(self._mode)
+        self.text.changed.connect(lambda percent: self._changed(lambda: theme.set_text_percent(int(percent))))
+        self.contrast.changed.connect(self._contrast)
+        self.motion.changed.connect(self._motion)
+        self.choose.clicked.connect(self._choose)
+        self._lay_out()
+        theme.changed.connect(self._show)
+
+    def _lay_out(self) -> None:
+        close = IconButton(self.theme, "x", "Close", "Esc")
+        close.clicked.connect(self.shut)
+        head = QHBoxLayout()
+        head.setContentsMargins(19, 0, 19, 0)
+        head.addWidget(label("Settings", "heading"))
+        head.addStretch(1)
+        head.addWidget(close)
+        self._inside = QWidget()
+        self._inside.setProperty("bare", "true")
+        grid = QGridLayout(self._inside)
+        grid.setContentsMargins(19, 4, 19, 4)
+        grid.setHorizontalSpacing(16)
+        grid.setVerticalSpacing(12)
+        grid.setColumnStretch(1, 1)
+        pictures = QHBoxLayout()
+        pictures.addWidget(self.folder, 1)
+        pictures.addWidget(self.choose)
+        rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
+            ("Look", self.mode),
+            ("Text size", self.text),
+            ("High contrast", self.contrast),
+            ("Less motion", self.motion),
+            ("Keyboard", self.shortcuts),
+            ("Pictures", pictures),
+        )
+        for row, (words, control) in enumerate(rows):
+            said = label(words, "bodyLarge", role="textSecondary")
+            grid.addWidget(said, row, 0, Qt.AlignmentFlag.AlignVCenter)
+            if isinstance(control, QWidget):
+                grid.addWidget(control, row, 1, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+            else:
+                grid.addLayout(control, row, 1)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.viewport().setAutoFillBackground(False)
+        self._area.setWidget(self._inside)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 14, 1, 16)
+        column.setSpacing(12)
+        column.addLayout(head)
+        column.addWidget(self._area, 1)
+
+    def first(self) -> QWidget:
+        return self.mode.chosen_button() or self
+
+    def wanted_size(self, room: QSize) -> QSize:
+        inside = self._inside.sizeHint()
+        wide = max(round(self.theme.scaled(WIDE)), inside.width() + 14)
+        high = inside.height() + self.sizeHint().height() - self._area.sizeHint().height() + 4
+        return QSize(min(room.width(), wide), min(room.height(), high))
+
+    def open(self) -> None:
+        """Show what is chosen now."""
+        self._show()
+        super().open()
+
+    def _show(self) -> None:
+        theme = self.theme
+        self.mode.set_value(theme.mode)
+        self.text.set_value(str(theme.text_percent))
+        self.contrast.set_value(theme.contrast)
+        self.motion.set_value(theme.motion)
+        self.folder.setText(str(snapshots.folder(self._settings)))
+        if self.isVisible():
+            self.place()
+
+    def _changed(self, change: Callable[[], object]) -> None:
+        change()
+        self._state.keep_theme(self.theme)
+
+    def _mode(self, chosen: str) -> None:
+        mode = next(mode for mode in MODES if mode == chosen)
+        self._changed(lambda: self.theme.set_mode(mode))
+
+    def _contrast(self, chosen: str) -> None:
+        wish = next(wish for wish in WISHES if wish == chosen)
+        self._changed(lambda: self.theme.set_contrast(wish))
+
+    def _motion(self, chosen: str) -> None:
+        wish = next(wish for wish in WISHES if wish == chosen)
+        self._changed(lambda: self.theme.set_motion(wish))
+
+    def _choose(self) -> None:
+        """Ask for a folder, while everything else goes on."""
+        before = str(snapshots.folder(self._settings))
+        dialog = QFileDialog(self.window_below(), "Folder for pictures", before)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.fileSelected.connect(self.keep_folder)
+        show_free(dialog)
+
+    def keep_folder(self, folder: str) -> None:
+        """Keep pictures there from now on."""
+        self._state.keep(snapshots.CHOSEN, folder)
+        self._show()

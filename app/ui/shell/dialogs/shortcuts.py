@@ -1,0 +1,247 @@
+"""All shortcuts in one table: search, press Enter or click to give a command another key, swap, reset."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.ui.shell.actions.shortcuts import FIXED, STOP, Shortcuts, key_of
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.text.numbers import spoken_key
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, IconButton, SearchField, label, paint
+from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
+from app.ui.widgets.lists.fuzzy import Entry, Found, match
+
+WIDE, HIGH = 680, 640
+ONLY_MODIFIERS = frozenset(
+    {
+        Qt.Key.Key_Control,
+        Qt.Key.Key_Shift,
+        Qt.Key.Key_Alt,
+        Qt.Key.Key_AltGr,
+        Qt.Key.Key_Meta,
+        Qt.Key.Key_unknown,
+    }
+)
+PLACES = {"file": "File", "panel": "Panels", "edit": "Edit"}
+HINT = "Enter or a click gives a command another key. Delete takes its key away."
+WAITING = "Press the new key for “{0}”. Esc leaves it as it is."
+
+
+class ShortcutSheet(Overlay):
+    """The table. While a new key is awaited every key but F12 and Esc is taken as that key."""
+
+    top = 72
+
+    def __init__(self, theme: Theme, window: QWidget, shortcuts: Shortcuts) -> None:
+        super().__init__(theme, window, "Keyboard shortcuts")
+        self._shortcuts = shortcuts
+        self._waiting = ""
+        self._offer: tuple[str, str] | None = None  # a command and the key that another one has
+        self.field = SearchField(theme, "Find a command or a key")
+        self.rows = EntryList(theme, "Keyboard shortcuts")
+        self.said = label(HINT, "body", role="textSecondary", wrap=True)
+        self.swap = Button(theme, "Swap the two", size="small")
+        self.reset = Button(theme, "Reset this one", size="small")
+        self.reset_all = Button(theme, "Reset all", size="small")
+        self._lay_out()
+        self.field.installEventFilter(self)
+        self.field.textChanged.connect(self._show)
+        self.rows.pressed_row.connect(self.record)
+        self.rows.moved.connect(self._chosen)
+        self.swap.clicked.connect(self._swap)
+        self.reset.clicked.connect(self._reset)
+        self.reset_all.clicked.connect(shortcuts.reset_all)
+        shortcuts.changed.connect(self._show)
+
+    def _lay_out(self) -> None:
+        close = IconButton(self.theme, "x", "Close", "Esc")
+        close.clicked.connect(self.shut)
+        head = QHBoxLayout()
+        head.addWidget(label("Keyboard shortcuts", "heading"))
+        head.addStretch(1)
+        head.addWidget(close)
+        foot = QHBoxLayout()
+        foot.setSpacing(8)
+        foot.addWidget(self.said, 1)
+        for button in (self.swap, self.reset, self.reset_all):
+            foot.addWidget(button)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 14, 1, 14)
+        column.setSpacing(10)
+        for part, sides in ((head, 19), (self.field, 19), (self.rows, 0), (foot, 19)):
+            row = QHBoxLayout()
+            row.setContentsMargins(sides, 0, sides, 0)
+            if isinstance(part, QWidget):
+                row.addWidget(part)
+            else:
+                row.addLayout(part)
+            column.addLayout(row, 1 if part is self.rows else 0)
+        paint.show_when(self.swap, False)
+
+    def first(self) -> QWidget:
+        return self.field
+
+    def wanted_size(self, room: QSize) -> QSize:
+        scaled = self.theme.scaled
+        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
+
+    def open(self) -> None:
+        """Show all of them."""
+        self.field.clear()
+        self._stop_waiting()
+        self._show()
+        super().open()
+
+    def open_for(self, name: str) -> None:
+        """Show one command and wait for its new key."""
+        self.open()
+        self._show(f"command:{name}")
+        self.record()
+
+    # -- the rows ---------------------------------------------------------------------------------
+
+    def _show(self, chosen: str = "") -> None:
+        query = self.field.text().strip()
+        before = self.rows.entry
+        lines: list[Line] = []
+        for heading, entry in self._all():
+            text = f"{entry.words} {spoken_key(entry.key)}" if query else entry.words
+            fits = match(query, text)
+            if fits is None:
+                continue
+            if Heading(heading) not in lines:
+                lines.append(Heading(heading))
+            end = len(entry.words)
+            spans = tuple((begin, min(stop, end)) for begin, stop in fits[1] if begin < end)
+            lines.append(Found(entry, 0.0, spans if query else ()))
+        keep = chosen if chosen.startswith(("command:", "fixed:")) else before.id if before else ""
+        self.rows.show_lines(lines, keep)
+        self._chosen()
+
+    def _all(self) -> list[tuple[str, Entry]]:
+        groups: dict[str, list[Entry]] = {}
+        for row in self._shortcuts.rows.values():
+            keys = "\n".join(self._shortcuts.of(row.name))
+            note = "yours" if self._shortcuts.own(row.name) else ""
+            group = groups.setdefault(row.menu or PLACES.get(row.name.partition(".")[0], "View"), [])
+            group.append(Entry(f"command:{row.name}", row.text, "", note, keys))
+        for number, fixed in enumerate(FIXED):
+            keys = "\n".join(fixed.key.split(", "))
+            groups.setdefault(fixed.place, []).append(
+                Entry(f"fixed:{number}", fixed.words, "", "stays", keys)
+            )
+        return [(heading, entry) for heading, entries in groups.items() for entry in entries]
+
+    def _chosen(self) -> None:
+        entry = self.rows.entry
+        command = entry is not None and entry.kind == "command"
+        self.reset.setEnabled(command and entry is not None and self._shortcuts.own(entry.name))
+        self.reset_all.setEnabled(any(self._shortcuts.own(name) for name in self._shortcuts.rows))
+        if entry is not None and self.isVisible() and not self._waiting:
+            paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
+
+    # -- a new key --------------------------------------------------------------------------------
+
+    def record(self) -> None:
+        """Wait for a new key for the chosen command."""
+        entry = self.rows.entry
+        if entry is None:
+            return
+        if entry.kind != "command":
+            self._tell(f"“{entry.words}” keeps its key.")
+            return
+        self._waiting, self._offer = entry.name, None
+        self.rows.look.waiting = entry.id
+        paint.show_when(self.swap, False)
+        self.field.setFocus(Qt.FocusReason.OtherFocusReason)
+        self._tell(WAITING.format(entry.words))
+        self.rows.viewport().update()
+
+    def _stop_waiting(self, said: str = HINT) -> None:
+        self._waiting = self.rows.look.waiting = ""
+        self._offer = None
+        paint.show_when(self.swap, False)
+        self._tell(said)
+        self.rows.viewport().update()
+
+    def _tell(self, said: str) -> None:
+        self.said.setText(said)
+        if said != HINT and self.isVisible():
+            paint.announce(self.said, said)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is not self.field:
+            return super().eventFilter(watched, event)
+        if event.type() == QEvent.Type.ShortcutOverride and self._waiting:
+            pressed = cast("QKeyEvent", event)
+            if pressed.key() != Qt.Key.Key_F12:  # F12 stops, whatever is awaited
+                event.accept()
+                return True
+        if event.type() == QEvent.Type.KeyPress:
+            return self._pressed(cast("QKeyEvent", event))
+        return super().eventFilter(watched, event)
+
+    def _pressed(self, pressed: QKeyEvent) -> bool:
+        key = pressed.key()
+        if self._waiting:
+            if key not in ONLY_MODIFIERS:
+                self._take(pressed)
+            return True
+        if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self.record()
+            return True
+        if key == Qt.Key.Key_Delete and not self.field.text():
+            self._take_away()
+            return True
+        plain = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        return plain and self.rows.handle(key)
+
+    def _take(self, pressed: QKeyEvent) -> None:
+        name, key = self._waiting, key_of(pressed.keyCombination())
+        if pressed.key() == Qt.Key.Key_Escape:
+            self._stop_waiting()
+            return
+        refusal = self._shortcuts.refusal(name, pressed.keyCombination())
+        if refusal:
+            self._tell(refusal)
+            return
+        words = self._shortcuts.rows[name].text
+        holder = self._shortcuts.holder(key)
+        if holder and holder != name:
+            other = self._shortcuts.rows[holder].text
+            self._stop_waiting(f"{spoken_key(key)} is “{other}” now. Swap the two, or press Enter again.")
+            self._offer = (name, key)
+            paint.show_when(self.swap, True)
+            return
+        self._stop_waiting(f"“{words}” has {spoken_key(key)} now.")
+        self._shortcuts.give(name, key)
+
+    def _swap(self) -> None:
+        if self._offer is not None:
+            name, key = self._offer
+            self._stop_waiting(f"“{self._shortcuts.rows[name].text}” has {spoken_key(key)} now.")
+            self._shortcuts.swap(name, key)
+            self.field.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _take_away(self) -> None:
+        entry = self.rows.entry
+        if entry is None or entry.kind != "command" or not self._shortcuts.of(entry.name):
+            return
+        if entry.name == STOP and len(self._shortcuts.of(STOP)) == 1:
+            self._tell("Stop keeps F12.")
+            return
+        said = f"“{entry.words}” has no key of its own now."
+        self._stop_waiting("Stop has only F12 now." if entry.name == STOP else said)
+        self._shortcuts.give(entry.name, "")
+
+    def _reset(self) -> None:
+        entry = self.rows.entry
+        if entry is not None and entry.kind == "command":
+            self._stop_waiting(f"“{entry.words}” has its first key again.")
+            self._shortcuts.reset(entry.name)
+            self.field.setFocus(Qt.FocusReason.OtherFocusReason)

@@ -1,0 +1,196 @@
+"""The earlier versions of a behaviour: when each was written, what is different now; one opens as a copy."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import cast
+
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.core.documents.diff import Difference, difference
+from app.core.documents.file_format import read_file
+from app.core.documents.versions import Version, namesakes_of, versions_of
+from app.errors import DocumentError
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.text.dates import when_words
+from app.ui.text.numbers import plural
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton, label, paint
+from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
+from app.ui.widgets.lists.fuzzy import Entry, Found
+
+WIDE, MOST_HIGH, EMPTY_HIGH = 680, 560, 330
+HINT = "A copy opens in a tab of its own; the file stays as it is."
+WHAT_MAKES_ONE = (
+    "Studio keeps what the file said before each time that it writes over it: when you save, save as, or"
+    " close a tab with unsaved work."
+)
+SAVE_FIRST = "Save it. From then on Studio keeps what the file said before each time that you save again."
+
+
+def difference_words(found: Difference) -> str:
+    """Say "14 blocks; since then 3 added, 1 removed"."""
+    counts = ((found.added, "added"), (found.removed, "removed"), (found.changed, "changed"))
+    since = ", ".join(f"{count} {what}" for count, what in counts if count)
+    if not since:
+        return (
+            f"{plural(found.blocks, 'block')}, {'put in another order' if found.moved else 'the same as now'}"
+        )
+    return f"{plural(found.blocks, 'block')}; since then {since}"
+
+
+class EarlierSheet(Overlay):
+    """Opened for one behaviour. What is different is read a version at a time, so that the window goes on."""
+
+    top = 72
+
+    def __init__(
+        self,
+        theme: Theme,
+        window: QWidget,
+        open_copy: Callable[[Path, str], object],
+        save: Callable[[], object],
+    ) -> None:
+        """``open_copy`` gets a version's file and the name for the copy, ``save`` saves the behaviour."""
+        super().__init__(theme, window, "Earlier versions")
+        self._open_copy, self._save = open_copy, save
+        self._now: Mapping[str, object] = {}
+        self._name = ""
+        self._versions: dict[str, Version] = {}
+        self._unread: deque[str] = deque()
+        self.heading = label("", "heading", wrap=True)
+        self.rows = EntryList(theme, "Earlier versions")
+        self.rows.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.empty = EmptyState(theme, "history", "", "")
+        self.hint = label(HINT, "body", role="textSecondary", wrap=True)
+        self.button = Button(theme, "Open a copy", "file-plus", kind="primary", size="form")
+        self._reading = QTimer(self)
+        self._reading.timeout.connect(self._read_one)
+        self._lay_out()
+        self.rows.installEventFilter(self)
+        self.rows.doubleClicked.connect(lambda _index: self.open_chosen())
+        self.button.clicked.connect(self.open_chosen)
+
+    def _lay_out(self) -> None:
+        close = IconButton(self.theme, "x", "Close", "Esc")
+        close.clicked.connect(self.shut)
+        head = QHBoxLayout()
+        head.setContentsMargins(19, 0, 19, 0)
+        head.addWidget(self.heading, 1)
+        head.addWidget(close)
+        self._foot = QWidget()
+        self._foot.setProperty("bare", "true")
+        foot = QHBoxLayout(self._foot)
+        foot.setContentsMargins(19, 0, 19, 0)
+        foot.setSpacing(12)
+        foot.addWidget(self.hint, 1)
+        foot.addWidget(self.button)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 14, 1, 14)
+        column.setSpacing(10)
+        column.addLayout(head)
+        column.addWidget(self.rows, 1)
+        column.addWidget(self.empty, 1)
+        column.addWidget(self._foot)
+
+    # -- showing ----------------------------------------------------------------------------------
+
+    def show_for(
+        self, name: str, path: Path | None, workspace: Mapping[str, object], now: dt.datetime | None = None
+    ) -> None:
+        """Show the versions of a behaviour's file, compared with its blocks as they are now."""
+        self._name, self._now = name, workspace
+        moment = now if now is not None else dt.datetime.now().astimezone()
+        own = versions_of(path) if path is not None else []
+        others = namesakes_of(path) if path is not None else []
+        self._versions = {f"version:{each.copy}": each for each in (*own, *others)}
+        self._unread = deque(self._versions)
+        lines: list[Line] = [self._line(each, moment) for each in own]
+        if others:
+            lines += [
+                Heading(f"Of other files called {name}"),
+                *(self._line(each, moment) for each in others),
+            ]
+        self.heading.setText(f"Earlier versions of {name}")
+        self.setAccessibleName(self.heading.text())
+        self._say_nothing(name, path)
+        for widget, shown in ((self.rows, True), (self._foot, True), (self.empty, False)):
+            paint.show_when(widget, shown == bool(lines))
+        self.rows.show_lines(lines)
+        self._reading.start(0)
+        self.open()
+
+    def _say_nothing(self, name: str, path: Path | None) -> None:
+        if path is None:
+            self.empty.say(f"{name} has no file yet", SAVE_FIRST)
+            self.empty.set_actions([EmptyAction("Save", self._save_it, "save", primary=True)])
+        else:
+            self.empty.say("No earlier versions yet", WHAT_MAKES_ONE)
+            self.empty.set_actions([EmptyAction("Close", self.shut)])
+
+    def _line(self, version: Version, now: dt.datetime) -> Found:
+        then = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
+        return Found(Entry(f"version:{version.copy}", when_words(then, now), "history"))
+
+    def first(self) -> QWidget:
+        return self.rows if self._versions else self.empty.findChild(Button) or self
+
+    def wanted_size(self, room: QSize) -> QSize:
+        scaled = self.theme.scaled
+        wide = min(room.width(), round(scaled(WIDE)))
+        layout = self.layout()
+        if not self._versions or layout is None:
+            return QSize(wide, min(room.height(), round(scaled(EMPTY_HIGH))))
+        rest = layout.totalHeightForWidth(wide) - self.rows.sizeHint().height()
+        high = rest + self.rows.height_of_all() + 8
+        return QSize(wide, min(room.height(), round(scaled(MOST_HIGH)), high))
+
+    # -- what is different ------------------------------------------------------------------------
+
+    def _read_one(self) -> None:
+        """Read one version and say in its row what is different now."""
+        if not self._unread or not self.isVisible():
+            self._reading.stop()
+            return
+        id = self._unread.popleft()
+        note = reason = ""
+        try:
+            note = difference_words(difference(read_file(self._versions[id].copy).workspace, self._now))
+        except DocumentError as error:
+            reason = f"It {error.reason.partition(';')[0]}"
+        self.rows.tell(id, note, reason)
+
+    @property
+    def read(self) -> bool:
+        """Whether every row says what is different."""
+        return not self._unread
+
+    # -- doing ------------------------------------------------------------------------------------
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is self.rows and event.type() == QEvent.Type.KeyPress:
+            key = cast("QKeyEvent", event).key()
+            if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+                self.open_chosen()
+                return True
+            return self.rows.handle(key)
+        return super().eventFilter(watched, event)
+
+    def open_chosen(self) -> None:
+        """Open the chosen version as a copy, unless it can't be read."""
+        entry = self.rows.entry
+        if entry is None or entry.reason:
+            return
+        version = self._versions[entry.id]
+        then = dt.datetime.fromtimestamp(version.written_s).astimezone()
+        self.shut()
+        self._open_copy(version.copy, f"{self._name}, {then.day} {then:%B} {then.hour}.{then.minute:02d}")
+
+    def _save_it(self) -> None:
+        self.shut()
+        self._save()

@@ -1,0 +1,307 @@
+"""The workbench: the docks of one layout, where a person moves them, and how they come back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QApplication, QMainWindow
+
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.shell.docking import dock_state
+from app.ui.shell.docking.dock import Dock, made
+from app.ui.shell.docking.dock_places import AREA, join
+from app.ui.shell.docking.layouts import Layout
+from app.ui.shell.docking.sizes import fit
+from app.ui.theme.theme import Theme
+
+ACROSS = Qt.Orientation.Horizontal
+DOWN = Qt.Orientation.Vertical
+NARROW_PX = 1280
+
+
+class Workbench(QMainWindow):
+    """The docks of one layout. Panels are made when they are first opened."""
+
+    panel_failed = Signal(str, str)
+
+    def __init__(
+        self,
+        theme: Theme,
+        layout: Layout,
+        panels: Mapping[str, Panel],
+        context: PanelContext,
+    ) -> None:
+        super().__init__()
+        self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
+        self.docks: dict[str, Dock] = {}
+        self._floating: list[Dock] = []
+        self._narrow = False
+        self._wide = QByteArray()  # the state before a narrow window made tabs
+        self._arranged = False
+        self._moved = False  # a person moved the lines between panels
+        self.setWindowFlags(Qt.WindowType.Widget)
+        self.setProperty("density", layout.density)
+        # the width of the gaps was asked for before the property was there, and is remembered
+        self.style().unpolish(self)
+        QApplication.sendEvent(self, QEvent(QEvent.Type.StyleChange))
+        self.setAccessibleName(f"{layout.title} layout")
+        gap = theme.size("gap", layout.density)
+        self.setContentsMargins(gap, gap, gap, gap)
+        self.setDockOptions(QMainWindow.DockOption.AllowNestedDocks | QMainWindow.DockOption.AllowTabbedDocks)
+        self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, self.tabPosition(AREA))
+        self._tabs_timer = QTimer(self)
+        self._tabs_timer.setSingleShot(True)
+        self._tabs_timer.timeout.connect(self._show_tabs)
+        self._size_timer = QTimer(self)  # sizes hold only when Qt has laid the docks out
+        self._size_timer.setSingleShot(True)
+        self._size_timer.timeout.connect(self._size)
+
+    # -- opening ----------------------------------------------------------------------------------
+
+    def arrange(self) -> None:
+        """Put the panels where the layout has them at first; what a person moved is put back."""
+        for old in list(self.docks.values()):
+            old.setFloating(False)
+            self.removeDockWidget(old)
+        # All columns first, then what is below in each: the other way round the rows would cross the columns.
+        waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
+        last: Dock | None = None
+        for column in self._layout.columns:
+            rows = [names for names, _ in column.rows if any(n in self._panels for n in names)]
+            rows = [names for names in rows if not set(names) <= self._layout.later]
+            head = self._put(rows[0], None, last) if rows else None
+            if head is not None:
+                waiting.append((head, rows[1:]))
+                last = head
+        for head, rows in waiting:
+            above = head
+            for names in rows:
+                above = self._put(names, above, None) or above
+        self._arranged, self._moved, self._narrow = True, False, False
+        self._size()
+        self._size_timer.start(0)
+        self._adapt()
+
+    def _put(self, names: Sequence[str], above: Dock | None, left: Dock | None) -> Dock | None:
+        """Put panels that share a place below ``above``, or right of ``left``."""
+        first: Dock | None = None
+        for name in names:
+            dock = self._dock(name)
+            if dock is None:
+                continue
+            if first is not None:
+                self.tabifyDockWidget(first, dock)
+            elif above is not None:
+                self.splitDockWidget(above, dock, DOWN)
+            elif left is not None:
+                self.splitDockWidget(left, dock, ACROSS)
+            else:
+                self.addDockWidget(AREA, dock)
+            dock.show()
+            first = first or dock
+        if first is not None:
+            first.raise_()
+        return first
+
+    def _size(self) -> None:
+        """Give everything its size, unless a person moved the lines between the panels."""
+        if self._arranged and not self._moved:
+            fit(self, self._layout, self.docks, self._theme.size("gap", self._layout.density))
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
+            self._moved = self._moved or self.isSeparator(event.position().toPoint())
+        return super().event(event)
+
+    def _dock(self, name: str) -> Dock | None:
+        """The dock of a panel, made when it is the first time; None when there is no such panel."""
+        if name in self.docks:
+            return self.docks[name]
+        description = self._panels.get(name)
+        if description is None:
+            return None
+        dock = made(description, self._context, self._layout.density)
+        dock.dockLocationChanged.connect(self._tabs_soon)
+        dock.topLevelChanged.connect(self._tabs_soon)
+        dock.visibilityChanged.connect(self._tabs_soon)
+        self.docks[name] = dock
+        return dock
+
+    def open(self, name: str) -> Dock | None:
+        """Show a panel, in front and where it was; None when there is no such panel.
+
+        The first time it brings the panel that belongs to it.
+        """
+        brought = self._layout.brings.get(name, "")
+        if brought and name not in self.docks and brought not in self.docks:
+            self.open(brought)
+        dock = self._dock(name)
+        if dock is None:
+            return None
+        if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
+            join(self, self._layout, self.docks, dock)
+            self._size_timer.start(0)
+        dock.try_again()
+        dock.show()
+        dock.raise_()
+        self._tabs_soon()
+        return dock
+
+    def open_names(self) -> tuple[str, ...]:
+        """The panels that are open, also those behind a tab."""
+        return tuple(name for name, dock in self.docks.items() if not dock.isHidden())
+
+    # -- tabs in the titles -----------------------------------------------------------------------
+
+    def _tabs_soon(self, *_what: object) -> None:
+        self._tabs_timer.start(0)
+
+    def _show_tabs(self) -> None:
+        order = list(self.docks.values())
+        for dock in order:
+            together = [
+                other
+                for other in order
+                if other is dock or (other in self.tabifiedDockWidgets(dock) and not other.isHidden())
+            ]
+            if dock.isFloating() or len(together) < 2:
+                dock.title.set_tabs(())
+            else:
+                dock.title.set_tabs(
+                    [(other.panel.title(), other is dock, _raiser(other)) for other in together]
+                )
+
+    # -- narrow windows ---------------------------------------------------------------------------
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._adapt()
+        self._size()
+
+    def _adapt(self) -> None:
+        narrow = self.width() < NARROW_PX
+        if not self._arranged or narrow == self._narrow:
+            return
+        first, second = (self.docks.get(name) for name in self._layout.narrow)
+        if first is None or second is None or first.isFloating() or second.isFloating():
+            return
+        self._narrow = narrow
+        if narrow:
+            self._wide = self.saveState(dock_state.VERSION)
+            self.tabifyDockWidget(first, second)
+            first.raise_()
+        elif second in self.tabifiedDockWidgets(first):
+            self._widen()
+        self._size_timer.start(0)
+        self._tabs_soon()
+
+    def _widen(self) -> None:
+        """Put back what was before the tabs: Qt makes a tab of whatever is split off a tab."""
+        opened = self.open_names()
+        if not self.restoreState(self._wide, dock_state.VERSION):
+            self.arrange()
+        for name, dock in self.docks.items():
+            if name not in opened:
+                dock.close()
+            elif dock.isHidden():
+                self.open(name)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self._floating = [dock for dock in self.docks.values() if dock.isFloating() and dock.isVisible()]
+        for dock in self._floating:
+            dock.hide()
+        super().hideEvent(event)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        for dock in self._floating:
+            dock.show()
+        self._floating = []
+
+    # -- the tick ---------------------------------------------------------------------------------
+
+    def follow(self, now: float) -> None:
+        """Panels that nobody can see rest, others wake; called with every tick, also while it is hidden."""
+        for name, dock in self.docks.items():
+            self._tell_failure(name, dock.follow(now))
+
+    def shows_pictures(self) -> bool:
+        """Whether a person sees a panel of pictures, which want to be refreshed twice as often."""
+        return any(dock.panel.shows_pictures and dock.shown() for dock in self.docks.values())
+
+    def refresh(self, *, pictures: bool = False) -> None:
+        """Let every panel that can be seen show what is new, or only those with ``pictures``."""
+        for name, dock in self.docks.items():
+            if pictures and not dock.panel.shows_pictures:
+                continue
+            self._tell_failure(name, dock.refresh())
+
+    def _tell_failure(self, name: str, sentence: str | None) -> None:
+        if sentence is not None:
+            self.panel_failed.emit(name, sentence)
+
+    def focus_home(self) -> None:
+        """Give the keyboard to the panel that the layout is about: the first that shows."""
+        dock = next((dock for dock in self.docks.values() if not dock.isHidden()), None)
+        if dock is not None:
+            dock.first_stop().setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def focus_panel(self, dock: Dock) -> None:
+        """Bring a panel to the front and give it the keyboard."""
+        dock.show()
+        dock.raise_()
+        if dock.isFloating():
+            dock.activateWindow()
+        dock.first_stop().setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    # -- kept between starts ----------------------------------------------------------------------
+
+    def save(self) -> dict[str, object]:
+        """Where everything is, for `restore`."""
+        return {
+            "open": [
+                name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
+            ],
+            "docks": dock_state.written(self.saveState(dock_state.VERSION)),
+            "wide": dock_state.written(self._wide),
+            "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
+            "narrow": self._narrow,
+            "moved": self._moved,
+        }
+
+    def restore(self, saved: Mapping[str, object]) -> bool:
+        """Put everything where `save` found it; False (and the first arrangement) if it does not fit."""
+        self.arrange()
+        names, panels = saved.get("open"), saved.get("panels")
+        if not isinstance(names, list):
+            return False
+        for name in names:
+            if isinstance(name, str) and name not in self.docks:
+                self.open(name)
+        if not self.restoreState(dock_state.read(saved.get("docks")), dock_state.VERSION):
+            self.arrange()
+            return False
+        self._size_timer.stop()  # a person's sizes, not those of `arrange`
+        self._wide = dock_state.read(saved.get("wide"))
+        self._narrow, self._moved = saved.get("narrow") is True, saved.get("moved") is True
+        for name, dock in self.docks.items():
+            state_of = panels.get(name) if isinstance(panels, Mapping) else None
+            if isinstance(state_of, Mapping):
+                dock.give_back(state_of)
+        self._tabs_soon()
+        return True
+
+    def shut(self) -> None:
+        """The window closes: every panel ends its watches."""
+        for dock in self.docks.values():
+            dock.shut()
+
+
+def _raiser(dock: Dock) -> Callable[[], object]:
+    def bring() -> None:
+        dock.raise_()
+        dock.panel.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    return bring

@@ -1,0 +1,1 @@
+"""Opening, saving and closing behaviours in the window."""

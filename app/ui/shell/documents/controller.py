@@ -1,0 +1,292 @@
+"""Opening, saving, closing and putting back behaviours; nothing is lost, so nothing asks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from app.blocks.fixes.fixes import mend
+from app.core.documents.document import Document
+from app.core.documents.file_format import SUFFIX
+from app.core.documents.journal import Unsaved
+from app.core.documents.versions import Earlier, free_path, keep_earlier, stamp_of
+from app.core.session import Session
+from app.core.storage import deep_json
+from app.core.storage.settings import home
+from app.errors import AppError, DocumentError, SettingsError
+from app.ui.shell.documents.file_words import sentence_of, strange_words
+from app.ui.widgets.file_dialogs import Asks
+
+
+@runtime_checkable
+class Flushes(Protocol):
+    """A panel that may hold an edit which the document has not seen yet."""
+
+    def flush(self, done: Callable[[], None]) -> None:
+        """Call ``done`` once the newest edit is in the document."""
+
+
+class Closed:
+    """A tab that was closed: what to say of it, and how its file was before, if it was written over."""
+
+    def __init__(self, document: Document, words: str = "", earlier: Earlier | None = None) -> None:
+        self.words, self.earlier = words, earlier
+        self.workspace = document.workspace
+        self.stamp = stamp_of(document.path) if document.path is not None else None
+
+
+class Files:
+    """The open behaviours' files. ``say`` is the toast, ``shown`` is called when another one shows."""
+
+    def __init__(
+        self,
+        session: Session,
+        asks: Asks,
+        say: Callable[..., object],
+        shown: Callable[[], object],
+        editor: Callable[[], object],
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        """``editor`` gives the behaviour panel, or None while there is none."""
+        self._session, self._asks, self._say, self._shown = session, asks, say, shown
+        self._documents = session.documents
+        self._editor, self._clock = editor, clock
+
+    def new(self) -> None:
+        """Begin an empty behaviour in a tab of its own."""
+        self.with_newest(lambda: self._show(self._documents.new))
+
+    def ask_open(self) -> None:
+        """Let a person choose a file and open it."""
+        self._session.alerts.cure("strange")
+        path = self._session.document.path
+        self._asks.open(str(path.parent if path is not None else Path.home()), self.open)
+
+    def open(self, path: Path) -> None:
+        """Open a behaviour file in a tab; what is wrong with it becomes an alert."""
+
+        def opened() -> None:
+            self._documents.open(path)
+            self._remember(path)
+
+        self.with_newest(lambda: self._show(opened))
+
+    def open_all(self, paths: Sequence[Path]) -> None:
+        """Open files that came from outside: the command line, a drop, another start.
+
+        Those that are no behaviours become one alert, the others open.
+        """
+        self._session.alerts.cure("strange")
+        strange = [path for path in paths if path.suffix.lower() != SUFFIX]
+        for path in paths:
+            if path not in strange:
+                self.open(path)
+        if strange:
+            self._complain(strange_words(strange), "file.open", "Open another file", alert="strange")
+
+    def example(self, path: Path) -> None:
+        """Open an example as a new behaviour."""
+        self.with_newest(lambda: self._show(lambda: self._documents.example(path)))
+
+    def copy(self, path: Path, name: str) -> None:
+        """Open an earlier version as a new behaviour of that name; no file is written."""
+
+        def opened() -> None:
+            self._documents.copy(path, name)
+            self._say(f"Opened {name} as a copy")
+
+        self.with_newest(lambda: self._show(opened))
+
+    def recover(self, left: Sequence[Unsaved]) -> None:
+        """Put back what a Studio that died left behind, each in its tab."""
+
+        def put_back() -> None:
+            for unsaved in left:
+                self._documents.recover(unsaved)
+
+        self.with_newest(lambda: self._show(put_back))
+
+    def close(self, *documents: Document) -> None:
+        """Close tabs. Their programs are stopped; unsaved work goes to its file, or where Recent finds it.
+
+        What was written over can be put back.
+        """
+
+        def closed() -> None:
+            runs = self._session.runs
+            gone = []
+            for document in documents:
+                if runs.active and runs.document is document:
+                    runs.stop()
+                kept = self._keep(document)
+                if kept is None:
+                    continue
+                self._documents.close(document)
+                gone.append(kept)
+            self._session.tabs.keep()
+            self._tell_closed([each for each in gone if each.words])
+
+        self.with_newest(closed)
+
+    def reopen(self) -> None:
+        """Open the tab that was closed last."""
+
+        def reopened() -> None:
+            if self._documents.reopen() is None:
+                self._say("No tab was closed")
+
+        self.with_newest(lambda: self._show(reopened))
+
+    def show(self, document: Document) -> None:
+        """Show an open behaviour's tab."""
+        self._documents.show(document)
+        self._session.tabs.keep()
+
+    def move(self, document: Document, place: int) -> None:
+        """Put a tab to another place."""
+        self._documents.move(document, place)
+        self._session.tabs.keep()
+
+    def save(self) -> None:
+        """Save, or ask where when the behaviour has no file yet."""
+        if self._session.document.path is None:
+            self.save_as()
+        else:
+            self.with_newest(lambda: self._save(None))
+
+    def save_as(self) -> None:
+        """Ask where, then save there."""
+        document = self._session.document
+        folder = document.path.parent if document.path is not None else Path.home()
+        suggestion = str(folder / f"{document.name}{SUFFIX}")
+        self._asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
+
+    def mend(self, action: str) -> bool:
+        """Change the blocks as a problem's button says; False when it says nothing about blocks."""
+        document = self._session.document
+        if deep_json.deeply(lambda: mend(document.workspace, action)) is None:
+            return False
+
+        def change() -> None:
+            document.mend(action)
+
+        self.with_newest(change)
+        return True
+
+    def with_newest(self, then: Callable[[], None]) -> None:
+        """Do something once the editor's newest edit is in the document."""
+        editor = self._editor()
+        if isinstance(editor, Flushes):
+            editor.flush(then)
+        else:
+            then()
+
+    def _save(self, path: Path | None) -> None:
+        document = self._session.document
+        try:
+            earlier, words = self._kept_before(document, path)
+            document.save(path)
+        except AppError as error:
+            self._cant_save(error)
+            return
+        self._documents.saved(document)
+        self._session.tabs.keep()
+        self._session.alerts.cure("file")
+        if document.path is not None:
+            self._remember(document.path)
+        if earlier is None:
+            self._say(f"Saved {document.name}")
+            return
+        then = f"{document.name}, before"
+        self._say(f"Saved {document.name}. {words}", "Open that", lambda: self.copy(earlier.copy, then))
+
+    def _kept_before(self, document: Document, path: Path | None) -> tuple[Earlier | None, str]:
+        """What of others the file says that is written over, and the words for it.
+
+        Raises DocumentError when that can't be kept. What Studio itself wrote there before is kept too, if it
+        can be, without words.
+        """
+        own = document.path
+        if path is not None and (own is None or path.resolve() != own.resolve()):
+            return keep_earlier(path), "The file that was there is kept."
+        if own is not None and document.changed_outside:
+            return keep_earlier(own), "Another program had changed the file; what it wrote is kept."
+        if own is not None and document.dirty:
+            try:
+                keep_earlier(own)
+            except DocumentError as error:
+                self._session.console.add("warn", "studio", f"No earlier version: {sentence_of(error)}")
+        return None, ""
+
+    def _show(self, act: Callable[[], object]) -> None:
+        """Show another tab."""
+        try:
+            act()
+        except AppError as error:
+            self._complain(sentence_of(error), "file.open", "Open another file")
+            return
+        self._session.tabs.keep()
+        self._session.alerts.cure("file")
+        self._shown()
+
+    def _keep(self, document: Document) -> Closed | None:
+        """Save what is not saved yet; None, and an alert, when that can't be done."""
+        if not document.dirty:
+            return Closed(document)
+        name, path = document.name, document.path
+        try:
+            earlier = keep_earlier(path) if path is not None else None
+            if path is None:
+                document.save(free_path(home() / "kept", name, self._clock()))
+            else:
+                document.save()
+        except AppError as error:
+            self._documents.show(document)
+            self._cant_save(error)
+            return None
+        if document.path is not None:
+            self._remember(document.path, name)
+        return Closed(document, f"Saved {name}" if path is not None else f"Kept {name} in Recent", earlier)
+
+    def _tell_closed(self, closed: Sequence[Closed]) -> None:
+        """Say which unsaved work was saved, and offer to take it back."""
+        if not closed:
+            return
+        words = closed[0].words if len(closed) == 1 else f"Saved {len(closed)} behaviours"
+        back = [each for each in closed if each.earlier is not None]
+        if back:
+            self._say(words, "Undo", lambda: self._show(lambda: self._take_back(back)))
+        else:
+            self._say(words)
+
+    def _take_back(self, closed: Sequence[Closed]) -> None:
+        """Let the files say what they said before, and open the tabs again, with their work unsaved."""
+        for each in closed:
+            if each.earlier is None:
+                continue
+            if stamp_of(each.earlier.path) != each.stamp:
+                name = f"{each.earlier.path.stem}, before"
+                self._documents.copy(each.earlier.copy, name)  # somebody wrote the file meanwhile: it stays
+                continue
+            there = self._documents.with_path(each.earlier.path)  # opened again before "Undo" was pressed
+            each.earlier.put_back()
+            if there is not None:
+                there.file_went_back()
+            else:
+                self._documents.open(each.earlier.path).edited(each.workspace)
+
+    def _remember(self, path: Path, name: str | None = None) -> None:
+        try:
+            self._session.settings.add_recent(path, name or self._session.document.name)
+        except SettingsError as error:
+            self._session.console.add("warn", "studio", str(error))
+
+    def _cant_save(self, error: Exception) -> None:
+        self._complain(sentence_of(error), "file.save_as", "Save somewhere else")
+
+    def _complain(self, sentence: str, action: str, button: str, alert: str = "file") -> None:
+        what, _, then = sentence.partition("; ")
+        detail = f"{then[:1].upper()}{then[1:]}." if then else ""
+        self._session.alerts.put(alert, "error", f"{what}.", detail, button=button, action=action)

@@ -1,0 +1,154 @@
+"""The focus ring: 2 px wide, 2 px outside the control, only when the keyboard led there.
+
+Style sheets cannot move an outline outwards, so one small overlay follows the widget that has the focus.
+"""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
+from PySide6.QtGui import QGuiApplication, QPainter, QPaintEvent, QWindow
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QAbstractScrollArea,
+    QApplication,
+    QDockWidget,
+    QMainWindow,
+    QMenu,
+    QMenuBar,
+    QWidget,
+)
+from shiboken6 import isValid
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+_MOVES = frozenset(
+    {QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide, QEvent.Type.ParentChange}
+)
+_PRESSES = frozenset({QEvent.Type.KeyPress, QEvent.Type.MouseButtonPress, QEvent.Type.TouchBegin})
+
+
+class FocusRing(QWidget):
+    """One ring for a window and the panels that float over it; ``focusRadius`` tells a widget's corners.
+
+    Whether the keyboard led somewhere is told by the newest key or mouse button: Qt's reason of a focus says
+    "Tab" too when a widget with the focus is hidden and the next one gets it.
+
+    Widgets with the property ``ownFocus`` (and tables and trees) draw their focus themselves; ``focusInset``
+    is the margin between a widget's edge and what it paints.
+    """
+
+    def __init__(self, theme: Theme, window: QWidget) -> None:
+        super().__init__(window)
+        self._theme = theme
+        self._home = self._window = window
+        self._by_mouse = False
+        self._target: QWidget | None = None
+        self._chain: list[QWidget] = []
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setAttribute(Qt.WidgetAttribute.WA_NoSystemBackground)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.hide()
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._focus_changed)
+            application.focusWindowChanged.connect(self._window_changed)
+        self._window_changed(window.windowHandle())
+        window.installEventFilter(self)  # its handle is made when it is first shown
+
+    @property
+    def target(self) -> QWidget | None:
+        """The widget that is ringed now."""
+        return self._target
+
+    def _window_changed(self, window: QWindow | None) -> None:
+        """Listen to the keys and buttons of every window of ours that a person uses."""
+        if window is not None:
+            window.removeEventFilter(self)
+            window.installEventFilter(self)
+
+    def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
+        pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
+        if pressed or self._by_mouse or new is None or not self._rings(new):
+            self._follow(None)
+            return
+        if new.window() is not self._window:
+            self._window = new.window()
+            self.setParent(self._window)
+        self._follow(new)
+
+    def _rings(self, widget: QWidget) -> bool:
+        window = widget.window()
+        ours = window is self._home or (isinstance(window, QDockWidget) and self._home.isAncestorOf(window))
+        if not ours or widget is window or widget.property("ownFocus"):
+            return False
+        parent = widget.parentWidget()
+        if parent is not None and parent.inherits("QWebEngineView"):  # the page shows its own focus
+            return False
+        own = QAbstractItemView | QAbstractScrollArea | QMainWindow | QMenu | QMenuBar
+        return not isinstance(widget, own)
+
+    def _follow(self, target: QWidget | None) -> None:
+        for widget in self._chain:
+            if isValid(widget):  # the focus also moves on because a widget is being deleted
+                widget.removeEventFilter(self)
+        self._chain = []
+        self._target = target
+        if target is None:
+            self.hide()
+            return
+        step: QWidget | None = target
+        while step is not None and step is not self._window:
+            step.installEventFilter(self)
+            self._chain.append(step)
+            step = step.parentWidget()
+        self._place()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind = event.type()
+        if isinstance(watched, QWindow):
+            if kind in _PRESSES:
+                self._by_mouse = kind != QEvent.Type.KeyPress
+                if self._by_mouse:
+                    self._follow(None)
+        elif kind == QEvent.Type.Show and watched is self._home:
+            self._window_changed(self._home.windowHandle())
+        elif kind in _MOVES:
+            self._place()
+        return super().eventFilter(watched, event)
+
+    def _place(self) -> None:
+        target = self._target
+        if target is None or not isValid(target) or not target.isVisible():
+            self.hide()
+            return
+        inset = int(target.property("focusInset") or 0)
+        out = self._theme.size("focusRing", "offset") + self._theme.size("focusRing", "width") - inset
+        rect = QRect(target.mapTo(self._window, QPoint(0, 0)), target.size()).adjusted(-out, -out, out, out)
+        shown = rect
+        for widget in self._chain[1:]:
+            scroller = widget.parentWidget()
+            if isinstance(scroller, QAbstractScrollArea) and scroller.viewport() is widget:
+                view = QRect(widget.mapTo(self._window, QPoint(0, 0)), widget.size())
+                shown = shown.intersected(view)
+        self.setGeometry(rect)
+        if shown.isEmpty():
+            self.hide()
+            return
+        if shown == rect:
+            self.clearMask()
+        else:
+            self.setMask(shown.translated(-rect.topLeft()))
+        self.show()
+        self.raise_()
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self._target is None or not isValid(self._target):
+            return
+        width = self._theme.size("focusRing", "width")
+        radius = int(self._target.property("focusRadius") or self._theme.radius("small"))
+        outside = radius + width + self._theme.size("focusRing", "offset")
+        painter = QPainter(self)
+        paint.box(painter, QRectF(self.rect()), outside, None, self._theme.colour("focus"), width)
+        painter.end()

@@ -1,0 +1,58 @@
+"""Which panel has the keyboard, and how it goes from one to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QApplication, QWidget
+
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.docking.workbench import Workbench
+
+
+class PanelFocus(QObject):
+    """Gives the keyboard to panels of the workbench that shows; marks the title of who has it."""
+
+    def __init__(self, bench: Callable[[], Workbench | None], parent: QObject) -> None:
+        """``bench`` gives the workbench that shows, None when there is none."""
+        super().__init__(parent)
+        self._bench = bench
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.focusChanged.connect(self._changed)
+
+    def next(self, step: int) -> None:
+        """Give the keyboard to the next panel that can be seen, or the one before."""
+        bench = self._bench()
+        docks = [dock for dock in bench.docks.values() if dock.shown()] if bench is not None else []
+        if bench is None or not docks:
+            return
+        current = self.dock()
+        place = docks.index(current) if current in docks else (-1 if step > 0 else 0)
+        bench.focus_panel(docks[(place + step) % len(docks)])
+
+    def number(self, number: int) -> None:
+        """Give the keyboard to the n-th open panel, from 1."""
+        bench = self._bench()
+        names = bench.open_names() if bench is not None else ()
+        if bench is not None and 0 < number <= len(names):
+            bench.focus_panel(bench.docks[names[number - 1]])
+
+    def dock(self) -> Dock | None:
+        """The panel that has the keyboard."""
+        focus, bench = QApplication.focusWidget(), self._bench()
+        if bench is None or focus is None:
+            return None
+        return next((dock for dock in bench.docks.values() if _has(dock, focus)), None)
+
+    def _changed(self, _old: QWidget | None, new: QWidget | None) -> None:
+        bench = self._bench()
+        if new is None or bench is None:
+            return
+        for dock in bench.docks.values():
+            dock.title.set_active(_has(dock, new))
+
+
+def _has(dock: Dock, widget: QWidget) -> bool:
+    return dock is widget or dock.isAncestorOf(widget)

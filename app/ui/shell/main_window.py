@@ -1,0 +1,350 @@
+"""The window: bars, banner, the start page and one workbench for each layout, refreshed 30 times a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+from PySide6.QtCore import QSize, QTimer, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+
+from app.core.faults import survived
+from app.core.robots.robot_link import NOT_STOPPED, STOPPING
+from app.core.session import Session
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.shell.bars.app_bar import AppBar
+from app.ui.shell.bars.banner import BannerPlace
+from app.ui.shell.bars.banner_place import BannerRoom
+from app.ui.shell.bars.robots_chip import robots_chip
+from app.ui.shell.bars.run_bar import RunBar, ToolBar
+from app.ui.shell.bars.status_bar import Facts, StatusBar
+from app.ui.shell.bars.toast import Toast
+from app.ui.shell.coming import Coming
+from app.ui.shell.dialogs.motion_permission import MoveQuestion
+from app.ui.shell.docking.dock import Dock, fitting
+from app.ui.shell.docking.layouts import LAYOUTS, layout_named
+from app.ui.shell.docking.saved_layouts import Arrangements
+from app.ui.shell.docking.workbench import Workbench
+from app.ui.shell.documents.flush import Leaving
+from app.ui.shell.enter_key import EnterKey
+from app.ui.shell.focus_ring import FocusRing
+from app.ui.shell.keyboard import PanelFocus
+from app.ui.shell.start_page.page import Example, StartPage
+from app.ui.shell.window_state import WindowState
+from app.ui.startup.garbage import Settling
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button
+
+TICK_MS = 33
+SMALLEST = QSize(1100, 700)
+FIRST_SIZE = QSize(1440, 900)
+START = "start"
+FACTS_EVERY = 8  # ticks
+
+
+class MainWindow(QMainWindow):
+    """One session in one window. `run` is set by the commands (`app.ui.shell.commands.commands`)."""
+
+    bench_made = Signal()
+
+    def __init__(
+        self,
+        session: Session,
+        theme: Theme,
+        panels: Mapping[str, Panel],
+        examples: Sequence[Example] = (),
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``clock`` gives monotonic seconds: how long a panel has not been seen."""
+        super().__init__()
+        self._clock = clock
+        self.session, self.theme, self.panels = session, theme, panels
+        self.state = WindowState(session.settings, self.complain)
+        self.arrangements = Arrangements(self.state, self.complain)
+        self.layouts = LAYOUTS
+        self.run: Callable[[str], object] = lambda _name: None
+        self.on_shut: Callable[[], object] = lambda: None
+        self.showing = ""
+        self.benches: dict[str, Workbench] = {}
+        self._facts = Facts(session)
+        self._alerts_seen = -1
+        self._ticks = self._halves = 0
+        self._twice = False  # the timer runs twice as often as the tick
+        self._shut = False
+        self._leaving = Leaving(self, self.editor, self.close)
+        self._build(examples)
+        self.context = PanelContext(session, theme, self.open_topic, self.toast.say, self._run)
+        self.ring = FocusRing(theme, self)
+        self.enter = EnterKey(self)
+        self.timer = QTimer(self)
+        self.timer.setInterval(TICK_MS)
+        self.timer.timeout.connect(self._half_tick)
+        self.settling = Settling(self)
+        self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
+        self.show_start()
+
+    def _build(self, examples: Sequence[Example]) -> None:
+        theme = self.theme
+        self.setWindowTitle("NEP Studio")
+        self.setMinimumSize(SMALLEST)
+        self.resize(FIRST_SIZE)
+        self.bar = AppBar(theme, LAYOUTS)
+        self.setMenuWidget(self.bar)
+        self.run_bar, self.tool_bar = RunBar(theme), ToolBar(theme)
+        self.use_robot = Button(theme, "Use the virtual robot", "bot", size="small")
+        self.use_robot.let_shrink()
+        self.tool_bar.add_tool(self.use_robot)
+        self.banner = BannerPlace(theme)
+        self.start = StartPage(theme, examples)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.start)
+        self.status = StatusBar(theme)
+        self.room = BannerRoom(self.banner, self.pages)
+        middle = QWidget()
+        column = QVBoxLayout(middle)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget in (self.run_bar, self.tool_bar, self.room):
+            column.addWidget(widget)
+        column.addWidget(self.pages, 1)
+        column.addWidget(self.status)
+        self.banner.setParent(middle)  # over the pages, which it does not move
+        self.setCentralWidget(middle)
+        self.toast = Toast(theme, self)
+        self.question = MoveQuestion(theme, self, self.session.fleet.moving, self.complain)
+
+    # -- what shows -------------------------------------------------------------------------------
+
+    def show_start(self) -> None:
+        """Show the start page."""
+        self.showing = START
+        self.pages.setCurrentWidget(self.start)
+        self.show_recent()
+        self._show_bars(None)
+        self.start.focus_first()
+
+    def show_recent(self) -> None:
+        """Show on the start page which files were opened lately."""
+        self.start.show_recent(self.session.settings.recent)
+
+    def complain(self, sentence: str) -> None:
+        """Say in the Console what went wrong and needs nobody's hand."""
+        self.session.console.add("warn", "studio", sentence)
+
+    def show_layout(self, name: str) -> Workbench:
+        """Show a layout; it is made, as it was left, when it is the first time."""
+        layout = layout_named(name)
+        if layout.name not in self.benches:
+            bench = Workbench(self.theme, layout, self.panels, self.context)
+            bench.panel_failed.connect(self._panel_failed)
+            self.benches[layout.name] = bench
+            self.pages.addWidget(bench)
+            bench.resize(self.pages.size())
+            self.arrangements.bring_back(bench, layout.name)
+            self.bench_made.emit()
+        bench = self.benches[layout.name]
+        focus = QApplication.focusWidget()
+        inside = focus is None or self.pages.isAncestorOf(focus)
+        self.showing = layout.name
+        self.pages.setCurrentWidget(bench)
+        if inside:  # not from the switch or a menu, which people go on using
+            bench.focus_home()
+        self._show_bars(layout.name)
+        self.state.keep_layout(layout.name)
+        return bench
+
+    def expect(self, layout: str) -> None:
+        """Show the bars of a layout, and in its place that it is made in a moment."""
+        self.showing = layout
+        coming = Coming(layout)
+        self.pages.addWidget(coming)
+        self.pages.setCurrentWidget(coming)
+        coming.setFocus()
+        self._show_bars(layout)
+        self.bench_made.connect(coming.deleteLater)
+
+    def _show_bars(self, layout: str | None) -> None:
+        self.bar.show_layout(layout)
+        self.run_bar.setVisible(layout == "behaviour")
+        self.tool_bar.setVisible(layout == "developer")
+        self.status.setVisible(layout is not None)
+        self._show_session()
+        self._show_facts()
+
+    @property
+    def bench(self) -> Workbench | None:
+        """The workbench that shows; None on the start page."""
+        return self.benches.get(self.showing)
+
+    def editor(self) -> object:
+        """The panel of behaviours; None until it was first shown."""
+        bench = self.benches.get("behaviour")
+        dock = bench.docks.get("behaviour") if bench is not None else None
+        return dock.panel if dock is not None else None
+
+    def open_panel(self, name: str) -> Dock | None:
+        """Show a panel in this layout; "behaviour" in its own layout only."""
+        wanted = "behaviour" if name == "behaviour" or self.bench is None else self.showing
+        return self.show_layout(wanted).open(name)
+
+    def open_topic(self, topic: str) -> None:
+        """Show a topic in the open panel that fits it best, else in the inspector."""
+        known = self.session.topics.get(topic)
+        kinds = {known.codec, known.msg_type} if known is not None else set()
+        bench = self.bench if self.bench is not None else self.show_layout("developer")
+        dock = fitting(bench.docks, bench.open_names(), kinds)
+        if dock is None:
+            bench = self.show_layout("developer")
+            dock = fitting(bench.docks, bench.open_names(), kinds) or bench.open("inspector")
+        if dock is not None:
+            dock.show()
+            dock.raise_()
+            dock.panel.show_topic(topic)
+
+    def _run(self, name: str) -> None:
+        self.run(name)
+
+    # -- the tick ---------------------------------------------------------------------------------
+
+    def _half_tick(self) -> None:
+        """60 times a second for pictures: at 30 every tenth or so would come twice within one and be lost.
+
+        While nobody sees a picture, the timer has half the pace, and each of its turns is a tick.
+        """
+        self._halves += 1
+        if self._halves % 2 or not self._twice:
+            self.tick()
+        elif self.bench is not None:
+            self.bench.refresh(pictures=True)
+
+    def _follow_panels(self) -> None:
+        """Let panels that nobody can see rest, and the timer run no faster than they need."""
+        now = self._clock()
+        for bench in self.benches.values():
+            bench.follow(now)
+        twice = self.bench is not None and self.bench.shows_pictures()
+        if twice != self._twice:
+            self._twice, self._halves = twice, 1
+            self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
+
+    def tick(self) -> None:
+        """Take what is new, and let everything that can be seen show it."""
+        began = time.perf_counter()
+        self._ticks += 1
+        surviving = self.session.surviving
+        with surviving("take over what is new"):
+            self.session.tick()
+        with surviving("show how it is"):
+            self._show_session()
+        with surviving("ask a question"):
+            self.question.refresh()
+        with surviving("make room for what is said"):
+            self.room.follow()
+        with surviving("let panels rest"):
+            self._follow_panels()
+        with surviving("show the panels"):
+            if self.bench is not None:
+                self.bench.refresh()
+        spent = (time.perf_counter() - began) * 1000
+        self._facts.window_ms += 0.1 * (spent - self._facts.window_ms)
+
+    def _show_session(self) -> None:
+        view = self.session.runs.view()
+        words, status = robots_chip(self.session)
+        self.bar.show_robots(words, status)
+        if self.showing == START:
+            self.bar.stop.show_state(view.stop_word, ring=view.state == "stopping", filled=self._may_move())
+            there = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
+            self.start.show_robot(words if there else "", status)
+        elif self.showing == "behaviour":
+            self.run_bar.show_view(view)
+        else:
+            self.tool_bar.show_view(view)
+            self.use_robot.setVisible(not self.session.fleet.links)
+        if self._ticks % FACTS_EVERY == 0:
+            with self.session.surviving("show the figures"):
+                self._show_facts()
+        with self.session.surviving("show the alerts"):
+            self._show_alerts()
+
+    def _show_facts(self) -> None:
+        """Figures that nobody can read 30 times a second."""
+        facts, document = self._facts, self.session.document
+        self.status.link = facts.reach()[1]
+        if self.showing == "behaviour":
+            self.status.show_facts((facts.health(), facts.saved()), (facts.topics(), facts.reach_quietly()))
+        elif self.showing == "developer":
+            left = (facts.master(), facts.reach(), facts.traffic(), facts.lost())
+            self.status.show_facts(left, (facts.shown(), facts.window()))
+        title = "NEP Studio" if self.showing == START else f"{document.name} - NEP Studio"
+        if title != self.windowTitle():
+            self.setWindowTitle(title)
+
+    def _moves(self) -> bool:
+        moves = {"busy", STOPPING}
+        return self.session.runs.active or any(link.state in moves for link in self.session.fleet.links)
+
+    def _may_move(self) -> bool:
+        """Whether a program, or a robot that did not stop, may move something now."""
+        is_open = self.session.runs.view().stop_word != "Stop"
+        return is_open or self._moves() or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
+
+    def _show_alerts(self) -> None:
+        alerts = self.session.alerts
+        if alerts.revision == self._alerts_seen:
+            return
+        self._alerts_seen = alerts.revision
+        shown = [a for a in alerts.active if a.severity != "info" and not alerts.dismissed(a.id)]
+        self.banner.show_alerts(shown)
+
+    def _panel_failed(self, name: str, sentence: str) -> None:
+        self.session.console.add("error", f"panel {name}", sentence)
+
+    # -- beginning and end ------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Start the session and the tick."""
+        self.session.start()
+        self.timer.start()
+        self.settling.start()
+        self.bench_made.connect(self.settling.start)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        if not self._shut:
+            if self._moves():
+                self.session.runs.stop()  # told now, answered while the session closes
+            if not self._leaving.ready():
+                event.ignore()
+                return
+            if not self._may_lose_work():
+                self._leaving.stay()
+                event.ignore()
+                return
+            self._shut = True
+            self.timer.stop()
+            with survived("keep how the window looks"):
+                self._keep()
+            self.hide()
+            for bench in self.benches.values():
+                bench.shut()
+            self.session.close()
+            self.on_shut()
+        super().closeEvent(event)
+
+    def _may_lose_work(self) -> bool:
+        """Whether no unsaved work is lost with the window, or a person who was told closes it anyway."""
+        unkept = self.session.documents.unkept()
+        if not unkept or self.session.gives_up(unkept[0]):
+            return True
+        self.show_layout("behaviour")
+        self.session.documents.show(unkept[0])
+        self.toast.say("Studio stays open: unsaved work would be lost")
+        return False
+
+    def _keep(self) -> None:
+        self.state.keep_place(self)
+        for name, bench in self.benches.items():
+            self.arrangements.keep(bench, name)
+        self.state.keep_theme(self.theme)

@@ -1,0 +1,1 @@
+"""The start page: its cards, pictures and previews."""

@@ -1,0 +1,114 @@
+"""The pictures of the start page, all painted: the robot in its room, an empty page with a first block."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPainterPath, QPaintEvent, QPen, QPixmap, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
+from app.ui.shell.start_page.preview import block_path, paint_grid
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+ART_HEIGHT = 158
+ROOM_HEIGHT = 296  # the whole room is painted this high; the card shows its upper part
+
+
+class Art(QWidget):
+    """The upper part of a card, cut to the card's round corners; subclasses paint `picture`."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:
+        return QSize(300, ART_HEIGHT)
+
+    def picture(self, painter: QPainter, area: QRectF) -> None:
+        """Paint into ``area``."""
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        area = QRectF(self.rect())
+        painter.setClipPath(upper_corners(area, self._theme.radius("card") - 1))
+        self.picture(painter, area)
+        paint.hairline(painter, area, Qt.Edge.BottomEdge, self._theme.colour("border"))
+        painter.end()
+
+
+def upper_corners(area: QRectF, radius: float) -> QPainterPath:
+    """A box whose upper corners are round."""
+    path = QPainterPath()
+    path.addRoundedRect(area.adjusted(0, 0, 0, 2 * radius), radius, radius)
+    box = QPainterPath()
+    box.addRect(area)
+    return path.intersected(box)
+
+
+class RobotArt(Art):
+    """The virtual robot as it waits, in the drawing of the Robot panel."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme)
+        self._drawing = RobotDrawing(theme.font("bodyLarge"))
+        self._made: tuple[tuple[object, ...], QPixmap] | None = None
+        self.setAccessibleName("A small white robot in a room, waving")
+
+    def picture(self, painter: QPainter, area: QRectF) -> None:
+        room = QRectF(area.left(), area.top() - 55, area.width(), ROOM_HEIGHT)
+        painter.drawPixmap(area.topLeft(), self._still(room, area))
+
+    def _still(self, room: QRectF, area: QRectF) -> QPixmap:
+        """The drawing, made once for each size and theme, on a canvas of its own: it sets its own clip."""
+        ratio = self.devicePixelRatioF()
+        key = (area.width(), area.height(), ratio, self._theme.dark)
+        if self._made is None or self._made[0] != key:
+            pixmap = QPixmap((area.size() * ratio).toSize())
+            pixmap.setDevicePixelRatio(ratio)
+            pixmap.fill(Qt.GlobalColor.transparent)
+            inner = QPainter(pixmap)
+            inner.setRenderHint(QPainter.RenderHint.Antialiasing)
+            self._drawing.paint(inner, room.translated(-area.topLeft()), PREVIEW, dark=self._theme.dark)
+            inner.end()
+            self._made = (key, pixmap)
+        return self._made[1]
+
+
+class EmptyPageArt(Art):
+    """The block "when started" on an empty page, a place to drop the next block, and the mouse."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme)
+        self.setAccessibleName("An empty page with the block “when started”")
+
+    def picture(self, painter: QPainter, area: QRectF) -> None:
+        theme = self._theme
+        paint_grid(painter, area, theme)
+        left, top = area.left() + max(24.0, area.width() / 2 - 108), area.top() + 41
+        font = theme.font("body")
+        font.setWeight(font.Weight.Bold)
+        block = QRectF(left, top, max(138.0, paint.width_of(font, "when started") + 32), 34)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(theme.block_colour("events"))
+        painter.drawPath(block_path(block, radius=5, notch=12))
+        paint.words(painter, block.adjusted(14, 0, 0, 0), "when started", font, theme.block_text("events"))
+        quiet = theme.font("body")
+        quiet.setWeight(quiet.Weight.Medium)
+        wide = max(200.0, paint.width_of(quiet, "drop a block here") + 40)
+        place = QRectF(left, block.bottom(), wide, 34)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(theme.colour("controlBorder"), 1.25, Qt.PenStyle.DashLine))
+        painter.drawPath(block_path(place, radius=5, notch=12))
+        colour = theme.colour("textSecondary")
+        paint.words(painter, place, "drop a block here", quiet, colour, paint.CENTRE)
+        self._mouse(painter, QPointF(place.right() - 18, place.bottom() + 8))
+
+    def _mouse(self, painter: QPainter, tip: QPointF) -> None:
+        shape = ((0, 0), (0, 17), (4, 13.3), (6.8, 19.5), (9.6, 18.2), (6.9, 12.2), (12.3, 12))
+        arrow = QPolygonF([QPointF(tip.x() + x, tip.y() + y) for x, y in shape])
+        painter.setPen(QPen(self._theme.colour("panel"), 1.2))
+        painter.setBrush(self._theme.colour("text"))
+        painter.drawPolygon(arrow)

@@ -1,0 +1,209 @@
+"""Parts of the start page: a card with a picture, an example, a recent file, the developers' line."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from app.core.storage.settings import RecentFile
+from app.ui.shell.start_page.art import Art, upper_corners
+from app.ui.shell.start_page.preview import Row, paint_rows
+from app.ui.text import plain
+from app.ui.text.dates import day_words
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Card, Chip, Elided, label, paint
+from app.ui.widgets.buttons import LinkButton
+
+EXAMPLE_ART = 112
+RECENT_HEIGHT = 48
+TILE = 30
+
+
+class CardTitle(QLabel):
+    """As wide as its words, so that a chip stands beside them; wraps where there is too little room."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setProperty("kind", "heading")
+        self.setWordWrap(True)
+
+    def sizeHint(self) -> QSize:
+        wide = self.fontMetrics().horizontalAdvance(self.text()) + 2
+        return QSize(wide, self.heightForWidth(wide))
+
+
+class BigCard(Card):
+    """A picture, a heading with perhaps a chip, one or two lines, and buttons."""
+
+    def __init__(self, theme: Theme, art: Art, title: str, text: str, buttons: list[Button]) -> None:
+        super().__init__(theme)
+        self.chip = Chip(theme, "", "ok")
+        self.text: QLabel = label(text, "bodyLarge", role="textSecondary", wrap=True)
+        self.text.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 1, 1, 1)
+        column.setSpacing(0)
+        column.addWidget(art)
+        body = QVBoxLayout()
+        body.setContentsMargins(20, 16, 20, 20)
+        body.setSpacing(0)
+        head = QHBoxLayout()
+        head.setSpacing(10)
+        head.addWidget(CardTitle(title))
+        head.addWidget(self.chip)
+        head.addStretch(1)
+        body.addLayout(head)
+        body.addSpacing(4)
+        body.addWidget(self.text, 1)
+        body.addSpacing(14)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        for button in buttons:
+            row.addWidget(button)
+        row.addStretch(1)
+        body.addLayout(row)
+        column.addLayout(body, 1)
+
+
+class ExampleCard(QAbstractButton):
+    """An example: its blocks from afar, its name, and what it does. The whole card is the button."""
+
+    def __init__(self, theme: Theme, path: Path, name: str, text: str, rows: tuple[Row, ...]) -> None:
+        super().__init__()
+        self._theme, self._text, self._rows = theme, text, rows
+        self.path = path
+        self.setText(name)
+        self.setAccessibleName(f"Open the example {name}. {text}")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setProperty("focusRadius", theme.radius("card"))
+        theme.changed.connect(self.updateGeometry)
+
+    def _fonts(self) -> tuple[float, float]:
+        title, text = self._theme.font("button"), self._theme.font("body")
+        return paint.height_of(title), paint.height_of(text)
+
+    def sizeHint(self) -> QSize:
+        title, text = self._fonts()
+        return QSize(240, EXAMPLE_ART + round(title + text) + 33)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        edge = "borderStrong" if self.underMouse() or self.isDown() else "border"
+        paint.box(painter, rect, theme.radius("card"), theme.colour("panel"), theme.colour(edge))
+        art = QRectF(1, 1, rect.width() - 2, EXAMPLE_ART)
+        painter.save()
+        painter.setClipPath(upper_corners(art, theme.radius("card") - 1))
+        painter.fillRect(art, theme.colour("workspace"))
+        paint_rows(painter, art.adjusted(19, 16, -19, 0), theme, self._rows)
+        painter.restore()
+        paint.hairline(painter, art, Qt.Edge.BottomEdge, theme.colour("border"))
+        title, text = self._fonts()
+        line = QRectF(17, art.bottom() + 14, rect.width() - 34, title)
+        paint.words(painter, line, self.text(), theme.font("button"), theme.colour("text"))
+        line = QRectF(17, line.bottom() + 2, line.width(), text)
+        paint.words(painter, line, self._text, theme.font("body"), theme.colour("textSecondary"))
+        painter.end()
+
+
+class RecentRow(QAbstractButton):
+    """A file opened lately: its tile, its name, and when."""
+
+    def __init__(self, theme: Theme, recent: RecentFile, now: dt.datetime) -> None:
+        super().__init__()
+        self._theme = theme
+        self.path = recent.path
+        then = dt.datetime.fromtimestamp(recent.opened_s, tz=now.tzinfo)
+        self._when = day_words(then, now)
+        self.setText(recent.name)
+        self.setAccessibleName(f"Open {recent.name}, {self._when}")
+        self.setToolTip(plain.tip(str(recent.path)))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setProperty("focusRadius", theme.radius("panel"))
+
+    def sizeHint(self) -> QSize:
+        return QSize(240, max(RECENT_HEIGHT, round(paint.height_of(self._theme.font("label"))) + 20))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        if self.underMouse() or self.isDown():
+            paint.box(painter, rect, theme.radius("panel"), theme.colour("hover"))
+        tile = QRectF(12, rect.center().y() - TILE / 2, TILE, TILE)
+        paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
+        icon = tile.adjusted(7, 7, -7, -7)
+        paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
+        small = theme.font("body")
+        when = paint.width_of(small, self._when) + 12
+        area = rect.adjusted(54, 0, -when - 8, 0)
+        paint.words(painter, area, self.text(), theme.font("label"), theme.colour("text"))
+        area = rect.adjusted(54, 0, -12, 0)
+        paint.words(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
+        painter.end()
+
+
+class _Key(QWidget):
+    """A command to type, on a key's surface."""
+
+    def __init__(self, theme: Theme, text: str) -> None:
+        super().__init__()
+        self._theme, self._text = theme, text
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(text)
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("code")
+        return QSize(round(paint.width_of(font, self._text)) + 12, round(paint.height_of(font)) + 4)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        theme = self._theme
+        paint.box(painter, QRectF(self.rect()), theme.radius("key"), theme.colour("sunken"))
+        ink = theme.colour("textSecondary")
+        paint.words(painter, QRectF(self.rect()), self._text, theme.font("code"), ink, paint.CENTRE)
+        painter.end()
+
+
+class DevelopersLine(QWidget):
+    """The last line: where people who write programs begin."""
+
+    developer_pressed = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setMinimumHeight(44)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        link = LinkButton(theme, "Open the Developer layout")
+        link.clicked.connect(self.developer_pressed)
+        row = QHBoxLayout(self)
+        row.setSpacing(6)
+        row.addStretch(1)
+        icon = QLabel()
+        icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14))
+        theme.changed.connect(lambda: icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14)))
+        row.addWidget(icon)
+        question = Elided("body", "textSecondary")
+        question.setText("Do you write programs?")
+        row.addWidget(question)
+        row.addWidget(link)
+        row.addWidget(label("or type", "body", role="textSecondary"))
+        row.addWidget(_Key(theme, "nep topic list"))
+        row.addStretch(1)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, self._theme.colour("border"))
+        painter.end()

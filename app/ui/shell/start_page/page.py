@@ -1,0 +1,245 @@
+"""The start page: use a robot, make a behaviour, open an example or a recent file."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QSpacerItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.core.storage.atomic_file import read_whole
+from app.core.storage.settings import RecentFile
+from app.ui.shell.start_page.art import EmptyPageArt, RobotArt
+from app.ui.shell.start_page.cards import BigCard, DevelopersLine, ExampleCard, RecentRow
+from app.ui.shell.start_page.preview import Row, rows
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, label, paint
+from app.ui.widgets.buttons import LinkButton
+
+WIDTH = 1080
+BANNER_ROOM = 40
+"""More room above the question, where the page is high enough: a banner that may not move the page covers no
+words there."""
+EXAMPLES_SHOWN = 4
+IN_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+RECENT_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class Example:
+    """A behaviour that Studio ships: its file, its name, what it does, and its first blocks."""
+
+    path: Path
+    name: str
+    text: str
+    rows: tuple[Row, ...]
+
+
+def read_examples(folder: Path) -> tuple[Example, ...]:
+    """The examples in a folder by file name; files that are no behaviours are left out."""
+    found = []
+    for path in sorted(folder.glob("*.nepb")) if folder.is_dir() else []:
+        try:
+            data = json.loads(read_whole(path))
+            workspace = data["workspace"]
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+        if isinstance(workspace, dict):
+            text = str(data.get("description", ""))
+            found.append(Example(path, str(data.get("name", path.stem)), text, rows(workspace)))
+    return tuple(found)
+
+
+def all_words(count: int) -> str:
+    """The words of the link that shows every example."""
+    return f"All {IN_WORDS[count] if count < len(IN_WORDS) else count} examples"
+
+
+class StartPage(QWidget):
+    """The page that asks what you would like to do."""
+
+    virtual_robot = Signal()
+    new_behaviour = Signal()
+    example_chosen = Signal(object)
+    file_chosen = Signal(object)
+    open_pressed = Signal()
+    developer_pressed = Signal()
+
+    def __init__(self, theme: Theme, examples: Sequence[Example]) -> None:
+        super().__init__()
+        self._theme, self.examples = theme, tuple(examples)
+        self.setAccessibleName("Start")
+        self._use = Button(theme, "Use the virtual robot", "bot", kind="primary", size="large")
+        self._use.clicked.connect(self.virtual_robot)
+        self._new = Button(theme, "New behaviour", size="large")
+        self._new.clicked.connect(self.new_behaviour)
+        self.robot_card = BigCard(
+            theme,
+            RobotArt(theme),
+            "Connect a robot",
+            "A virtual Pepper comes with Studio. You can use it now and connect a real one later.",
+            [self._use],
+        )
+        self.new_card = BigCard(
+            theme,
+            EmptyPageArt(theme),
+            "Make a new behaviour",
+            "Start with an empty page and the blocks of your robot.",
+            [self._new],
+        )
+        self._shows_all = False
+        self._recent_box = QWidget()
+        self._open = Button(theme, "Open a file", "folder-open", kind="ghost", size="normal")
+        self._open.clicked.connect(self.open_pressed)
+        self._build(examples)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        # the sheet gives size and weight; letter spacing is beyond it
+        self._question.setFont(self._theme.font("display"))
+
+    def _build(self, examples: Sequence[Example]) -> None:
+        content = QWidget()
+        content.setProperty("bare", "true")
+        content.setMaximumWidth(WIDTH)
+        column = QVBoxLayout(content)
+        column.setContentsMargins(0, 35, 0, 24)
+        column.setSpacing(0)
+        column.addSpacerItem(
+            QSpacerItem(0, BANNER_ROOM, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
+        )
+        self._question = label("What would you like to do?", "display", wrap=True)
+        column.addWidget(self._question)
+        column.addSpacing(7)
+        lead = "Build what a robot says and does, by putting blocks together. No programming needed."
+        column.addWidget(label(lead, "lead", role="textSecondary", wrap=True))
+        column.addSpacing(24)
+        cards = QHBoxLayout()
+        cards.setSpacing(16)
+        cards.addWidget(self.robot_card, 408)
+        cards.addWidget(self.new_card, 318)
+        column.addLayout(cards)
+        column.addSpacing(26)
+        self._all = LinkButton(self._theme, all_words(len(examples)), "arrow-right")
+        self._all.clicked.connect(lambda: self.show_all(not self._shows_all))
+        head = self._head(label("Open an example", "heading"), self._open)
+        head.addSpacing(8)
+        head.addWidget(self._all)
+        column.addLayout(head)
+        column.addSpacing(10)
+        column.addLayout(self._examples(examples))
+        column.addSpacing(22)
+        recent = QVBoxLayout(self._recent_box)
+        recent.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self._recent_box)
+        column.addStretch(1)
+        self._frame(content)
+
+    def _frame(self, content: QWidget) -> None:
+        """The content in the middle of a page that scrolls, with the developers' line below."""
+        middle = QWidget()
+        middle.setProperty("bare", "true")
+        row = QHBoxLayout(middle)
+        row.setContentsMargins(24, 0, 24, 0)
+        row.addStretch(1)
+        row.addWidget(content, 1000)
+        row.addStretch(1)
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setWidget(middle)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        area.viewport().setAutoFillBackground(False)
+        line = DevelopersLine(self._theme)
+        line.developer_pressed.connect(self.developer_pressed)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.setSpacing(0)
+        whole.addWidget(area, 1)
+        whole.addWidget(line)
+
+    def _head(self, title: QLabel, button: Button | None = None) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(title)
+        row.addStretch(1)
+        if button is not None:
+            row.addWidget(button)
+        return row
+
+    def _examples(self, examples: Sequence[Example]) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setSpacing(16)
+        self.example_cards: list[ExampleCard] = []
+        for index, example in enumerate(examples):
+            card = ExampleCard(self._theme, example.path, example.name, example.text, example.rows)
+            card.clicked.connect(lambda _on=False, path=example.path: self.example_chosen.emit(path))
+            grid.addWidget(card, index // EXAMPLES_SHOWN, index % EXAMPLES_SHOWN)
+            self.example_cards.append(card)
+        for place in range(EXAMPLES_SHOWN):
+            grid.setColumnStretch(place, 1)
+        self.show_all(False)
+        return grid
+
+    def show_all(self, shown: bool) -> None:
+        """All examples, or the first row of them."""
+        self._shows_all = shown
+        for card in self.example_cards[EXAMPLES_SHOWN:]:
+            paint.show_when(card, shown)
+        paint.show_when(self._all, len(self.example_cards) > EXAMPLES_SHOWN)
+        words = "Fewer examples" if shown else all_words(len(self.example_cards))
+        self._all.set_word(words, None if shown else "arrow-right")
+
+    def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
+        """The files opened lately; without any the section is not there."""
+        moment = now if now is not None else dt.datetime.now().astimezone()
+        layout = self._recent_box.layout()
+        if layout is None:
+            return
+        while (item := layout.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.deleteLater()
+        self.recent_rows: list[RecentRow] = []
+        paint.show_when(self._recent_box, bool(recent))
+        paint.show_when(self._open, not recent)
+        if not recent:
+            return
+        other = Button(self._theme, "Open a file", "folder-open", kind="ghost")
+        other.clicked.connect(self.open_pressed)
+        head = QWidget()
+        head.setLayout(self._head(label("Recent", "heading"), other))
+        layout.addWidget(head)
+        holder = QWidget()
+        row = QHBoxLayout(holder)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(8)
+        for file in recent[:RECENT_SHOWN]:
+            shown = RecentRow(self._theme, file, moment)
+            shown.clicked.connect(lambda _on=False, path=file.path: self.file_chosen.emit(path))
+            row.addWidget(shown, 1)
+            self.recent_rows.append(shown)
+        for _ in range(RECENT_SHOWN - len(recent[:RECENT_SHOWN])):
+            row.addStretch(1)
+        layout.addWidget(holder)
+
+    def show_robot(self, chip: str, status: str) -> None:
+        """The connected robot's chip beside "Connect a robot"; nothing when there is none."""
+        self.robot_card.chip.set(chip, status)
+
+    def focus_first(self) -> None:
+        """Give the keyboard to the button that most people want."""
+        self._use.setFocus(Qt.FocusReason.OtherFocusReason)

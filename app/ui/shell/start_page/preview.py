@@ -1,0 +1,148 @@
+"""A behaviour seen from afar: its first blocks as coloured bars, read from the workspace's JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QPainter, QPainterPath, QPen
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+ROW = 27.0
+GAP = 1.0
+INDENT = 16.0
+DEEPEST = 6
+MOST_ROWS = 12
+STATEMENTS = frozenset({"DO", "DO0", "ELSE", "STACK", "BODY", "THEN"})
+_LAST_WORD = {"do": "robot", "get": "sensors", "when": "events"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One block: how deep it stands in others, its category, and how long its words and its values are."""
+
+    depth: int
+    category: str
+    words: int
+    values: int
+
+
+def category_of(block_type: str) -> str:
+    """The category of a block type: ``robot_pepper_do_say`` is a robot's, ``control_wait`` is control."""
+    parts = block_type.split("_")
+    if parts[0] == "robot":
+        return next((_LAST_WORD[part] for part in parts[1:] if part in _LAST_WORD), "robot")
+    return parts[0]
+
+
+def rows(workspace: Mapping[str, object]) -> tuple[Row, ...]:
+    """The first rows of the largest script; none for an empty workspace."""
+    blocks = workspace.get("blocks")
+    tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
+    if not isinstance(tops, list):
+        return ()
+    scripts = [tuple(_chain(top, 0)) for top in tops if isinstance(top, Mapping)]
+    return max(scripts, key=len, default=())[:MOST_ROWS]
+
+
+def _chain(block: Mapping[str, object], depth: int) -> Iterator[Row]:
+    current: object = block
+    count = 0
+    while isinstance(current, Mapping) and count < MOST_ROWS:
+        count += 1
+        inputs = current.get("inputs")
+        held = dict(inputs) if isinstance(inputs, Mapping) else {}
+        inside = [_child(value) for name, value in held.items() if _is_statement(str(name))]
+        fields = current.get("fields")
+        values = len(held) - len(inside) + (len(fields) if isinstance(fields, Mapping) else 0)
+        kind = str(current.get("type", ""))
+        yield Row(depth, category_of(kind), len(kind.rsplit("_", 1)[-1]), min(values, 3))
+        if depth < DEEPEST:
+            for child in inside:
+                if child is not None:
+                    yield from _chain(child, depth + 1)
+        current = _child(current.get("next"))
+
+
+def _is_statement(name: str) -> bool:
+    return name in STATEMENTS or name.startswith(("DO", "ELSE", "THEN"))
+
+
+def _child(link: object) -> Mapping[str, object] | None:
+    block = link.get("block") if isinstance(link, Mapping) else None
+    return block if isinstance(block, Mapping) else None
+
+
+def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPainterPath:
+    """The outline of a block: a notch above, a tab below."""
+    left, top, right, bottom = rect.left(), rect.top(), rect.right(), rect.bottom()
+    wide, deep = notch, notch * 0.36
+    path = QPainterPath(QPointF(left + radius, top))
+    path.lineTo(left + wide, top)
+    path.lineTo(left + wide + deep, top + deep)
+    path.lineTo(left + 2 * wide, top + deep)
+    path.lineTo(left + 2 * wide + deep, top)
+    path.lineTo(right - radius, top)
+    path.quadTo(right, top, right, top + radius)
+    path.lineTo(right, bottom - radius)
+    path.quadTo(right, bottom, right - radius, bottom)
+    path.lineTo(left + 2 * wide + deep, bottom)
+    path.lineTo(left + 2 * wide, bottom + deep)
+    path.lineTo(left + wide + deep, bottom + deep)
+    path.lineTo(left + wide, bottom)
+    path.lineTo(left + radius, bottom)
+    path.quadTo(left, bottom, left, bottom - radius)
+    path.lineTo(left, top + radius)
+    path.quadTo(left, top, left + radius, top)
+    path.closeSubpath()
+    return path
+
+
+def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, ...]) -> None:
+    """Paint rows from the top of ``area``; what does not fit is cut by the painter's clip."""
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    top = area.top()
+    for row in found:
+        if top > area.bottom():
+            break
+        left = area.left() + row.depth * INDENT
+        width = 58.0 + 8.0 * row.words + 38.0 * row.values
+        rect = QRectF(left, top, min(width, area.right() - left), ROW)
+        painter.setPen(QPen(theme.block_colour(row.category, "tertiary"), 0.75))
+        painter.setBrush(theme.block_colour(row.category))
+        painter.drawPath(block_path(rect))
+        _paint_words(painter, rect, theme, row)
+        top += ROW + GAP
+
+
+def _paint_words(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> None:
+    ink = theme.block_text(row.category)
+    middle = rect.center().y() + 1
+    paint.box(painter, QRectF(rect.left() + 9, middle - 4, 8, 8), 2, ink)
+    words = QRectF(rect.left() + 24, middle - 2.5, 10 + 5.0 * row.words, 5)
+    faint = theme.block_text(row.category)
+    faint.setAlphaF(0.75)
+    paint.box(painter, words, 2.5, faint)
+    left = words.right() + 7
+    for _ in range(row.values):
+        if left + 26 > rect.right() - 4:
+            break
+        paint.box(painter, QRectF(left, middle - 5, 26, 10), 5, ink)
+        left += 32
+
+
+def paint_grid(painter: QPainter, area: QRectF, theme: Theme, step: float = 24.0) -> None:
+    """The dots of the workspace."""
+    painter.fillRect(area, theme.colour("workspace"))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(theme.colour("grid"))
+    y = area.top() + step / 2
+    while y < area.bottom():
+        x = area.left() + step / 2
+        while x < area.right():
+            painter.drawEllipse(QPointF(x, y), 1, 1)
+            x += step
+        y += step

@@ -1,0 +1,71 @@
+"""Stop's keys and buttons work whatever is open: menus, lists, dialogs, sheets, and panels that float."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from PySide6.QtCore import QEvent, QObject, QPoint, Qt
+from PySide6.QtGui import QKeyEvent, QKeySequence, QMouseEvent
+from PySide6.QtWidgets import QAbstractButton, QApplication
+
+from app.ui.shell.every_window import EveryWindow
+from app.ui.widgets import Button, StopButton
+
+_KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
+
+
+def stop_at(place: QPoint) -> QAbstractButton | None:
+    """The button that stops, all robots or one, at a place of the screen that nothing popped up over."""
+    windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
+    inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
+    if any(window.windowType() == Qt.WindowType.Popup for window in inside):
+        return None
+    for window in inside:
+        under = window.childAt(window.mapFromGlobal(place))
+        if isinstance(under, StopButton) or (isinstance(under, Button) and under.kind == "stop"):
+            return under
+    return None
+
+
+def shut_popups() -> None:
+    """Close every menu and list that is open."""
+    while (popup := QApplication.activePopupWidget()) is not None and popup.close():
+        continue
+
+
+class StopKeys(EveryWindow):
+    """Hears the keys of every window of ours before anything in it does.
+
+    A shortcut is not enough: an open menu or list, a page or a field that claims the key would have it.
+    A button is not enough either: while a menu or a list is open, the press beside it only closes it.
+    """
+
+    def __init__(
+        self, parent: QObject, keys: Callable[[], Collection[str]], stop: Callable[[], object]
+    ) -> None:
+        """``keys`` are Stop's keys of the moment, as `QKeySequence` spells them; ``stop`` is done at once."""
+        self._keys, self._stop = keys, stop
+        super().__init__(parent)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() in _KINDS and isinstance(event, QKeyEvent):
+            pressed = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
+            if pressed in self._keys():
+                event.accept()
+                if event.type() == QEvent.Type.KeyPress and not event.isAutoRepeat():
+                    self._stop()
+                return True
+        if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
+            return self._pressed(event)
+        return super().eventFilter(watched, event)
+
+    def _pressed(self, event: QMouseEvent) -> bool:
+        """Whether a press beside what pops up was on a button that stops, and is done with."""
+        if event.button() != Qt.MouseButton.LeftButton or QApplication.activePopupWidget() is None:
+            return False
+        stop = stop_at(event.globalPosition().toPoint())
+        if stop is None:
+            return False
+        shut_popups()
+        stop.click()
+        return True

@@ -1,0 +1,1 @@
+"""What happens once when Studio starts: the interpreter's settings, one window, files to open, Qt's log."""

@@ -1,0 +1,1 @@
+"""The look of Studio: tokens, colours, fonts, icons and the style sheet."""

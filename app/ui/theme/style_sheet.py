@@ -1,0 +1,156 @@
+"""The application's one style sheet, made from the roles of a theme: rules by class and dynamic property.
+
+Labels take their font and colour from the properties ``kind`` and ``role`` (`app.ui.widgets.label`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, Protocol
+
+from app.ui.theme.tokens import TextKind
+
+LABEL_ROLES = (
+    "text", "textSecondary", "textTertiary", "textDisabled", "accentText", "ok", "warn", "error", "info",
+    "changed", "onAccent", "selectedText",
+)  # fmt: skip
+
+OUR_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
+"""Labels between the kinds of text in the tokens: size and weight."""
+
+
+class Look(Protocol):
+    """What the sheet asks of a theme."""
+
+    @property
+    def dark(self) -> bool:
+        """Whether the colours are the dark ones."""
+
+    def hex(self, role: str) -> str:
+        """A role's colour."""
+
+    def radius(self, name: str) -> int:
+        """A corner's radius."""
+
+    def size(self, *path: str) -> int:
+        """A length."""
+
+    def scaled(self, pixels: float) -> float:
+        """Pixels that grow with the text."""
+
+    def text_kinds(self) -> Mapping[str, TextKind]:
+        """The kinds of text."""
+
+    def family(self, kind: Literal["text", "mono"]) -> str:
+        """A font's family."""
+
+
+SHEET = """
+QToolTip {{
+    background: {tooltip}; color: {tooltipText}; border: 1px solid {tooltip}; padding: 1px 2px;
+    font-size: {small_text}px;
+}}
+QMainWindow, QDialog {{ background: {window}; }}
+QMainWindow::separator {{ background: {window}; width: 8px; height: 8px; }}
+QMainWindow[density="compact"]::separator {{ width: 6px; height: 6px; }}
+QMainWindow::separator:hover {{ background: {pressed}; }}
+QSplitter::handle {{ background: {window}; }}
+
+QMenuBar {{ background: transparent; color: {textSecondary}; border: none; spacing: 0; }}
+QMenuBar::item {{ background: transparent; padding: 5px 10px; margin: 0; border-radius: {small}px; }}
+QMenuBar::item:selected {{ background: {hover}; color: {text}; }}
+QMenuBar::item:pressed {{ background: {pressed}; color: {text}; }}
+QMenu {{
+    background: {raised}; color: {text}; border: 1px solid {borderStrong}; padding: 5px;
+    border-radius: {panel_radius}px;
+}}
+QMenu::item {{ padding: 6px 22px 6px 33px; border-radius: {small}px; min-width: 150px; }}
+QMenu::item:selected {{ background: {hover}; color: {text}; }}
+QMenu::item:disabled {{ color: {textDisabled}; }}
+QMenu::icon {{ padding-left: 8px; }}
+QMenu::separator {{ height: 1px; background: {border}; margin: 4px 6px; }}
+QMenu::indicator {{ width: 16px; height: 16px; padding-left: 8px; }}
+
+QLineEdit, QPlainTextEdit, QTextEdit {{
+    background: {field}; color: {text}; border: 1px solid {controlBorder}; border-radius: {control}px;
+    padding: 3px 8px; selection-background-color: {selected}; selection-color: {selectedText};
+}}
+QLineEdit[quiet="true"] {{ border-color: {borderStrong}; }}
+QLineEdit[wrong="true"] {{ border-color: {error}; }}
+QLineEdit[bare="true"] {{ border: none; border-radius: 0; background: transparent; padding: 0; }}
+QLineEdit:disabled {{ color: {textDisabled}; border-color: {border}; }}
+QPlainTextEdit[bare="true"], QTextEdit[bare="true"] {{ border: none; border-radius: 0; background: {panel}; }}
+QComboBox QAbstractItemView {{
+    background: {raised}; color: {text}; border: 1px solid {borderStrong}; padding: 4px; outline: none;
+    border-radius: {panel_radius}px;
+    selection-background-color: {selected}; selection-color: {selectedText};
+}}
+QComboBox {{ combobox-popup: 0; }}
+QComboBox QAbstractItemView::item {{ padding: 5px 8px; border-radius: {small}px; border: none; }}
+QComboBox QAbstractItemView::item:hover {{ background: {hover}; }}
+QComboBox QAbstractItemView::item:selected {{ background: {selected}; color: {selectedText}; }}
+
+QAbstractItemView {{
+    background: {panel}; color: {text}; border: none; outline: none; alternate-background-color: {sunken};
+    selection-background-color: {selected}; selection-color: {selectedText};
+}}
+QAbstractItemView[raised="true"] {{ background: {raised}; }}
+QHeaderView {{ background: {panel}; border: none; }}
+QHeaderView::section {{
+    background: {panel}; color: {textTertiary}; border: none; border-bottom: 1px solid {border};
+    padding: 4px 6px; font-size: {small_text}px; font-weight: 500;
+}}
+QTableCornerButton::section {{ background: {panel}; border: none; border-bottom: 1px solid {border}; }}
+QScrollArea {{ background: transparent; border: none; }}
+QScrollArea > QWidget > QWidget[bare="true"] {{ background: transparent; }}
+
+QScrollBar:vertical {{ background: transparent; width: 10px; margin: 0; }}
+QScrollBar:horizontal {{ background: transparent; height: 10px; margin: 0; }}
+QScrollBar::handle {{ background: {borderStrong}; border-radius: 3px; margin: 2px; }}
+QScrollBar::handle:vertical {{ min-height: 28px; }}
+QScrollBar::handle:horizontal {{ min-width: 28px; }}
+QScrollBar::handle:hover {{ background: {controlBorder}; }}
+QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; border: none; background: none; }}
+QScrollBar::add-page, QScrollBar::sub-page {{ background: none; }}
+QAbstractScrollArea::corner {{ background: transparent; border: none; }}
+
+Workbench > QTabBar {{ border: none; background: transparent; qproperty-drawBase: 0; }}
+Workbench > QTabBar::tab {{ width: 0; height: 0; margin: 0; padding: 0; border: none; }}
+"""
+
+
+def _labels(look: Look) -> str:
+    kinds = {name: (kind.size_px, kind.weight) for name, kind in look.text_kinds().items()} | OUR_KINDS
+    rules = []
+    for name, (size_px, weight) in kinds.items():
+        family = look.family("mono" if name == "code" else "text")
+        rules.append(
+            f'QLabel[kind="{name}"] {{ font-family: "{family}"; font-weight: {weight};'
+            f" font-size: {round(look.scaled(size_px))}px; }}"
+        )
+    rules.extend(f'QLabel[role="{role}"] {{ color: {look.hex(role)}; }}' for role in LABEL_ROLES)
+    return "\n".join(rules)
+
+
+class _Roles(dict[str, str]):
+    """Looks every name up in the theme when the sheet asks for it."""
+
+    def __init__(self, look: Look) -> None:
+        super().__init__()
+        self._look = look
+
+    def __missing__(self, role: str) -> str:
+        return self._look.hex(role)
+
+
+def build(look: Look) -> str:
+    """The style sheet in the colours and sizes of ``look``."""
+    roles = _Roles(look)
+    roles.update(
+        small=str(look.radius("small")),
+        control=str(look.radius("control")),
+        panel_radius=str(look.radius("panel")),
+        field=look.hex("sunken") if look.dark else look.hex("panel"),
+        small_text=str(round(look.scaled(look.text_kinds()["small"].size_px))),
+    )
+    return SHEET.format_map(roles) + _labels(look)

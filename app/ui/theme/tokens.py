@@ -1,0 +1,116 @@
+"""The design tokens, parsed once: names of roles, sizes and durations become typed, frozen values.
+
+Colours keep the form of the file (``#RRGGBB`` or ``#RRGGBBAA``); `app.ui.theme.theme` makes Qt values from
+them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import cast
+
+from app import resources
+
+Numbers = Mapping[str, "int | float | Numbers | list[int]"]
+
+
+@dataclass(frozen=True)
+class Status:
+    """How one status looks: role of its colour, role of its tint (None: no tint) and its icon."""
+
+    colour: str
+    tint: str | None
+    icon: str
+
+
+@dataclass(frozen=True)
+class TextKind:
+    """One size of text: pixels, line height in pixels, weight 400 to 700."""
+
+    size_px: int
+    line_px: int
+    weight: int
+
+
+@dataclass(frozen=True)
+class Tokens:
+    """All tokens of ``resources/theme/tokens.json``; ``raw`` is the file as it was read."""
+
+    raw: Mapping[str, object]
+    colours: Mapping[str, Mapping[str, str]]
+    series: Mapping[str, tuple[str, ...]]
+    status: Mapping[str, Status]
+    blocks: Mapping[str, Mapping[str, Mapping[str, str]]]
+    block_icons: Mapping[str, str]
+    block_text: Mapping[str, str]
+    sizes: Numbers
+    radii: Mapping[str, int]
+    texts: Mapping[str, TextKind]
+    motion_ms: Mapping[str, int]
+    icons: Mapping[str, str]
+    families: Mapping[str, str]
+    fallback: tuple[str, ...]
+
+
+# Statuses whose icon the tokens describe in words: their dot is drawn, not loaded.
+_DRAWN_ICONS = MappingProxyType({"a filled dot 10 px": "dot"})
+
+
+def load(path: Path | None = None) -> Tokens:
+    """Read the tokens; KeyError or ValueError if the file is not what `check_tokens` would accept."""
+    source = path if path is not None else resources.path("theme", "tokens.json")
+    return parse(json.loads(source.read_text("utf-8")))
+
+
+def parse(raw: Mapping[str, object]) -> Tokens:
+    """The typed tokens of a parsed ``tokens.json``."""
+    colours = cast("Mapping[str, Mapping[str, str | list[str]]]", raw["colour"])
+    blocks = cast("Mapping[str, Mapping[str, object]]", raw["block"])
+    font = cast("Mapping[str, object]", raw["font"])
+    icons = cast("Mapping[str, Mapping[str, str]]", raw["icons"])["uses"]
+    return Tokens(
+        raw=raw,
+        colours={
+            theme: {name: value for name, value in roles.items() if isinstance(value, str)}
+            for theme, roles in colours.items()
+        },
+        series={theme: tuple(roles["series"]) for theme, roles in colours.items()},
+        status=_status(cast("Mapping[str, object]", raw["status"])),
+        blocks={
+            name: cast("Mapping[str, Mapping[str, str]]", {mode: block[mode] for mode in ("light", "dark")})
+            for name, block in blocks.items()
+        },
+        block_icons={name: str(block["icon"]) for name, block in blocks.items()},
+        block_text={name: str(block["text"]) for name, block in blocks.items()},
+        sizes=cast("Numbers", raw["size_px"]),
+        radii=cast("Mapping[str, int]", raw["radius_px"]),
+        texts=_texts(cast("Mapping[str, Mapping[str, int]]", raw["type"])),
+        motion_ms={
+            name: value
+            for name, value in cast("Mapping[str, int | str]", raw["motion_ms"]).items()
+            if isinstance(value, int)
+        },
+        icons={use: name.split(" ")[0] for use, name in icons.items()},
+        families={"text": str(font["text"]), "mono": str(font["mono"])},
+        fallback=tuple(cast("list[str]", font["fallback"])),
+    )
+
+
+def _status(raw: Mapping[str, object]) -> Mapping[str, Status]:
+    found: dict[str, Status] = {}
+    for name, value in raw.items():
+        if isinstance(value, dict):
+            icon = str(value["icon"])
+            tint = value["tint"]
+            found[name] = Status(
+                str(value["colour"]), None if tint is None else str(tint), _DRAWN_ICONS.get(icon, icon)
+            )
+    return found
+
+
+def _texts(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:
+    return {name: TextKind(kind["size_px"], kind["line_px"], kind["weight"]) for name, kind in raw.items()}

@@ -1,0 +1,285 @@
+"""Buttons that paint their own icon, gap and word, as Fusion's gap is narrow and fixed."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
+
+from app.ui.text import plain
+from app.ui.text.numbers import tip_with_key
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+Kind = Literal["plain", "primary", "ghost", "run", "stop"]
+Size = Literal["small", "normal", "form", "large"]
+
+
+class _Measure(NamedTuple):
+    height: int
+    font: str
+    icon: int
+    gap: int
+    padding: int
+    radius: str
+
+
+_MEASURES: dict[str, _Measure] = {
+    "small": _Measure(26, "body", 14, 6, 9, "small"),
+    "normal": _Measure(32, "body", 16, 8, 12, "control"),
+    "form": _Measure(36, "label", 16, 8, 14, "control"),
+    "large": _Measure(44, "button", 20, 10, 18, "large"),
+}
+# kind: fill, fill under the mouse, fill pressed, border, words
+_COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] = {
+    "plain": ("panel", "hover", "pressed", "borderStrong", "text"),
+    "ghost": (None, "hover", "pressed", None, "text"),
+    "primary": ("accent", "accentHover", "accentHover", None, "onAccent"),
+    "run": ("run", "runHover", "runHover", None, "onRun"),
+    "stop": ("stop", "stopHover", "stopHover", None, "onStop"),
+}
+
+
+def name_command(widget: QWidget, command: str, tip: str, key: str = "") -> None:
+    """Say which command a button does; its tooltip follows the key that a person gives the command."""
+    widget.setProperty("command", command)
+    widget.setProperty("tip", tip)
+    widget.setToolTip(plain.tip(tip_with_key(tip, key)))
+
+
+class Button(QAbstractButton):
+    """A button with a word and perhaps an icon; filled kinds are for the one thing most people want next."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        text: str,
+        icon: str | None = None,
+        *,
+        kind: Kind = "plain",
+        size: Size = "normal",
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self.kind: Kind = kind
+        self.measure = _MEASURES[size]
+        self.icon_name = icon
+        self.fill_icon = False
+        self._least: int | None = None
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setCursor(Qt.CursorShape.ArrowCursor)
+        self.setProperty("focusRadius", theme.radius(self.measure.radius))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        theme.changed.connect(self.updateGeometry)
+
+    def set_word(self, text: str, icon: str | None = None) -> None:
+        """Another word, and another icon when one is given; the place stays."""
+        if text == self.text() and icon in {None, self.icon_name}:
+            return
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.icon_name = icon if icon is not None else self.icon_name
+        self.updateGeometry()
+        self.update()
+
+    def set_kind(self, kind: Kind) -> None:
+        """Filled or outlined from now on."""
+        if kind != self.kind:
+            self.kind = kind
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font(self.measure.font)
+        width = paint.width_of(font, self.text()) + 2 * self.measure.padding
+        if self.icon_name is not None:
+            width += self.icon_side() + (self.measure.gap if self.text() else 0)
+        height = max(self.measure.height, round(paint.height_of(font)) + 8)
+        return QSize(round(width) + 1, height)
+
+    def minimumSizeHint(self) -> QSize:
+        wanted = self.sizeHint()
+        return wanted if self._least is None else QSize(min(self._least, wanted.width()), wanted.height())
+
+    def let_shrink(self, least: int = 72) -> None:
+        """In narrow places the word is shortened rather than cut off; its tooltip then has the whole."""
+        self._least = least
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
+
+    def icon_side(self) -> int:
+        """How large the icon is: it grows with the text."""
+        return round(self._theme.scaled(self.measure.icon))
+
+    def shown_word(self) -> str:
+        """The word that is painted."""
+        return self.text()
+
+    def frame(self) -> QRectF:
+        """Where the button's body is painted."""
+        return QRectF(self.rect())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        fill, border, ink = self._look()
+        paint.box(painter, self.frame(), self._theme.radius(self.measure.radius), fill, border)
+        self.paint_content(painter, ink)
+        painter.end()
+
+    def paint_content(self, painter: QPainter, ink: QColor) -> None:
+        """The icon and the word, centred together."""
+        font = self._theme.font(self.measure.font)
+        if self.measure.font == "body":
+            font.setWeight(font.Weight.Medium)
+        frame = self.frame()
+        word = self.shown_word()
+        text_width = paint.width_of(font, word)
+        icon = self.icon_side() if self.icon_name is not None else 0
+        gap = self.measure.gap if icon and word else 0
+        left = max(frame.left() + 6, frame.center().x() - (icon + gap + text_width) / 2)
+        if self.icon_name is not None:
+            top = frame.center().y() - icon / 2
+            filled = self.fill_icon and self.isEnabled()
+            paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, ink, filled=filled)
+        end = frame.bottomRight() - QPointF(4, 0)
+        area = QRectF(QPointF(left + icon + gap, frame.top()), end)
+        paint.words(painter, area, word, font, ink)
+
+    def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
+        """Fill, border and ink of the moment."""
+        theme = self._theme
+        rest, hover, pressed, border, ink = _COLOURS[self.kind]
+        if not self.isEnabled():
+            edge = "border" if self.kind != "ghost" else None
+            return None, theme.colour(edge) if edge else None, theme.colour("textDisabled")
+        role = pressed if self.isDown() or self.isChecked() else hover if self.underMouse() else rest
+        return (
+            theme.colour(role) if role else None,
+            theme.colour(border) if border else None,
+            theme.colour(ink),
+        )
+
+
+class IconButton(QAbstractButton):
+    """A button with only an icon; its name and shortcut are its tooltip and what a screen reader says."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        icon: str,
+        name: str,
+        shortcut: str = "",
+        *,
+        checkable: bool = False,
+        size: int = 28,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self._icon = icon
+        self._side = size
+        self.setCheckable(checkable)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", theme.radius("small"))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.set_name(name, shortcut)
+        theme.changed.connect(self.updateGeometry)
+
+    def set_name(self, name: str, shortcut: str = "") -> None:
+        """What the button does, and its key."""
+        self.setAccessibleName(name)
+        self.setToolTip(plain.tip(tip_with_key(name, shortcut)))
+
+    def _icon_side(self) -> float:
+        name = "normal" if self._side < 40 else "large"
+        return self._theme.scaled(self._theme.size("icon", name))
+
+    def set_icon(self, icon: str) -> None:
+        """Another icon in the same place."""
+        self._icon = icon
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        side = max(self._side, round(self._icon_side()) + 10)
+        return QSize(side, side)
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        fill, ink = None, "textSecondary"
+        if self.isChecked():
+            fill, ink = "accentTint", "accentText"
+        elif self.isDown():
+            fill, ink = "pressed", "text"
+        elif self.underMouse() and self.isEnabled():
+            fill, ink = "hover", "text"
+        if fill is not None:
+            paint.box(painter, rect, theme.radius("small"), theme.colour(fill))
+        side = self._icon_side()
+        square = QRectF(0, 0, side, side)
+        square.moveCenter(rect.center())
+        paint_icon(painter, square, self._icon, theme.colour(ink if self.isEnabled() else "textDisabled"))
+        painter.end()
+
+
+ARROW = 16
+
+
+class LinkButton(QAbstractButton):
+    """Words in the accent that lead somewhere, perhaps with an arrow."""
+
+    def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
+        super().__init__()
+        self._theme, self._icon = theme, icon
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def set_word(self, text: str, icon: str | None) -> None:
+        """Other words, and another arrow or none."""
+        self._icon = icon
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("title")
+        width = round(paint.width_of(font, self.text())) + 2 + (ARROW + 6 if self._icon else 0)
+        return QSize(width, max(24, round(paint.height_of(font)) + 4))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(80, self.sizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        font = self._theme.font("title")
+        font.setUnderline(self.underMouse())
+        rect, ink = QRectF(self.rect()), self._theme.colour("accentText")
+        if self._icon is not None:
+            square = QRectF(rect.right() - ARROW, rect.center().y() - ARROW / 2, ARROW, ARROW)
+            paint_icon(painter, square, self._icon, ink)
+            rect.adjust(0, 0, -ARROW - 6, 0)
+        paint.words(painter, rect, self.text(), font, ink)
+        painter.end()

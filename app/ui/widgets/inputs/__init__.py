@@ -1,0 +1,1 @@
+"""Widgets that hold a value: segments, choice, slider."""

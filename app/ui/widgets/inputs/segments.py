@@ -1,0 +1,144 @@
+"""A choice of up to four: segments, of which one is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QFont, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLayout, QSizePolicy, QWidget
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.flow_layout import Flow
+
+_HEIGHTS: dict[str, tuple[int, int, str]] = {
+    "small": (24, 10, "body"),
+    "normal": (28, 14, "body"),
+    "form": (32, 14, "label"),
+}
+GAP = 8
+
+
+class _Segment(QAbstractButton):
+    def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
+        super().__init__()
+        self._theme, self._icon, self._check = theme, icon, check
+        self._height, self._padding, self._kind = _HEIGHTS[size]
+        self.setText(label)
+        self.setAccessibleName(label)
+        self.setCheckable(True)
+        self.setAutoExclusive(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setProperty("focusRadius", theme.radius("small"))
+        theme.changed.connect(self.updateGeometry)
+
+    def _font(self) -> QFont:
+        font = self._theme.font(self._kind)
+        font.setWeight(font.Weight.Medium)
+        return font
+
+    def _side(self) -> int:
+        return round(self._theme.scaled(16))
+
+    def _icons_width(self) -> int:
+        return (self._side() + GAP) * (int(self._icon is not None) + int(self._check))
+
+    def sizeHint(self) -> QSize:
+        width = paint.width_of(self._font(), self.text()) + 2 * self._padding + self._icons_width()
+        return QSize(round(width) + 1, max(self._height, round(paint.height_of(self._font())) + 6))
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self.text())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        chosen = self.isChecked()
+        if chosen:
+            fill = theme.colour("pressed" if theme.dark else "panel")
+            paint.box(painter, rect, theme.radius("small"), fill, theme.colour("border"))
+        elif self.underMouse() and self.isEnabled():
+            paint.box(painter, rect, theme.radius("small"), theme.colour("pressed"))
+        ink = theme.colour("text" if chosen else "textSecondary" if self.isEnabled() else "textDisabled")
+        shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
+        text_width = paint.width_of(self._font(), self.text())
+        side = self._side()
+        left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP)) / 2)
+        for name in shown:
+            paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, ink)
+            left += side + GAP
+        paint.words(painter, rect.adjusted(left, 0, 2, 0), self.text(), self._font(), ink)
+        painter.end()
+
+
+class Segments(QWidget):
+    """Up to four words side by side, one chosen; `changed` tells its value when a person chooses."""
+
+    changed = Signal(str)
+
+    def __init__(
+        self,
+        theme: Theme,
+        options: Sequence[tuple[str, str, str | None]],
+        value: str | None = None,
+        *,
+        check: bool = False,
+        size: Literal["small", "normal", "form"] = "normal",
+        name: str = "",
+        wraps: bool = False,
+    ) -> None:
+        """Options are (value, label, icon or None); ``check`` puts a check mark before the chosen one.
+
+        With ``wraps`` they stand in several rows where there is too little room.
+        """
+        super().__init__()
+        self._theme = theme
+        self.setAccessibleName(name)
+        row: QLayout
+        if wraps:
+            self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
+            row = Flow(self, gap=1, row_gap=1)
+        else:
+            self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+            row = QHBoxLayout(self)
+            row.setSpacing(1)
+        row.setContentsMargins(2, 2, 2, 2)
+        self._segments: dict[str, _Segment] = {}
+        for key, words, icon in options:
+            segment = _Segment(theme, words, icon, size, check)
+            row.addWidget(segment)
+            self._segments[key] = segment
+            segment.clicked.connect(lambda _on=False, key=key: self.changed.emit(key))
+        self.set_value(value if value is not None else next(iter(self._segments), ""))
+
+    @property
+    def value(self) -> str:
+        """The chosen value, or "" when there are no options."""
+        return next((key for key, segment in self._segments.items() if segment.isChecked()), "")
+
+    def chosen_button(self) -> QAbstractButton | None:
+        """The segment that is chosen, for the keyboard."""
+        return self._segments.get(self.value)
+
+    def set_value(self, value: str) -> None:
+        """Choose without telling; a value that is not offered changes nothing."""
+        if value in self._segments:
+            self._segments[value].setChecked(True)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        theme = self._theme
+        rect = QRectF(self.rect())
+        edge = theme.colour("border") if theme.dark or theme.high_contrast else None
+        paint.box(painter, rect, theme.radius("panel"), theme.colour("sunken"), edge)
+        painter.end()

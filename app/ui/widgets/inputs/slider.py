@@ -1,0 +1,243 @@
+"""A slider with its number field, whose unit stands inside."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QSizePolicy, QSlider, QWidget
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.labels import label
+
+MOST_STEPS = 100_000
+FIELD_WIDTH = 104
+PAGE_STEPS = 10
+
+
+class Track(QSlider):
+    """The slider itself: track 4, handle 20; it counts steps, and the wheel turns it only with the focus."""
+
+    reset = Signal()
+
+    def __init__(self, theme: Theme, steps: int) -> None:
+        super().__init__(Qt.Orientation.Horizontal)
+        self._theme = theme
+        self.setRange(0, steps)
+        self.setSingleStep(1)
+        self.setPageStep(PAGE_STEPS)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setMinimumWidth(80)
+        self.setProperty("focusRadius", theme.radius("control"))
+
+    def sizeHint(self) -> QSize:
+        return QSize(200, self._theme.size("sliderHandle") + 4)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(80, self._theme.size("sliderHandle") + 4)
+
+    def handle(self) -> QPointF:
+        """The middle of the handle."""
+        half = self._theme.size("sliderHandle") / 2
+        span = max(1, self.maximum() - self.minimum())
+        share = (self.sliderPosition() - self.minimum()) / span
+        return QPointF(half + share * (self.width() - 2 * half), self.height() / 2)
+
+    def _step_at(self, x: float) -> int:
+        half = self._theme.size("sliderHandle") / 2
+        share = (x - half) / max(1.0, self.width() - 2 * half)
+        return round(self.minimum() + min(max(share, 0.0), 1.0) * (self.maximum() - self.minimum()))
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.setSliderDown(True)
+            self.setSliderPosition(self._step_at(event.position().x()))
+            event.accept()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self.isSliderDown():
+            self.setSliderPosition(self._step_at(event.position().x()))
+            event.accept()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self.setSliderDown(False)
+        event.accept()
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self.reset.emit()
+        event.accept()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        middle = self.handle()
+        thick, side = theme.size("sliderTrack"), theme.size("sliderHandle")
+        track = QRectF(side / 2 - 2, middle.y() - thick / 2, self.width() - side + 4, thick)
+        paint.box(painter, track, thick / 2, theme.colour("borderStrong"))
+        track.setRight(middle.x())
+        enabled = self.isEnabled()
+        accent = theme.colour("accent" if enabled else "textDisabled")
+        paint.box(painter, track, thick / 2, accent)
+        painter.setPen(QPen(accent, 2))
+        painter.setBrush(theme.colour("panel"))
+        painter.drawEllipse(middle, side / 2 - 1, side / 2 - 1)
+        painter.end()
+
+
+class NumberField(QLineEdit):
+    """A number with its unit inside; a wrong one stays as it was typed and says what is wrong."""
+
+    number = Signal(float)
+    problem = Signal(str)
+
+    def __init__(
+        self, theme: Theme, minimum: float | None, maximum: float | None, unit: str = "", decimals: int = 0
+    ) -> None:
+        super().__init__()
+        self._theme, self._unit, self._decimals = theme, unit, decimals
+        self._minimum, self._maximum = minimum, maximum
+        self.sentence = ""
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setMinimumHeight(theme.size("control", "form") - 2)
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.editingFinished.connect(self._read)
+        theme.changed.connect(self._arrange)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        unit = paint.width_of(self._theme.font("body"), self._unit)
+        self.setTextMargins(0, 0, round(unit) + (6 if self._unit else 0), 0)
+
+    def show_number(self, value: float) -> None:
+        """Show a value that is known to be right."""
+        self.setText(f"{value:.{self._decimals}f}")
+        self._judge("")
+
+    def _read(self) -> None:
+        try:
+            value = float(self.text().strip().replace(",", "."))
+        except ValueError:
+            self._judge("This needs a number.")
+            return
+        if not math.isfinite(value):
+            self._judge("This needs a number.")
+        elif self._minimum is not None and value < self._minimum:
+            self._judge(f"The least is {self._minimum:g} {self._unit}".rstrip() + ".")
+        elif self._maximum is not None and value > self._maximum:
+            self._judge(f"The most is {self._maximum:g} {self._unit}".rstrip() + ".")
+        else:
+            self._judge("")
+            self.number.emit(value)
+
+    def _judge(self, sentence: str) -> None:
+        if sentence == self.sentence:
+            return
+        self.sentence = sentence
+        self.setProperty("wrong", "true" if sentence else "false")
+        self.style().unpolish(self)
+        self.style().polish(self)
+        self.problem.emit(sentence)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect()).adjusted(8, 0, -10, 0)
+        paint.words(painter, rect, self._unit, theme.font("body"), theme.colour("textTertiary"), paint.RIGHT)
+        if self.sentence:
+            square = QRectF(7, self.height() / 2 - 7, 14, 14)
+            paint_icon(painter, square, theme.status("error").icon, theme.colour("error"))
+        painter.end()
+
+
+def decimals_of(step: float) -> int:
+    """How many decimals a step needs, at most 6."""
+    return next((digits for digits in range(7) if math.isclose(round(step, digits), step, rel_tol=1e-9)), 6)
+
+
+class SliderWithUnit(QWidget):
+    """A value between two limits: slider and field; `changed` tells a value that a person chose."""
+
+    changed = Signal(float)
+
+    def __init__(
+        self,
+        theme: Theme,
+        minimum: float,
+        maximum: float,
+        *,
+        step: float = 1,
+        value: float | None = None,
+        default: float | None = None,
+        unit: str = "",
+        name: str = "",
+    ) -> None:
+        """ValueError if the limits or the step make no range."""
+        super().__init__()
+        if not (maximum > minimum and step > 0):
+            raise ValueError(f"no range from {minimum} to {maximum} by {step}")
+        steps = min(MOST_STEPS, max(1, round((maximum - minimum) / step)))
+        self._minimum, self._step = minimum, (maximum - minimum) / steps
+        self._default = default if default is not None else value if value is not None else minimum
+        self._value = minimum
+        digits = decimals_of(step)
+        self.track = Track(theme, steps)
+        self.field = NumberField(theme, minimum, maximum, unit, digits)
+        self.field.setFixedWidth(FIELD_WIDTH)
+        self._digits = digits
+        self._sentence = label("", "small", role="error", wrap=True)
+        self._sentence.hide()
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(4)
+        grid.addWidget(self.track, 0, 0)
+        grid.addWidget(self.field, 0, 1)
+        grid.addWidget(self._sentence, 1, 0, 1, 2)
+        self._name(name)
+        self.set_value(value if value is not None else self._default)
+        self.track.valueChanged.connect(self._from_track)
+        self.track.reset.connect(lambda: self._choose(self._default))
+        self.field.number.connect(self._choose)
+        self.field.problem.connect(self._complain)
+
+    def _name(self, name: str) -> None:
+        self.setAccessibleName(name)
+        self.track.setAccessibleName(name)
+        self.field.setAccessibleName(name)
+
+    @property
+    def value(self) -> float:
+        """The value now."""
+        return self._value
+
+    def set_value(self, value: float) -> None:
+        """Show a value without telling."""
+        self._value = value
+        self.track.blockSignals(True)
+        self.track.setValue(round((value - self._minimum) / self._step))
+        self.track.blockSignals(False)
+        self.track.update()
+        self.field.show_number(value)
+
+    def _from_track(self, steps: int) -> None:
+        self._choose(round(self._minimum + steps * self._step, max(self._digits, 6)))
+
+    def _choose(self, value: float) -> None:
+        if value != self._value:
+            self.set_value(value)
+            self.changed.emit(value)
+
+    def _complain(self, sentence: str) -> None:
+        self._sentence.setText(sentence)
+        self._sentence.setVisible(bool(sentence))

@@ -1,0 +1,1 @@
+"""Lists: entries with matches in bold, the search behind them, rows that fill a panel."""

@@ -1,0 +1,268 @@
+"""The list in the palette and in the table of shortcuts: headings, and rows with matches in bold and keys."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QFont, QFontMetricsF, QPainter
+from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
+
+from app.ui.text import plain
+from app.ui.text.numbers import spoken_key
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.lists.fuzzy import Entry, Found
+
+ROW, HEADING, INSET = 40, 30, 8
+ICON_LEFT, TEXT_LEFT, RIGHT = 10, 38, 10
+Index = QModelIndex | QPersistentModelIndex
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A group's name above its rows."""
+
+    words: str
+
+
+Line = Heading | Found
+
+
+class EntryModel(QAbstractListModel):
+    """Lines as Qt asks for them; headings can't be chosen."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: Sequence[Line] = ()
+
+    def show_lines(self, lines: Sequence[Line]) -> None:
+        """Show other lines."""
+        self.beginResetModel()
+        self.lines = lines
+        self.endResetModel()
+
+    def tell(self, id: str, note: str, reason: str) -> None:
+        """Say something else beside an entry; it stays where it is."""
+        for row, line in enumerate(self.lines):
+            if isinstance(line, Found) and line.entry.id == id:
+                told = replace(line, entry=replace(line.entry, note=note, reason=reason))
+                self.lines = [*self.lines[:row], told, *self.lines[row + 1 :]]
+                self.dataChanged.emit(self.index(row), self.index(row))
+
+    def rowCount(self, parent: Index | None = None) -> int:
+        return 0 if parent is not None and parent.isValid() else len(self.lines)
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        line = self.lines[index.row()]
+        if isinstance(line, Heading):
+            return line.words if role == Qt.ItemDataRole.DisplayRole else None
+        entry = line.entry
+        if role == Qt.ItemDataRole.DisplayRole:
+            return entry.words
+        if role == Qt.ItemDataRole.AccessibleTextRole:
+            return spoken(entry)
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return plain.tip(entry.reason or entry.words)
+        return None
+
+    def flags(self, index: Index) -> Qt.ItemFlag:
+        if isinstance(self.lines[index.row()], Heading):
+            return Qt.ItemFlag.NoItemFlags
+        return Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
+
+
+def spoken(entry: Entry) -> str:
+    """What a screen reader says about an entry."""
+    key = f"key {spoken_key(entry.key)}" if entry.key else ""
+    return ", ".join(part for part in (entry.words, entry.note, key, entry.reason) if part)
+
+
+class EntryDelegate(QStyledItemDelegate):
+    """Paints one line."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.waiting = ""  # the id of the entry that waits for a new key
+
+    def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
+        model = index.model()
+        heading = isinstance(model, EntryModel) and isinstance(model.lines[index.row()], Heading)
+        return QSize(100, round(self._theme.scaled(HEADING if heading else ROW)))
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        model = index.model()
+        if not isinstance(model, EntryModel):
+            return
+        line = model.lines[index.row()]
+        rect = QRectF(option.rect)
+        painter.save()
+        if isinstance(line, Heading):
+            font = self._theme.font("small")
+            font.setWeight(QFont.Weight.DemiBold)
+            area = rect.adjusted(INSET + ICON_LEFT, 2, -INSET, 0)
+            paint.words(painter, area, line.words, font, self._theme.colour("textSecondary"))
+        else:
+            chosen = bool(option.state & QStyle.StateFlag.State_Selected)
+            self._row(painter, rect.adjusted(INSET, 0, -INSET, 0), line, chosen=chosen)
+        painter.restore()
+
+    def _row(self, painter: QPainter, rect: QRectF, found: Found, *, chosen: bool) -> None:
+        theme, entry = self._theme, found.entry
+        if chosen:
+            edge = theme.colour("controlBorder") if theme.high_contrast else None
+            paint.box(painter, rect, theme.radius("panel"), theme.colour("selected"), edge)
+        ink = "textDisabled" if entry.reason and not chosen else "selectedText" if chosen else "text"
+        quiet = "selectedText" if chosen else "textSecondary"
+        side = theme.scaled(16)
+        square = QRectF(rect.left() + ICON_LEFT, rect.center().y() - side / 2, side, side)
+        if entry.icon:
+            dim = ink if chosen or entry.reason else "textSecondary"
+            paint_icon(painter, square, entry.icon, theme.colour(dim))
+        right = self._right(painter, rect, entry, quiet, chosen=chosen)
+        left = rect.left() + (TEXT_LEFT if entry.icon else ICON_LEFT) + (side - 16 if entry.icon else 0)
+        area = QRectF(left, rect.top(), max(20.0, right - left - 12), rect.height())
+        marked = ink if chosen or entry.reason else "accentText"
+        self._words(painter, area, found, ink, marked)
+
+    def _right(self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, chosen: bool) -> float:
+        """Note, key and the sign of Enter; where they begin."""
+        theme, right, middle = self._theme, rect.right() - RIGHT, rect.center().y()
+        if entry.id == self.waiting:
+            font = theme.font("body")
+            font.setWeight(QFont.Weight.Medium)
+            words = "Press the new key"
+            width = paint.width_of(font, words)
+            area = QRectF(right - width, rect.top(), width, rect.height())
+            paint.words(painter, area, words, font, theme.colour(quiet))
+            return right - width
+        if chosen and not entry.reason:
+            side = theme.scaled(15)
+            square = QRectF(right - side, middle - side / 2, side, side)
+            paint_icon(painter, square, "corner-down-left", theme.colour("selectedText"))
+            right -= side + 12
+        for key in reversed(entry.key.split("\n") if entry.key else ()):
+            right = paint.key_cap(painter, theme, right, middle, spoken_key(key)).left() - 8
+        said = entry.reason or entry.note
+        if said:
+            font = theme.font("body")
+            room = min(paint.width_of(font, said), rect.width() * 0.55)
+            right -= room + 4
+            area = QRectF(right, rect.top(), room, rect.height())
+            paint.words(painter, area, said, font, theme.colour(quiet), paint.RIGHT)
+        return right
+
+    def _words(self, painter: QPainter, area: QRectF, found: Found, ink: str, marked: str) -> None:
+        """The words, with the letters that fit in bold."""
+        theme = self._theme
+        plain = theme.font("code" if found.entry.kind == "topic" else "bodyLarge")
+        if found.entry.kind == "topic":
+            plain.setPixelSize(round(theme.scaled(13)))
+        bold = QFont(plain)
+        bold.setWeight(QFont.Weight.Bold)
+        room = area.width() - 4 * len(found.spans)
+        shown = QFontMetricsF(plain).elidedText(found.entry.words, Qt.TextElideMode.ElideRight, room)
+        end = len(shown) - 1 if shown != found.entry.words else len(shown)
+        cuts = sorted({0, len(shown), *(min(place, end) for span in found.spans for place in span)})
+        inside = [range(*span) for span in found.spans]
+        for begin, stop in itertools.pairwise(cuts):
+            fits = any(begin in span for span in inside)
+            font = bold if fits else plain
+            piece = shown[begin:stop]
+            painter.setFont(font)
+            painter.setPen(theme.colour(marked if fits else ink))
+            painter.drawText(area, int(paint.LEFT), piece)
+            area.setLeft(area.left() + paint.width_of(font, piece))
+
+
+class EntryList(QListView):
+    """Rows of which one is chosen; `moved` when it is another one, `pressed_row` when it is to be done."""
+
+    moved = Signal()
+    pressed_row = Signal()
+
+    def __init__(self, theme: Theme, name: str) -> None:
+        super().__init__()
+        self._theme = theme
+        self.lines = EntryModel()
+        self.look = EntryDelegate(theme)
+        self.setModel(self.lines)
+        self.setItemDelegate(self.look)
+        self.setAccessibleName(name)
+        self.setProperty("raised", "true")
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setMouseTracking(True)
+        self.clicked.connect(self._clicked)
+
+    def show_lines(self, lines: Sequence[Line], chosen: str = "") -> None:
+        """Show other lines and choose the one with this id, else the first that is no heading."""
+        self.lines.show_lines(lines)
+        rows = [row for row, line in enumerate(lines) if isinstance(line, Found)]
+        wanted = (row for row in rows if chosen and _id(lines[row]) == chosen)
+        self._choose(next(wanted, rows[0] if rows else -1))
+        if not chosen:
+            self.scrollToTop()
+
+    def tell(self, id: str, note: str, reason: str = "") -> None:
+        """Say something else beside an entry."""
+        self.lines.tell(id, note, reason)
+
+    @property
+    def entry(self) -> Entry | None:
+        """The entry that is chosen."""
+        row = self.currentIndex().row()
+        line = self.lines.lines[row] if 0 <= row < len(self.lines.lines) else None
+        return line.entry if isinstance(line, Found) else None
+
+    def height_of_all(self) -> int:
+        """How high all lines are together."""
+        heights = {Heading: self._theme.scaled(HEADING), Found: self._theme.scaled(ROW)}
+        return sum(round(heights[type(line)]) for line in self.lines.lines)
+
+    def step(self, steps: int) -> None:
+        """Choose another row that many rows away; it stops at the ends."""
+        rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Found)]
+        if rows:
+            current = self.currentIndex().row()
+            place = rows.index(current) if current in rows else 0
+            self._choose(rows[max(0, min(len(rows) - 1, place + steps))])
+
+    def handle(self, key: int) -> bool:
+        """Up, Down, Page up, Page down, Home and End; False for other keys."""
+        page = max(1, self.viewport().height() // round(self._theme.scaled(ROW)) - 1)
+        far = len(self.lines.lines)
+        steps = {
+            Qt.Key.Key_Up: -1,
+            Qt.Key.Key_Down: 1,
+            Qt.Key.Key_PageUp: -page,
+            Qt.Key.Key_PageDown: page,
+            Qt.Key.Key_Home: -far,
+            Qt.Key.Key_End: far,
+        }.get(Qt.Key(key))
+        if steps is None:
+            return False
+        self.step(steps)
+        return True
+
+    def _choose(self, row: int) -> None:
+        index = self.lines.index(row) if row >= 0 else QModelIndex()
+        self.setCurrentIndex(index)
+        if row >= 1 and isinstance(self.lines.lines[row - 1], Heading):
+            self.scrollTo(self.lines.index(row - 1))
+        self.scrollTo(index)
+        self.moved.emit()
+
+    def _clicked(self, index: QModelIndex) -> None:
+        if isinstance(self.lines.lines[index.row()], Found):
+            self._choose(index.row())
+            self.pressed_row.emit()
+
+
+def _id(line: Line) -> str:
+    return line.entry.id if isinstance(line, Found) else ""

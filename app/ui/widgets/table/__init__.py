@@ -1,0 +1,1 @@
+"""A virtual table: its model, its look, its cells, its columns."""

@@ -1,0 +1,178 @@
+"""How the cells and the head of a table are painted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QFont, QFontMetricsF, QPainter
+from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QWidget
+
+from app.ui.theme.icons import paint_icon, paint_icon_again
+from app.ui.theme.theme import Theme
+from app.ui.widgets.labels import SPARK, paint_sparkline
+from app.ui.widgets.table.model import Cell, Column, Order
+
+Index = QModelIndex | QPersistentModelIndex
+EDGE, PADDING, ICON = 12, 6, 14
+REMEMBERED = 4000  # cells: some screens full, so that scrolling does not gather all there are
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+
+
+class Shown(Protocol):
+    """What painting asks of the table's view; the rows may be of any type."""
+
+    row_height: int
+    hovered_row: int
+    last_shown: int  # the last column that is not hidden
+
+    @property
+    def shown_columns(self) -> Sequence[Column[Any]]:
+        """The columns."""
+
+    @property
+    def shown_order(self) -> Order[Any]:
+        """How it is sorted."""
+
+    def cell_font(self, cell: Cell) -> QFont:
+        """The font of a cell."""
+
+    def cell_at(self, row: int, column: int) -> Cell:
+        """What a cell shows now."""
+
+
+def padded(rect: QRect, column: int, last: int) -> QRectF:
+    """The inside of a cell: the outer columns keep further from the edge."""
+    left = EDGE if column == 0 else PADDING
+    right = EDGE if column == last else PADDING
+    return QRectF(rect.adjusted(left, 0, -right, 0))
+
+
+class CellDelegate(QStyledItemDelegate):
+    """Paints a `Cell`, and knows what each place showed when it was painted last."""
+
+    def __init__(self, theme: Theme, view: Shown, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self._view = view
+        self._painted: dict[tuple[int, int], Cell] = {}
+
+    def changed(self, row: int, columns: Sequence[int]) -> list[int]:
+        """Those of the columns that this row would show otherwise than it was painted last."""
+        if len(self._painted) > REMEMBERED:
+            self._painted.clear()
+        at = self._view.cell_at
+        return [column for column in columns if self._painted.get((row, column)) != at(row, column)]
+
+    def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
+        return QSize(40, self._view.row_height)
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        row, column = index.row(), index.column()
+        cell = self._painted[row, column] = self._view.cell_at(row, column)
+        theme, rect = self._theme, QRect(option.rect)
+        chosen = QStyle.StateFlag.State_Selected in option.state
+        painter.save()
+        if chosen:
+            painter.fillRect(rect, theme.colour("selected"))
+        elif self._view.hovered_row == row:
+            painter.fillRect(rect, theme.colour("hover"))
+        if chosen and column == 0:
+            painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
+        figures = self._view.shown_columns[column].figures
+        inside = padded(rect, column, self._view.last_shown)
+        role = "selectedText" if chosen and cell.role == "text" else cell.role
+        if chosen and role == "textTertiary":
+            role = "accentText"
+        self._paint_cell(painter, inside, cell, role, figures=figures)
+        painter.restore()
+
+    def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, figures: bool) -> None:
+        theme = self._theme
+        if cell.curve:
+            place = QRectF(box.left(), box.center().y() - SPARK.height() / 2, box.width(), SPARK.height())
+            paint_sparkline(painter, place, cell.curve, theme.colour(role))
+            return
+        box = box.adjusted(cell.indent, 0, 0, 0)
+        if not (cell.text or cell.icon or cell.chip):
+            return
+        font = self._view.cell_font(cell)
+        metrics = QFontMetricsF(font)
+        colour = theme.colour(role)
+        taken = (ICON + 5.0 if cell.icon else 0.0) + (self._chip_width(cell.chip) + 8 if cell.chip else 0.0)
+        text, room = cell.text, max(0.0, box.width() - taken)
+        advance = metrics.horizontalAdvance(text)
+        if advance > room:
+            shorten = Qt.TextElideMode.ElideMiddle if cell.middle else Qt.TextElideMode.ElideRight
+            text = metrics.elidedText(text, shorten, room)
+            advance = metrics.horizontalAdvance(text)
+        x = box.right() - advance - taken if figures else box.left()
+        if cell.icon:
+            top = box.center().y() - ICON / 2
+            paint_icon_again(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
+            x += ICON + 5.0
+        painter.setFont(font)
+        painter.setPen(colour)
+        painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
+        if cell.chip:
+            self._paint_chip(painter, QPointF(x + advance + 8, box.center().y()), cell.chip)
+
+    def _chip_font(self) -> QFont:
+        return self._theme.font("caption")
+
+    def _chip_width(self, words: str) -> float:
+        return QFontMetricsF(self._chip_font()).horizontalAdvance(words) + 14
+
+    def _paint_chip(self, painter: QPainter, middle: QPointF, words: str) -> None:
+        box = QRectF(middle.x(), middle.y() - 9, self._chip_width(words), 18)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(self._theme.colour("accentTint"))
+        painter.drawRoundedRect(box, 9, 9)
+        painter.setFont(self._chip_font())
+        painter.setPen(self._theme.colour("accentText"))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, words)
+
+
+class Head(QHeaderView):
+    """The head: small words, the sorted one in the text's colour with its arrow."""
+
+    def __init__(self, theme: Theme, view: Shown, parent: QWidget) -> None:
+        super().__init__(Qt.Orientation.Horizontal, parent)
+        self._theme = theme
+        self._view = view
+        self.setHighlightSections(False)
+        self.setSectionsClickable(True)
+        self.setMinimumSectionSize(28)
+        self.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+
+    def sizeHint(self) -> QSize:
+        return QSize(super().sizeHint().width(), self._view.row_height + 1)
+
+    def paintSection(self, painter: QPainter, rect: QRect, section: int) -> None:
+        columns = self._view.shown_columns
+        if not rect.isValid() or section >= len(columns):
+            return
+        theme, column = self._theme, columns[section]
+        painter.save()
+        painter.fillRect(rect, theme.colour("panel"))
+        painter.setPen(theme.colour("border"))
+        painter.drawLine(rect.bottomLeft(), rect.bottomRight())
+        font = theme.font("small")
+        font.setWeight(QFont.Weight.Medium)
+        box = padded(rect, section, self._view.last_shown)
+        ordered = self._view.shown_order.column is column
+        metrics = QFontMetricsF(font)
+        arrow = 16.0 if ordered else 0.0
+        text = metrics.elidedText(column.title, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
+        advance = metrics.horizontalAdvance(text)
+        x = box.right() - advance - arrow if column.figures else box.left()
+        painter.setFont(font)
+        painter.setPen(theme.colour("text" if ordered else "textTertiary"))
+        painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
+        if ordered:
+            name = "chevron-up" if self._view.shown_order.falling else "chevron-down"
+            at = QRectF(x + advance + 3, box.center().y() - 6.5, 13, 13)
+            paint_icon(painter, at, name, theme.colour("textSecondary"))
+        painter.restore()

@@ -1,0 +1,218 @@
+"""A virtual table made from `Column` descriptions: one signal a refresh, no widgets in cells.
+
+Rows are filtered and sorted in Python lists, never by a proxy; figures are asked for only while they
+are seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
+
+from app.ui.text import plain
+
+Row = TypeVar("Row")
+Index = QModelIndex | QPersistentModelIndex
+CELL_ROLE = int(Qt.ItemDataRole.UserRole)
+RUNS_AT_MOST = 40  # more removed runs than this, and a reset is cheaper than telling each
+_ROOT = QModelIndex()
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text.
+
+    Text that does not fit is shortened at its end, or in its ``middle``. ``curve`` are values to draw as a
+    sparkline in place of the text, ``indent`` pixels to stand further in.
+    """
+
+    text: str = ""
+    icon: str | None = None
+    role: str = "text"
+    mono: bool = False
+    bold: bool = False
+    struck: bool = False
+    chip: str | None = None
+    middle: bool = False
+    curve: Sequence[float] = ()
+    indent: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Column(Generic[Row]):
+    """One column: its head, its width, and what it shows of a row.
+
+    ``key`` gives what it is sorted by (None at the end, whatever the direction); without it the column
+    can't be sorted. ``stretch`` takes the width that is left. ``tip`` is the tooltip's sentence. Where there
+    is too little room (large text) columns that ``yield`` are not shown, the largest number first. ``off``
+    ones are shown only when a person chooses them; ``words`` names one whose head is blank.
+    """
+
+    name: str
+    title: str
+    width: int
+    cell: Callable[[Row], Cell]
+    key: Callable[[Row], object] | None = None
+    figures: bool = False
+    stretch: bool = False
+    tip: Callable[[Row], str] | None = None
+    yields: int = 0
+    off: bool = False
+    words: str = ""
+
+
+@dataclass(slots=True)
+class Order(Generic[Row]):
+    """How rows are sorted: by a column, rising or falling; None keeps the order in which they come."""
+
+    column: Column[Row] | None = None
+    falling: bool = False
+
+    def sort(self, rows: list[Row]) -> list[Row]:
+        """The rows in this order; equal ones and unknown values keep the order in which they came."""
+        key = self.column.key if self.column is not None else None
+        if key is None:
+            return rows
+        known = [(key(row), row) for row in rows]
+        good = [pair for pair in known if pair[0] is not None]
+        good.sort(key=lambda pair: pair[0], reverse=self.falling)  # type: ignore[arg-type, return-value]
+        return [row for _, row in good] + [row for value, row in known if value is None]
+
+
+@dataclass(slots=True)
+class _Rows(Generic[Row]):
+    shown: list[Row] = field(default_factory=list)
+    keys: list[str] = field(default_factory=list)
+
+
+class TableModel(QAbstractTableModel, Generic[Row]):
+    """The rows of a table as Qt wants them."""
+
+    def __init__(self, columns: Sequence[Column[Row]], key: Callable[[Row], str]) -> None:
+        """``key`` names a row for ever, so that the chosen row stays chosen when others come and go."""
+        super().__init__()
+        self.columns = tuple(columns)
+        self._key = key
+        self._rows: _Rows[Row] = _Rows()
+
+    # -- Qt's questions ---------------------------------------------------------------------------------
+
+    def rowCount(self, parent: Index = _ROOT) -> int:
+        return 0 if parent.isValid() else len(self._rows.shown)
+
+    def columnCount(self, parent: Index = _ROOT) -> int:
+        return 0 if parent.isValid() else len(self.columns)
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        if not index.isValid():
+            return None
+        column, row = self.columns[index.column()], self._rows.shown[index.row()]
+        if role == CELL_ROLE:
+            return column.cell(row)
+        if role == Qt.ItemDataRole.DisplayRole:
+            return column.cell(row).text
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return plain.tip(column.tip(row)) if column.tip is not None else None
+        if role == Qt.ItemDataRole.AccessibleTextRole:
+            cell = column.cell(row)
+            return ", ".join(part for part in (column.title or column.words, cell.text, cell.chip) if part)
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return _alignment(column.figures)
+        return None
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> object:
+        if orientation != Qt.Orientation.Horizontal or not 0 <= section < len(self.columns):
+            return None
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self.columns[section].title
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return _alignment(self.columns[section].figures)
+        return None
+
+    # -- what a panel asks and says ---------------------------------------------------------------------
+
+    def row_at(self, index: Index) -> Row | None:
+        """The row of an index, or None."""
+        return self._rows.shown[index.row()] if index.isValid() else None
+
+    def key_of(self, row: Row) -> str:
+        """The key of a row."""
+        return self._key(row)
+
+    def cell_at(self, row: int, column: int) -> Cell:
+        """What a cell shows now, asked without the way through Qt."""
+        return self.columns[column].cell(self._rows.shown[row])
+
+    def index_of(self, key: str) -> QModelIndex:
+        """The first cell of the row with this key; invalid when it is not shown."""
+        keys = self._rows.keys
+        return self.index(keys.index(key), 0) if key in keys else QModelIndex()
+
+    def set_rows(self, rows: Sequence[Row]) -> None:
+        """Show exactly these rows, in this order. The chosen row stays chosen if it is still there."""
+        keys = [self._key(row) for row in rows]
+        if keys == self._rows.keys:
+            self._rows.shown = list(rows)
+            return
+        wanted = set(keys)
+        runs = _runs([place for place, key in enumerate(self._rows.keys) if key not in wanted])
+        if len(runs) > RUNS_AT_MOST:
+            self.beginResetModel()
+            self._rows = _Rows(list(rows), keys)
+            self.endResetModel()
+            return
+        for first, last in reversed(runs):
+            self.beginRemoveRows(_ROOT, first, last)
+            del self._rows.shown[first : last + 1], self._rows.keys[first : last + 1]
+            self.endRemoveRows()
+        self._append(rows, keys)
+        if keys != self._rows.keys:
+            self._reorder(rows, keys)
+        self._rows.shown = list(rows)
+
+    def tell_changed(self, first: int, last: int) -> None:
+        """The figures of these rows changed: one signal for all of them."""
+        last = min(last, len(self._rows.shown) - 1)
+        if 0 <= first <= last:
+            corner = self.index(last, len(self.columns) - 1)
+            self.dataChanged.emit(self.index(first, 0), corner, [Qt.ItemDataRole.DisplayRole])
+
+    def _append(self, rows: Sequence[Row], keys: Sequence[str]) -> None:
+        known = set(self._rows.keys)
+        fresh = [(row, key) for row, key in zip(rows, keys, strict=True) if key not in known]
+        if fresh:
+            first = len(self._rows.keys)
+            self.beginInsertRows(_ROOT, first, first + len(fresh) - 1)
+            self._rows.shown.extend(row for row, _ in fresh)
+            self._rows.keys.extend(key for _, key in fresh)
+            self.endInsertRows()
+
+    def _reorder(self, rows: Sequence[Row], keys: list[str]) -> None:
+        self.layoutAboutToBeChanged.emit()
+        place = {key: number for number, key in enumerate(keys)}
+        before = self.persistentIndexList()
+        after = [self.index(place[self._rows.keys[old.row()]], old.column()) for old in before]
+        self._rows = _Rows(list(rows), keys)
+        self.changePersistentIndexList(before, after)
+        self.layoutChanged.emit()
+
+
+def _alignment(figures: bool) -> int:
+    side = Qt.AlignmentFlag.AlignRight if figures else Qt.AlignmentFlag.AlignLeft
+    return int(side | Qt.AlignmentFlag.AlignVCenter)
+
+
+def _runs(places: Sequence[int]) -> list[tuple[int, int]]:
+    """Neighbouring numbers as (first, last)."""
+    runs: list[tuple[int, int]] = []
+    for place in places:
+        if runs and runs[-1][1] == place - 1:
+            runs[-1] = (runs[-1][0], place)
+        else:
+            runs.append((place, place))
+    return runs

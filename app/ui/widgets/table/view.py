@@ -1,0 +1,296 @@
+"""How a table looks: rows without lines, a quiet head, the chosen row with its bar, figures at the right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Generic, TypeVar
+
+from PySide6.QtCore import (
+    QEvent,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPoint,
+    QRect,
+    QRectF,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import (
+    QAccessible,
+    QAccessibleTableModelChangeEvent,
+    QFocusEvent,
+    QFont,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QRegion,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QTableView,
+)
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets.menus import Menu
+from app.ui.widgets.table.cells import CellDelegate, Head
+from app.ui.widgets.table.columns import ColumnChoice
+from app.ui.widgets.table.model import Cell, Column, Order, TableModel
+
+Row = TypeVar("Row")
+Index = QModelIndex | QPersistentModelIndex
+EDGE, PADDING, ICON = 12, 6, 14
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+KEYBOARD = frozenset(
+    {
+        Qt.FocusReason.TabFocusReason,
+        Qt.FocusReason.BacktabFocusReason,
+        Qt.FocusReason.ShortcutFocusReason,
+    }
+)
+
+
+class TableView(QTableView, Generic[Row]):
+    """A table of `Column`s. `opened` with the key of a row that was clicked or entered."""
+
+    opened = Signal(str)
+    filter_wanted = Signal()
+    order_changed = Signal()
+
+    def __init__(self, theme: Theme, model: TableModel[Row], key: str = "") -> None:
+        """Show ``model``; ``key`` is the column sorted by at first."""
+        super().__init__()
+        self.theme = theme
+        self.columns: tuple[Column[Row], ...] = model.columns
+        self.order: Order[Row] = Order(next((c for c in self.columns if c.name == key), None))
+        self.choice = ColumnChoice(self.columns)
+        self.last_shown = len(self.columns) - 1
+        self.row_height = 26
+        self.hovered_row = -1
+        self.keyboard = False
+        self._fonts: dict[tuple[bool, bool, bool], QFont] = {}
+        self._large = False
+        self.setModel(model)
+        self._model = model
+        self._cells = CellDelegate(theme, self, self)
+        self.setItemDelegate(self._cells)
+        self.setHorizontalHeader(Head(theme, self, self))
+        head = self.horizontalHeader()
+        head.sectionClicked.connect(self._sort)
+        head.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        head.customContextMenuRequested.connect(lambda at: self._show_columns(head.mapToGlobal(at)))
+        self.verticalHeader().hide()
+        self.setShowGrid(False)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setTabKeyNavigation(False)
+        self.setWordWrap(False)
+        self.setMouseTracking(True)
+        self.clicked.connect(self._open)
+        self.set_row_height(26, large=False)
+        self.fit_columns()
+
+    @property
+    def shown_columns(self) -> Sequence[Column[Row]]:
+        """The columns."""
+        return self.columns
+
+    @property
+    def shown_order(self) -> Order[Row]:
+        """How it is sorted."""
+        return self.order
+
+    def set_row_height(self, height: int, *, large: bool) -> None:
+        """The height of all rows; ``large`` words for the comfortable density."""
+        self.row_height, self._large = height, large
+        self._fonts.clear()
+        rows = self.verticalHeader()
+        rows.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        rows.setMinimumSectionSize(height)
+        rows.setDefaultSectionSize(height)
+        self.horizontalHeader().setFixedHeight(height + 1)
+        self.fit_columns()
+        self.viewport().update()
+
+    def cell_font(self, cell: Cell) -> QFont:
+        """The font of a cell."""
+        key = (cell.mono, cell.bold, cell.struck)
+        if key not in self._fonts:
+            font = self.theme.font("bodyLarge" if self._large else "body")
+            if cell.mono:
+                mono = self.theme.font("mono")
+                mono.setPixelSize(font.pixelSize())
+                font = mono
+            if cell.bold:
+                font.setWeight(QFont.Weight.Bold)
+            font.setStrikeOut(cell.struck)
+            self._fonts[key] = font
+        return self._fonts[key]
+
+    def cell_at(self, row: int, column: int) -> Cell:
+        """What a cell shows now."""
+        return self._model.cell_at(row, column)
+
+    def visible_rows(self) -> tuple[int, int]:
+        """First and last row that can be seen; the last is before the first when there is none."""
+        first = self.rowAt(0)
+        if first < 0:
+            return 0, -1
+        last = self.rowAt(self.viewport().height() - 1)
+        return first, last if last >= 0 else self._model.rowCount() - 1
+
+    def tell_visible_changed(self) -> None:
+        """Figures may have changed: repaint those that can be seen and did, with one signal."""
+        first, last = self.visible_rows()
+        self._model.tell_changed(first, last)
+
+    def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
+        """Qt says which rows may have changed; it would paint all of them again."""
+        top, bottom = self.visible_rows()
+        columns = [place for place in range(len(self.columns)) if not self.isColumnHidden(place)]
+        dirty = QRegion()
+        for row in range(max(first.row(), top), min(last.row(), bottom) + 1):
+            changed = self._cells.changed(row, columns)
+            if changed:
+                x = self.columnViewportPosition(changed[0])
+                wide = self.columnViewportPosition(changed[-1]) + self.columnWidth(changed[-1]) - x
+                dirty += QRect(x, self.rowViewportPosition(row), wide, self.row_height)
+        if not dirty.isEmpty():
+            self.viewport().update(dirty)
+            self._tell_screen_reader(first.row(), last.row())
+
+    def _tell_screen_reader(self, first: int, last: int) -> None:
+        if QAccessible.isActive():
+            event = QAccessibleTableModelChangeEvent(
+                self, QAccessibleTableModelChangeEvent.ModelChangeType.DataChanged
+            )
+            event.setFirstRow(first)
+            event.setLastRow(last)
+            event.setFirstColumn(0)
+            event.setLastColumn(len(self.columns) - 1)
+            QAccessible.updateAccessibility(event)
+
+    def chosen_key(self) -> str | None:
+        """The key of the chosen row."""
+        row = self._model.row_at(self.currentIndex())
+        return self._model.key_of(row) if row is not None else None
+
+    def choose(self, key: str) -> None:
+        """Choose the row of this key without opening it; nothing when it is not shown."""
+        index = self._model.index_of(key)
+        if index.isValid() and index.row() != self.currentIndex().row():
+            self.setCurrentIndex(index)
+            self.selectRow(index.row())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        self.keyboard = True
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self._open(self.currentIndex())
+        elif event.text() == "/":
+            self.filter_wanted.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        self.keyboard = event.reason() in KEYBOARD
+        super().focusInEvent(event)
+        if self.keyboard and not self.currentIndex().isValid() and self._model.rowCount():
+            self.setCurrentIndex(self._model.index(0, 0))
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self._hover(-1)
+        super().leaveEvent(event)
+
+    def viewportEvent(self, event: QEvent) -> bool:
+        if event.type() in {QEvent.Type.MouseMove, QEvent.Type.HoverMove}:
+            self._hover(self.rowAt(round(event.position().y())))  # type: ignore[attr-defined]
+        elif event.type() in {QEvent.Type.MouseButtonPress, QEvent.Type.Leave, QEvent.Type.HoverLeave}:
+            self.keyboard = False
+        return super().viewportEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.fit_columns()
+
+    def fit_columns(self) -> None:
+        """Give the stretching column what the others leave, at least its own width; columns may give way."""
+        scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
+        room = self.viewport().width()
+        shown = self.choice.fit(scaled, room)
+        rest = room - sum(scaled[place] for place in shown if not self.columns[place].stretch)
+        for place, column in enumerate(self.columns):
+            self.setColumnHidden(place, place not in shown)
+            self.setColumnWidth(place, max(scaled[place], rest) if column.stretch else scaled[place])
+        self.last_shown = max(shown)
+        wide = sum(scaled[place] for place in shown) > room
+        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if wide else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setHorizontalScrollBarPolicy(policy)
+
+    def column_menu(self) -> Menu:
+        """The menu in which a person chooses the columns."""
+        return self.choice.menu(self.theme, self, self.fit_columns)
+
+    def fill_column_menu(self, menu: Menu) -> None:
+        """The same in a menu that stays."""
+        self.choice.fill(menu, self.fit_columns)
+
+    def _show_columns(self, at: QPoint) -> None:
+        menu = self.column_menu()
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(at)
+
+    def saved_state(self) -> dict[str, object]:
+        """The order and the chosen columns, for a layout."""
+        order = self.order
+        return {
+            "sort": order.column.name if order.column else "",
+            "falling": order.falling,
+            "columns": self.choice.saved(),
+        }
+
+    def restore(self, state: Mapping[str, object]) -> None:
+        """Take over what `saved_state` gave; whatever does not fit is as at first."""
+        chosen = (column for column in self.columns if column.name == state.get("sort"))
+        self.order.column = next(chosen, self.columns[0])
+        self.order.falling = state.get("falling") is True
+        self.choice.restore(state.get("columns"))
+        self.fit_columns()
+        self.order_changed.emit()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        index = self.currentIndex()
+        if self.keyboard and self.hasFocus() and index.isValid():
+            painter = QPainter(self.viewport())
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(QPen(self.theme.colour("focus"), 2))
+            top = self.rowViewportPosition(index.row())
+            painter.drawRoundedRect(
+                QRectF(1, top + 1, self.viewport().width() - 2, self.row_height - 2), 4, 4
+            )
+            painter.end()
+
+    def _hover(self, row: int) -> None:
+        if row != self.hovered_row:
+            self.hovered_row = row
+            self.viewport().update()
+
+    def _open(self, index: QModelIndex) -> None:
+        row = self._model.row_at(index)
+        if row is not None:
+            self.opened.emit(self._model.key_of(row))
+
+    def _sort(self, section: int) -> None:
+        column = self.columns[section]
+        if column.key is None:
+            return
+        same = self.order.column is column
+        self.order = Order(column, not self.order.falling if same else column.figures)
+        self.horizontalHeader().viewport().update()
+        self.order_changed.emit()
