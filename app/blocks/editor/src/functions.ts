@@ -1,7 +1,7 @@
 // The functions of a behaviour: uses follow their function, and the toolbox offers them.
 import * as Blockly from 'blockly/core';
 import {CALLS, type CallBlock, type DefinitionBlock, FieldFunctionInput, definitionsOf, follow, freshName,
-  functionName} from './shapes';
+  functionName} from './mutators';
 import {Toolbox} from './toolbox';
 
 export const FUNCTIONS = 'functions';

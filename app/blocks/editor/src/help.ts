@@ -1,7 +1,7 @@
 // Help for one block: a card in the page, made of what the window tells about each block.
 import * as Blockly from 'blockly/core';
 import {iconElement, iconName} from './icons';
-import {isKept} from './kept';
+import {isKept} from './unknown_blocks';
 import {definitionOf} from './definitions';
 
 export interface BlockHelp {

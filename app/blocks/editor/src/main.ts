@@ -1,8 +1,8 @@
 // The page of the block editor: what the window tells it (`nepReceive`) and what it tells the window.
 import * as Blockly from 'blockly/core';
-import './quick';
+import './blockly_patches';
 import './fields';
-import './shapes';
+import './mutators';
 import {HelpCard, focusedBlock, offerHelp} from './help';
 import {iconElement} from './icons';
 import {trimMenu} from './menu';

@@ -1,6 +1,6 @@
 // Fewer entries, plain words.
 import * as Blockly from 'blockly/core';
-import {offerRemoving} from './removing';
+import {offerRemoving} from './remove_menu';
 
 const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockCollapseExpand', 'blockDisable',
   'blockHelp', 'commentCreate', 'commentDelete', 'commentDuplicate'];

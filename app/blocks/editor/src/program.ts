@@ -1,9 +1,9 @@
 // The workspace as JSON: loading, saving, telling the window about real edits.
 import * as Blockly from 'blockly/core';
 import {leniently} from './checker';
-import type {Far} from './far';
-import {type BlockState, KEPT, keep, keepWhole, unkeep} from './kept';
-import {wordsLater} from './quick';
+import type {Far} from './culling';
+import {type BlockState, KEPT, keep, keepWhole, unkeep} from './unknown_blocks';
+import {wordsLater} from './blockly_patches';
 
 type Json = Record<string, unknown>;
 

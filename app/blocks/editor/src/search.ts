@@ -4,7 +4,7 @@ import {definitionOf} from './definitions';
 import {helpFor} from './help';
 import {iconElement} from './icons';
 
-type Entry = Record<string, unknown>;
+export type Entry = Record<string, unknown>;
 
 function plain(words: string): string {
   return words.normalize('NFKD').replace(/[\u0300-\u036f]/g, '').toLowerCase().replace(/\s+/g, ' ').trim();

@@ -1,10 +1,16 @@
 // The field above the toolbox: type, see the blocks that answer, take one with Enter.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
-import {findEntries} from './search';
-import type {Toolbox} from './toolbox';
+import {type Entry, findEntries} from './search';
 
 export const SEARCH = 'nepSearch';
+
+/** What the field needs of the toolbox in which it stands. */
+interface SearchedToolbox {
+  allEntries(): Entry[];
+  showFound(entries: unknown[] | null): void;
+  enterFound(event: KeyboardEvent | null): void;
+}
 
 export class SearchItem extends Blockly.ToolboxItem {
   private readonly div = document.createElement('div');
@@ -46,8 +52,8 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.field.value = '';
   }
 
-  private get toolbox(): Toolbox {
-    return this.parentToolbox_ as unknown as Toolbox;
+  private get toolbox(): SearchedToolbox {
+    return this.parentToolbox_ as unknown as SearchedToolbox;
   }
 
   private show(): void {

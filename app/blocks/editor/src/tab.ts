@@ -2,12 +2,12 @@
 import * as Blockly from 'blockly/core';
 import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
-import {Far} from './far';
+import {Far} from './culling';
 import {Functions} from './functions';
-import {offeredSensors, onFlyout} from './offered';
+import {offeredSensors, onFlyout} from './visible_sensors';
 import {Program, holdsAny} from './program';
 import {RENDERER} from './renderer';
-import {States} from './states';
+import {States} from './overlays';
 import {makeTheme} from './theme';
 import {Toolbox} from './toolbox';
 

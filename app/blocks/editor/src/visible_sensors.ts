@@ -1,7 +1,7 @@
 // The sensors that the open toolbox shows: their values are wanted while it is open.
 import * as Blockly from 'blockly/core';
 import {sensorTypes} from './definitions';
-import {sensorOf} from './states';
+import {sensorOf} from './overlays';
 
 /** Calls `look` after whatever opens, fills or closes it. */
 export function onFlyout(flyout: Blockly.IFlyout, look: () => void): void {

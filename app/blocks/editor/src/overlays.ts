@@ -3,7 +3,7 @@ import * as Blockly from 'blockly/core';
 import {definitionOf, sensorTypes} from './definitions';
 import {FieldLive} from './fields';
 import {drawIcon} from './icons';
-import {isKept} from './kept';
+import {isKept} from './unknown_blocks';
 import {type BlockState, pathOf} from './renderer';
 
 const SVG = 'http://www.w3.org/2000/svg';

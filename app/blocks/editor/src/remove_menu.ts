@@ -2,7 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {leniently} from './checker';
 import {definitionOf} from './definitions';
-import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, changeInputs} from './shapes';
+import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, changeInputs} from './mutators';
 
 interface Item {
   list: Blockly.BlockSvg;

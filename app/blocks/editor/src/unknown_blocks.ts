@@ -2,7 +2,7 @@
 // like others, and written back exactly as they were read.
 import * as Blockly from 'blockly/core';
 import {type BlockDefinition, definitionOf, fieldNames, inputKinds} from './definitions';
-import {readInputs} from './shapes';
+import {readInputs} from './mutators';
 
 export const KEPT = 'nep_kept';
 

@@ -1,6 +1,6 @@
 // Where Blockly does work again and again that a page with a thousand blocks feels, done once or later.
 import * as Blockly from 'blockly/core';
-import {bringNear} from './far';
+import {bringNear} from './culling';
 
 const SVG = 'http://www.w3.org/2000/svg';
 
