@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 FULL = """
 import json, sys
 from pathlib import Path
-from app.core import snapshots
+from app.core.messages import snapshots
 from app.core.documents.file_format import BehaviourFile, write_file
 from app.core.documents.document import Document
 from app.core.documents.versions import keep_earlier

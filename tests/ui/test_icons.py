@@ -83,7 +83,7 @@ def test_every_icon_that_the_code_names_is_shipped() -> None:
     """Words in the code that stand where icons stand: what a person mistyped is found here."""
     before = r'(?:paint_icon(?:_again)?\([^"\n]*|\bicon\(|icon=|Button\(theme, "[^"]*", )'
     given = re.compile(before + r'"([a-z0-9-]+)"')
-    root = Path(icons.__file__).parents[1]
+    root = Path(icons.__file__).parents[2]
     named = {name for path in root.rglob("*.py") for name in given.findall(path.read_text("utf-8"))}
     assert len(named) > 50
     assert named - {"dot", "error", "behaviour"} <= icons.names()  # a disc, a colour, a layout
