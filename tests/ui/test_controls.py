@@ -25,7 +25,7 @@ from app.ui.panels.robots.controls.picture_file import FILES, MOST_FILE_BYTES, e
 from app.ui.panels.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
-from app.ui.widgets.long_text import LEAST_HEIGHT, LongText
+from app.ui.widgets.inputs.fields import LEAST_HEIGHT, LongText
 from app.ui.widgets.menus import Menu
 from tests.nep.bad_pictures import BOMBS, chunk, exif, segment
 from tests.ui import fakes

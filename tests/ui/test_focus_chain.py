@@ -11,7 +11,7 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QLabel, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
 import app.ui
-from app.ui.widgets.focus_chain import following, proxy_of, tab_stops
+from app.ui.widgets.keyboard import following, proxy_of, tab_stops
 
 ASKS = re.compile(r"\.(nextInFocusChain|previousInFocusChain|focusProxy|buddy)\(\)")
 
@@ -68,4 +68,4 @@ def test_a_window_is_nobodys_child_after_it_was_asked_for(window: QWidget) -> No
 def test_nobody_else_asks_for_the_focus_chain() -> None:
     root = Path(app.ui.__file__).parent
     asking = {path.name for path in root.rglob("*.py") if ASKS.search(path.read_text("utf-8"))}
-    assert asking == {"focus_chain.py"}
+    assert asking == {"keyboard.py"}

@@ -13,7 +13,7 @@ from app.ui.panels.registry import PanelShelf
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.shell.docking.workbench import Workbench
-from app.ui.widgets.focus_chain import tab_stops
+from app.ui.widgets.keyboard import tab_stops
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 

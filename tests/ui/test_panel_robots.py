@@ -13,7 +13,7 @@ from app.robots.description.model import Field
 from app.ui.panels.robots.list import seen_words
 from app.ui.panels.robots.panel import PANEL, RobotsPanel
 from app.ui.panels.robots.tries import feedback_words, progress_of
-from app.ui.widgets.long_text import LongText
+from app.ui.widgets.inputs.fields import LongText
 from tests.ui.fakes import ACTIONS, Invocation, RobotLink, Session, pepper
 from tests.ui.panel_case import Window, button, press
 

@@ -23,7 +23,7 @@ from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.shell.main_window import MainWindow
 from app.ui.text.numbers import spoken_key, tip_with_key
 from app.ui.theme.theme import Theme
-from app.ui.widgets.fields import FilterField
+from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.lists.entry_list import Heading
 from app.ui.widgets.lists.fuzzy import Found
 

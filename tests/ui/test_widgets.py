@@ -28,9 +28,9 @@ from app.ui.widgets import (
     Switch,
     paint,
 )
+from app.ui.widgets.indicators import paint_sparkline
 from app.ui.widgets.inputs.slider import decimals_of
-from app.ui.widgets.labels import paint_sparkline
-from app.ui.widgets.scrolled import Scrolled
+from app.ui.widgets.lists.scroll_areas import Scrolled
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

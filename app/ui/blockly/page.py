@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.ui.blockly.bridge import BlocklyBridge
 from app.ui.blockly.scheme import PAGE, SCHEME, Fence, SchemeHandler, register_scheme
-from app.ui.widgets.focus_chain import proxy_of
+from app.ui.widgets.keyboard import proxy_of
 
 _log = logging.getLogger(__name__)
 _Attribute = QWebEngineSettings.WebAttribute

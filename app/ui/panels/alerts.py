@@ -14,7 +14,7 @@ from app.ui.text.numbers import grouped
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyState, label, paint
-from app.ui.widgets.lists.scroll_rows import PanelRows
+from app.ui.widgets.lists.scroll_areas import PanelRows
 
 if TYPE_CHECKING:
     from app.core.alerts import Alert

@@ -14,7 +14,7 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyState, IconButton, label, paint
-from app.ui.widgets.lists.scroll_rows import PanelRows
+from app.ui.widgets.lists.scroll_areas import PanelRows
 from nep.doctor import report
 
 if TYPE_CHECKING:

@@ -23,8 +23,9 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, Scrolled, label, paint
-from app.ui.widgets.labels import Tile
-from app.ui.widgets.rich_line import BoldInLine, is_pressed_key
+from app.ui.widgets.cards import Tile
+from app.ui.widgets.keyboard import is_pressed_key
+from app.ui.widgets.labels import BoldInLine
 
 if TYPE_CHECKING:
     from app.blocks import Program

@@ -17,8 +17,9 @@ from app.ui.robot_drawing.state import RobotState
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
+from app.ui.widgets.indicators import ROBOT_STATUS
+from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.menus import Menu, drop_below
-from app.ui.widgets.plain_key import is_plain
 
 if TYPE_CHECKING:
     from app.core.network.watches import Look, Watch
@@ -28,10 +29,6 @@ TOUCHABLE = ("head", "left_hand", "right_hand")
 STALE = QColor(90, 90, 90, 150)
 STALE_AFTER_S = 2.0
 """A virtual robot tells how it is many times a second, also when it does nothing."""
-STATUS = {
-    "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
-    "away": "off",
-}  # fmt: skip
 KEYS = {Qt.Key.Key_H: "head", Qt.Key.Key_L: "left_hand", Qt.Key.Key_R: "right_hand"}
 
 
@@ -176,7 +173,7 @@ class RobotPanel(PanelWidget):
         link = fleet.link(self._robot) if self._robot else None
         if link is None:
             return
-        self.chip.set(link.chip, STATUS.get(link.state, "ok"))
+        self.chip.set(link.chip, ROBOT_STATUS.get(link.state, "ok"))
         if link.drawing is not None:
             now = time.monotonic()
             if link.drawing is not self._told:

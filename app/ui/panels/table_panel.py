@@ -13,7 +13,7 @@ from app.ui.panels.base import Density, PanelContext, PanelWidget
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Elided, EmptyAction, EmptyState, Line, label
 from app.ui.widgets.buttons import LinkButton
-from app.ui.widgets.fields import FilterField
+from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView

@@ -14,7 +14,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
 from app.ui.widgets.labels import label
-from app.ui.widgets.scrolled import Scrolled
+from app.ui.widgets.lists.scroll_areas import Scrolled
 
 TILE, BELOW_TILE = 56, 16
 TEXT_WIDTH = 400

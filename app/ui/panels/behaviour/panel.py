@@ -18,7 +18,7 @@ from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.title import BehaviourTitle
 from app.ui.widgets import EmptyAction, EmptyState
-from app.ui.widgets.robot_item import STATUS
+from app.ui.widgets.indicators import ROBOT_STATUS
 
 if TYPE_CHECKING:
     from app.blocks import Program
@@ -291,7 +291,7 @@ class BehaviourPanel(PanelWidget):
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
     """What the toolbox says of robots that may move or do not answer, instead of a green dot."""
     return {
-        link.name: (STATUS[link.state], link.chip.removeprefix("virtual, "))
+        link.name: (ROBOT_STATUS[link.state], link.chip.removeprefix("virtual, "))
         for link in links
         if link.state in ALARMS
     }

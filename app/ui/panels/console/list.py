@@ -24,7 +24,7 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SearchField, paint
-from app.ui.widgets.plain_key import is_plain
+from app.ui.widgets.keyboard import is_plain
 
 if TYPE_CHECKING:
     from app.core.console import LogRecord

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from app.ui.panels.inspector.values import search
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, SearchField, paint
-from app.ui.widgets.plain_key import is_plain
+from app.ui.widgets.keyboard import is_plain
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex

@@ -16,8 +16,8 @@ from app.ui.panels.robots.tries import end_words, left_words, now_words, output_
 from app.ui.panels.robots.try_list import TryList
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, set_role
+from app.ui.widgets.cards import Tile
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.labels import Tile
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation

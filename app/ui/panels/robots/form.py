@@ -16,7 +16,7 @@ from app.ui.panels.robots.input_text import input_words
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Segments, label
-from app.ui.widgets.long_text import LongText
+from app.ui.widgets.inputs.fields import LongText
 
 LABEL_WIDTH = 92
 ROW_GAP = 10

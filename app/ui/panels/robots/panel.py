@@ -22,12 +22,12 @@ from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, RobotInputError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.robots.action_card import ActionCard
-from app.ui.panels.robots.list import RobotList
+from app.ui.panels.robots.list import LIST_WIDTH, RobotList
 from app.ui.panels.robots.robot_head import RobotHead
 from app.ui.panels.robots.session_pictures import SessionPictures
 from app.ui.text.numbers import plural
 from app.ui.widgets import EmptyAction, EmptyState, Line, label
-from app.ui.widgets.robot_item import LIST_WIDTH, STATUS
+from app.ui.widgets.indicators import ROBOT_STATUS
 
 if TYPE_CHECKING:
     from app.core.network.watches import Look, Watch
@@ -218,7 +218,7 @@ class RobotsPanel(PanelWidget):
     def _show_link(self, link: RobotLink) -> None:
         self._make_forms()
         if self._new("head", link.state, link.chip):
-            self.chip.set(link.chip.removeprefix("virtual, "), STATUS.get(link.state, "ok"))
+            self.chip.set(link.chip.removeprefix("virtual, "), ROBOT_STATUS.get(link.state, "ok"))
         may_move = link.state in {NOT_STOPPED, STOPPING}
         for name, card in self.cards.items():
             made = link.invocations.get(name)

@@ -20,7 +20,7 @@ from shiboken6 import isValid
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import StopButton, paint
-from app.ui.widgets.focus_chain import tab_stops
+from app.ui.widgets.keyboard import tab_stops
 from app.ui.widgets.menus import round_region
 
 SHADOW_PX = 28

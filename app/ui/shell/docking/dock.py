@@ -24,7 +24,7 @@ from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelContext, PanelWidg
 from app.ui.shell.docking.dock_title import DockTitle
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
-from app.ui.widgets.focus_chain import proxy_of, tab_stops
+from app.ui.widgets.keyboard import proxy_of, tab_stops
 from app.ui.widgets.menus import Menu, drop_below
 
 LEAST_BODY = QSize(160, 60)

@@ -1,1 +1,1 @@
-"""Widgets that hold a value: segments, choice, slider."""
+"""Widgets that hold a value: fields, segments, choice, slider, switch."""

@@ -6,11 +6,11 @@ import math
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
-from PySide6.QtWidgets import QGridLayout, QLineEdit, QSizePolicy, QSlider, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QSlider, QWidget
 
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.inputs.fields import NumberField
 from app.ui.widgets.labels import label
 
 MOST_STEPS = 100_000
@@ -91,72 +91,6 @@ class Track(QSlider):
         painter.setPen(QPen(accent, 2))
         painter.setBrush(theme.colour("panel"))
         painter.drawEllipse(middle, side / 2 - 1, side / 2 - 1)
-        painter.end()
-
-
-class NumberField(QLineEdit):
-    """A number with its unit inside; a wrong one stays as it was typed and says what is wrong."""
-
-    number = Signal(float)
-    problem = Signal(str)
-
-    def __init__(
-        self, theme: Theme, minimum: float | None, maximum: float | None, unit: str = "", decimals: int = 0
-    ) -> None:
-        super().__init__()
-        self._theme, self._unit, self._decimals = theme, unit, decimals
-        self._minimum, self._maximum = minimum, maximum
-        self.sentence = ""
-        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.setMinimumHeight(theme.size("control", "form") - 2)
-        self.setProperty("focusRadius", theme.radius("control"))
-        self.editingFinished.connect(self._read)
-        theme.changed.connect(self._arrange)
-        self._arrange()
-
-    def _arrange(self) -> None:
-        unit = paint.width_of(self._theme.font("body"), self._unit)
-        self.setTextMargins(0, 0, round(unit) + (6 if self._unit else 0), 0)
-
-    def show_number(self, value: float) -> None:
-        """Show a value that is known to be right."""
-        self.setText(f"{value:.{self._decimals}f}")
-        self._judge("")
-
-    def _read(self) -> None:
-        try:
-            value = float(self.text().strip().replace(",", "."))
-        except ValueError:
-            self._judge("This needs a number.")
-            return
-        if not math.isfinite(value):
-            self._judge("This needs a number.")
-        elif self._minimum is not None and value < self._minimum:
-            self._judge(f"The least is {self._minimum:g} {self._unit}".rstrip() + ".")
-        elif self._maximum is not None and value > self._maximum:
-            self._judge(f"The most is {self._maximum:g} {self._unit}".rstrip() + ".")
-        else:
-            self._judge("")
-            self.number.emit(value)
-
-    def _judge(self, sentence: str) -> None:
-        if sentence == self.sentence:
-            return
-        self.sentence = sentence
-        self.setProperty("wrong", "true" if sentence else "false")
-        self.style().unpolish(self)
-        self.style().polish(self)
-        self.problem.emit(sentence)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect()).adjusted(8, 0, -10, 0)
-        paint.words(painter, rect, self._unit, theme.font("body"), theme.colour("textTertiary"), paint.RIGHT)
-        if self.sentence:
-            square = QRectF(7, self.height() / 2 - 7, 14, 14)
-            paint_icon(painter, square, theme.status("error").icon, theme.colour("error"))
         painter.end()
 
 

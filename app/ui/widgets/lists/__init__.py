@@ -1,1 +1,1 @@
-"""Lists: entries with matches in bold, the search behind them, rows that fill a panel."""
+"""Lists: entries with matches in bold, the search behind them, what scrolls."""

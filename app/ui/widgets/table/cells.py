@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOp
 
 from app.ui.theme.icons import paint_icon, paint_icon_again
 from app.ui.theme.theme import Theme
-from app.ui.widgets.labels import SPARK, paint_sparkline
+from app.ui.widgets.indicators import SPARK, paint_sparkline
 from app.ui.widgets.table.model import Cell, Column, Order
 
 Index = QModelIndex | QPersistentModelIndex

@@ -13,7 +13,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import NumberField, SliderWithUnit, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.slider import decimals_of
-from app.ui.widgets.plain_key import is_plain
+from app.ui.widgets.keyboard import is_plain
 
 COARSE_FROM = 20
 UPRIGHT = ("pitch", "tilt", "down", "up", "nod")

@@ -8,7 +8,7 @@ from app.robots.description.description import Parameter
 from app.robots.description.inputs import from_words, to_words
 from app.ui.panels.robots.controls.base import Control, connect, line_field
 from app.ui.theme.theme import Theme
-from app.ui.widgets.long_text import LongText
+from app.ui.widgets.inputs.fields import LongText
 
 LONG_FROM = 200
 """A text that may have as many characters gets several lines."""

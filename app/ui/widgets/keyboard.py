@@ -1,9 +1,10 @@
-"""The order in which Tab goes through widgets, asked so that asking changes nothing.
+"""Keys that hold nothing else down, and the order in which Tab goes through widgets.
 
-PySide takes whatever a getter without arguments returns for a child of the object that was asked. Of the next
-widget in the focus chain, or a proxy, that is not true: when the widget that was asked is deleted, PySide
-calls the other one, and what Qt made in it, deleted too, while Qt goes on using it. So each gets its own
-parent back at once, and nothing else in `app.ui` may ask these questions (ADR 0018).
+The order is asked so that asking changes nothing. PySide takes whatever a getter without arguments returns
+for a child of the object that was asked. Of the next widget in the focus chain, or a proxy, that is not
+true: when the widget that was asked is deleted, PySide calls the other one, and what Qt made in it, deleted
+too, while Qt goes on using it. So each gets its own parent back at once, and nothing else in `app.ui` may
+ask these questions (ADR 0018).
 """
 
 from __future__ import annotations
@@ -11,7 +12,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget
+
+
+def is_plain(event: QKeyEvent) -> bool:
+    """Whether nothing is held with a key: Cmd+Down goes to the end of a text on a Mac, Down into the list.
+
+    Arrows of a Mac and keys of a number pad carry a mark of their own, which is nothing that is held.
+    """
+    return not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+
+
+def is_pressed_key(key: int) -> bool:
+    """Whether a key presses what has the focus."""
+    return key in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}
 
 
 def following(widget: QWidget, *, forward: bool = True) -> QWidget:

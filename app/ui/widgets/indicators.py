@@ -1,0 +1,259 @@
+"""What shows a state and is never a button: chips, facts of the status bar, curves and bars."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
+# px at 100 % that a fact keeps where there is too little room for all; its tooltip has the whole
+LEAST_ITEM = 64
+SPARK = QSize(56, 16)
+SPARK_STROKE = 1.25
+BAR_HEIGHT = 6
+# the status that a chip gives what `RobotLink.state` says
+ROBOT_STATUS = {
+    "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
+    "away": "off",
+}  # fmt: skip
+
+
+class Chip(QWidget):
+    """An icon and a word on the tint of a status; `set` changes it, empty words hide it."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        text: str = "",
+        status: str = "ok",
+        icon: str | None = None,
+        *,
+        large: bool = False,
+        parent: QWidget | None = None,
+    ) -> None:
+        """``icon`` "" shows none, None the status' own; ``large`` is the chip of the app bar (26 high)."""
+        super().__init__(parent)
+        self._theme = theme
+        self._large = large
+        self._text, self._status, self._icon = "", "", icon
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        theme.changed.connect(self.updateGeometry)
+        self.set(text, status, icon)
+
+    @property
+    def text(self) -> str:
+        """The words shown now."""
+        return self._text
+
+    @property
+    def status(self) -> str:
+        """The status shown now."""
+        return self._status
+
+    def set(self, text: str, status: str = "ok", icon: str | None = None) -> None:
+        """Show another state; the chip is hidden while it has no words."""
+        if (text, status, icon) == (self._text, self._status, self._icon):
+            if not text:
+                self.hide()
+            return
+        self._theme.status(status)
+        self._text, self._status, self._icon = text, status, icon
+        self.setAccessibleName(text)
+        paint.show_when(self, bool(text))
+        self.updateGeometry()
+        self.update()
+
+    def _icon_name(self) -> str:
+        return self._theme.status(self._status).icon if self._icon is None else self._icon
+
+    def _side(self) -> float:
+        return self._theme.scaled(self._theme.size("icon", "small") + (1 if self._large else 0))
+
+    def _font(self) -> QFont:
+        font = self._theme.font("body" if self._large else "small")
+        font.setWeight(font.Weight.Medium)
+        return font
+
+    def sizeHint(self) -> QSize:
+        width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
+        if self._icon_name():
+            width += self._side() + CHIP_GAP
+        least = CHIP_HEIGHT + (4 if self._large else 0)
+        return QSize(round(width) + 1, max(least, round(paint.height_of(self._font())) + 6))
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self._text)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        status = theme.status(self._status)
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        edge = theme.colour("controlBorder") if theme.high_contrast else None
+        tint = status.tint or "sunken"
+        paint.box(painter, rect, rect.height() / 2, theme.colour(tint), edge)
+        plain = {"off": "textSecondary", "running": "text"}
+        ink = theme.colour(plain.get(self._status, status.colour))
+        left = float(CHIP_PADDING + (1 if self._large else 0))
+        name = self._icon_name()
+        if name:
+            side = self._side()
+            square = QRectF(left, (rect.height() - side) / 2, side, side)
+            paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
+            left += side + CHIP_GAP
+        paint.words(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
+        painter.end()
+
+
+class StatusItem(QWidget):
+    """One fact in the status bar: perhaps an icon, and a few words."""
+
+    ICON = 14
+
+    def __init__(self, theme: Theme, icon: str = "", text: str = "", status: str | None = None) -> None:
+        super().__init__()
+        self._theme = theme
+        self._icon, self._text, self._status = "", "", status
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
+        theme.changed.connect(self.updateGeometry)
+        self.set(icon, text, status)
+
+    @property
+    def text(self) -> str:
+        """What it says now."""
+        return self._text
+
+    def set(self, icon: str, text: str, status: str | None = None) -> None:
+        """Show another fact; without words the item is hidden. A status colours it."""
+        if (icon, text, status) == (self._icon, self._text, self._status):
+            return
+        self._icon, self._text, self._status = icon, text, status
+        self.setAccessibleName(text)
+        paint.show_when(self, bool(text))
+        self.updateGeometry()
+        self.update()
+
+    def _side(self) -> float:
+        return self._theme.scaled(self.ICON)
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("small")
+        width = paint.width_of(font, self._text) + (self._side() + 6 if self._icon else 0)
+        return QSize(round(width) + 1, round(paint.height_of(font)))
+
+    def minimumSizeHint(self) -> QSize:
+        wanted = self.sizeHint()
+        return QSize(min(wanted.width(), round(self._theme.scaled(LEAST_ITEM))), wanted.height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.tell_whole(self, self._text)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        theme = self._theme
+        rect = QRectF(self.rect())
+        loud = self._status in {"warn", "error"}
+        ink = theme.colour(theme.status(self._status).colour) if self._status and loud else None
+        if self._icon:
+            colour = ink or theme.colour(
+                theme.status(self._status).colour if self._status else "textSecondary"
+            )
+            side = self._side()
+            paint_icon(painter, QRectF(0, rect.center().y() - side / 2, side, side), self._icon, colour)
+            rect.setLeft(side + 6)
+        paint.words(painter, rect, self._text, theme.font("small"), ink or theme.colour("textSecondary"))
+        painter.end()
+
+
+class Sparkline(QWidget):
+    """A small curve of 56 x 16."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._values: tuple[float, ...] = ()
+        self.setFixedSize(SPARK)
+
+    def set_values(self, values: Sequence[float]) -> None:
+        """What to draw, oldest first."""
+        if tuple(values) != self._values:
+            self._values = tuple(values)
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        paint_sparkline(painter, QRectF(self.rect()), self._values, self._theme.colour("textSecondary"))
+        painter.end()
+
+
+def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], colour: QColor) -> None:
+    """One stroke through the values, oldest left, no axes; fewer than two values paint nothing.
+
+    The lower edge is 0 (or the least, where that is below), the upper one the largest: a rate that changes
+    little is a level line, and one that stops falls to the ground. Values that are no numbers paint nothing.
+    """
+    if len(values) < 2 or not isfinite(sum(values)):
+        return
+    lowest = min(0.0, *values)
+    span = (max(0.0, *values) - lowest) or 1.0
+    left, step = rect.left(), rect.width() / (len(values) - 1)
+    bottom, rise = rect.bottom() - 1, (rect.height() - 2) / span
+    curve = QPainterPath()
+    curve.reserve(len(values))
+    curve.moveTo(left, bottom - (values[0] - lowest) * rise)
+    draw_to = curve.lineTo
+    for index, value in enumerate(values):
+        draw_to(left + step * index, bottom - (value - lowest) * rise)
+    painter.save()
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(QPen(colour, SPARK_STROKE))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawPath(curve)
+    painter.restore()
+
+
+class Bar(QWidget):
+    """A sensor's value between its limits; None shows only the track."""
+
+    def __init__(self, theme: Theme, fraction: float | None = None) -> None:
+        super().__init__()
+        self._theme = theme
+        self._fraction: float | None = None
+        self.setFixedHeight(BAR_HEIGHT)
+        self.setMinimumWidth(40)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.set_fraction(fraction)
+
+    @property
+    def fraction(self) -> float | None:
+        """What is shown: 0 to 1, or None."""
+        return self._fraction
+
+    def set_fraction(self, fraction: float | None) -> None:
+        """Show a share from 0 to 1 (outside values are cut), or None for "not known"."""
+        value = None if fraction is None or fraction != fraction else min(max(fraction, 0.0), 1.0)  # noqa: PLR0124
+        if value != self._fraction:
+            self._fraction = value
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        paint.box(painter, rect, rect.height() / 2, self._theme.colour("sunken"))
+        if self._fraction:
+            rect.setWidth(max(rect.height(), rect.width() * self._fraction))
+            paint.box(painter, rect, rect.height() / 2, self._theme.colour("accent"))
+        painter.end()

@@ -1,0 +1,253 @@
+"""Fields to type into: to find and filter, for numbers with their unit, for long texts."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPlainTextEdit, QSizePolicy, QWidget
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.menus import EditMenu
+
+MOST_LINES = 5
+LEAST_HEIGHT = 34
+SHEET_PADDING = 9  # what the style sheet gives texts above and below, and a pixel for rounding
+
+
+class SearchField(QLineEdit):
+    """A field to filter or find, with its icon inside and the key that leads to it at the right."""
+
+    def __init__(self, theme: Theme, placeholder: str, key: str = "") -> None:
+        super().__init__()
+        self._theme, self._key = theme, key
+        self.setPlaceholderText(placeholder)
+        self.setAccessibleName(placeholder)
+        self.setProperty("quiet", "true")
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.setMinimumHeight(26)
+        EditMenu(theme, self)
+        self._arrange()
+        theme.changed.connect(self._arrange)
+
+    def _arrange(self) -> None:
+        right = round(paint.key_width(self._theme, self._key)) + 2 if self._key else 0
+        self.setTextMargins(20, 0, right, 0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self)
+        middle = self.height() / 2
+        paint_icon(painter, QRectF(9, middle - 7, 14, 14), "search", self._theme.colour("textTertiary"))
+        if self._key and not self.text():
+            paint.key_cap(painter, self._theme, self.width() - 5, middle, self._key)
+        painter.end()
+
+
+class FilterField(SearchField):
+    """Filters a list: Down and Return go on into the list (`leave`), Esc clears it."""
+
+    leave = Signal()
+
+    def __init__(self, theme: Theme, name: str) -> None:
+        """``name`` is what a screen reader says: "Filter topics"."""
+        super().__init__(theme, "Filter", "/")
+        self.setAccessibleName(name)
+        self.setMaximumWidth(190)
+        self.setMinimumWidth(90)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape and self.text():
+            self.clear()
+        elif event.key() in {Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+            self.leave.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class NumberField(QLineEdit):
+    """A number with its unit inside; a wrong one stays as it was typed and says what is wrong."""
+
+    number = Signal(float)
+    problem = Signal(str)
+
+    def __init__(
+        self, theme: Theme, minimum: float | None, maximum: float | None, unit: str = "", decimals: int = 0
+    ) -> None:
+        super().__init__()
+        self._theme, self._unit, self._decimals = theme, unit, decimals
+        self._minimum, self._maximum = minimum, maximum
+        self.sentence = ""
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setMinimumHeight(theme.size("control", "form") - 2)
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.editingFinished.connect(self._read)
+        theme.changed.connect(self._arrange)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        unit = paint.width_of(self._theme.font("body"), self._unit)
+        self.setTextMargins(0, 0, round(unit) + (6 if self._unit else 0), 0)
+
+    def show_number(self, value: float) -> None:
+        """Show a value that is known to be right."""
+        self.setText(f"{value:.{self._decimals}f}")
+        self._judge("")
+
+    def _read(self) -> None:
+        try:
+            value = float(self.text().strip().replace(",", "."))
+        except ValueError:
+            self._judge("This needs a number.")
+            return
+        if not math.isfinite(value):
+            self._judge("This needs a number.")
+        elif self._minimum is not None and value < self._minimum:
+            self._judge(f"The least is {self._minimum:g} {self._unit}".rstrip() + ".")
+        elif self._maximum is not None and value > self._maximum:
+            self._judge(f"The most is {self._maximum:g} {self._unit}".rstrip() + ".")
+        else:
+            self._judge("")
+            self.number.emit(value)
+
+    def _judge(self, sentence: str) -> None:
+        if sentence == self.sentence:
+            return
+        self.sentence = sentence
+        self.setProperty("wrong", "true" if sentence else "false")
+        self.style().unpolish(self)
+        self.style().polish(self)
+        self.problem.emit(sentence)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect()).adjusted(8, 0, -10, 0)
+        paint.words(painter, rect, self._unit, theme.font("body"), theme.colour("textTertiary"), paint.RIGHT)
+        if self.sentence:
+            square = QRectF(7, self.height() / 2 - 7, 14, 14)
+            paint_icon(painter, square, theme.status("error").icon, theme.colour("error"))
+        painter.end()
+
+
+class _Text(QPlainTextEdit):
+    """The text itself; Tab leaves it."""
+
+    left = Signal()
+    entered = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("bare", "true")
+        self.setProperty("ownFocus", "true")
+        self.setTabChangesFocus(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.document().setDocumentMargin(0)
+        self.viewport().setAutoFillBackground(False)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.entered.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.left.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and held:
+            event.ignore()  # the card's: try it
+        else:
+            super().keyPressEvent(event)
+
+
+class LongText(QWidget):
+    """Several lines of text in the frame of a field; `finished` when a person leaves it."""
+
+    changed = Signal()
+    finished = Signal()
+
+    def __init__(self, theme: Theme, name: str) -> None:
+        super().__init__()
+        self._theme = theme
+        self._wrong = False
+        self.setAccessibleName(name)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.edit = _Text()
+        self.edit.setAccessibleName(name)
+        EditMenu(theme, self.edit)
+        self.setFocusProxy(self.edit)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(3, 2, 3, 1)
+        row.addWidget(self.edit)
+        self.edit.textChanged.connect(self._grow)
+        self.edit.textChanged.connect(self.changed)
+        self.edit.left.connect(self.finished)
+        self.edit.left.connect(self.update)
+        self.edit.entered.connect(self.update)
+        theme.changed.connect(self._grow)
+        self._grow()
+
+    def text(self) -> str:
+        """What stands in it."""
+        return self.edit.toPlainText()
+
+    def set_text(self, text: str) -> None:
+        """Put another text into it."""
+        if text != self.text():
+            self.edit.setPlainText(text)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it is marked as wrong."""
+        return self._wrong
+
+    def mark(self, *, wrong: bool) -> None:
+        """Give it the edge of a wrong value, or take it away."""
+        if wrong != self._wrong:
+            self._wrong = wrong
+            self.update()
+
+    def _lines(self) -> int:
+        lines = 0
+        block = self.edit.document().firstBlock()
+        while block.isValid() and lines < MOST_LINES:
+            lines += max(1, block.layout().lineCount())
+            block = block.next()
+        return min(MOST_LINES, max(1, lines))
+
+    def _line_height(self) -> float:
+        return paint.height_of(self.edit.font())
+
+    def _grow(self) -> None:
+        lines = self._lines()
+        text = round(lines * self._line_height()) + SHEET_PADDING
+        high = max(round(self._theme.scaled(LEAST_HEIGHT)), text + 8)
+        self.edit.setFixedHeight(text)
+        shown = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MOST_LINES else None
+        self.edit.setVerticalScrollBarPolicy(shown or Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        if high != self.height():
+            self.setFixedHeight(high)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._grow()  # other words may wrap now
+
+    def sizeHint(self) -> QSize:
+        return QSize(240, self.height())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        edge = "error" if self._wrong else "accent" if self.edit.hasFocus() else "controlBorder"
+        fill = theme.colour("sunken" if theme.dark else "panel")
+        width = 2.0 if self.edit.hasFocus() else 1.0
+        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)
+        painter.end()

@@ -1,0 +1,52 @@
+"""Yes or no."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+
+
+class Switch(QAbstractButton):
+    """Yes or no: a switch with the word beside it."""
+
+    TRACK = QSize(36, 20)
+
+    def __init__(self, theme: Theme, text: str, on: bool = False) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setCheckable(True)
+        self.setChecked(on)
+        self.setText(text)
+        self.setAccessibleName(text)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setProperty("focusRadius", 10)
+        theme.changed.connect(self.updateGeometry)
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("bodyLarge")
+        gap = 10 if self.text() else 0
+        width = self.TRACK.width() + gap + paint.width_of(font, self.text())
+        return QSize(round(width) + 2, max(24, round(paint.height_of(font))))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self._theme
+        painter = QPainter(self)
+        rect = QRectF(self.rect())
+        track = QRectF(0, rect.center().y() - 10, self.TRACK.width(), self.TRACK.height())
+        on = self.isChecked()
+        if on and self.isEnabled():
+            paint.box(painter, track, 10, theme.colour("accent"))
+        else:
+            paint.box(painter, track, 10, theme.colour("sunken"), theme.colour("controlBorder"))
+        knob = QRectF(0, 0, 14, 14)
+        knob.moveCenter(QPointF(track.right() - 10 if on else track.left() + 10, track.center().y()))
+        paint.box(painter, knob, 7, theme.colour("onAccent" if on else "controlBorder"))
+        ink = theme.colour("text" if self.isEnabled() else "textDisabled")
+        paint.words(painter, rect.adjusted(46, 0, 0, 0), self.text(), theme.font("bodyLarge"), ink)
+        painter.end()

@@ -1,0 +1,84 @@
+"""What can be scrolled: words where large text leaves too little room, and rows that fill a panel."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtGui import QFontMetricsF
+from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+
+class Scrolled(QScrollArea):
+    """Something that asks for the height of all its lines, and scrolls when it gets less."""
+
+    def __init__(self, inside: QWidget) -> None:
+        super().__init__()
+        self._inside = inside
+        inside.setProperty("bare", "true")
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.viewport().setAutoFillBackground(False)
+        self.setWidget(inside)
+        inside.setAutoFillBackground(False)
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Maximum)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+
+    def heightForWidth(self, width: int) -> int:
+        inside = self._inside
+        return inside.heightForWidth(width) if inside.hasHeightForWidth() else inside.sizeHint().height()
+
+    def sizeHint(self) -> QSize:
+        wide = max(1, self.width())
+        return QSize(self._inside.sizeHint().width(), self.heightForWidth(wide))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(60, round(1.5 * QFontMetricsF(self._inside.font()).height()))
+
+    def viewportEvent(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.LayoutRequest:
+            self.updateGeometry()  # what is inside wants another height, which a scroll area keeps to itself
+        return super().viewportEvent(event)
+
+
+class PanelRows(QStackedWidget):
+    """Shows ``empty`` until it is told that there are rows."""
+
+    def __init__(self, empty: QWidget, name: str = "") -> None:
+        """``name`` is what a screen reader calls the rows."""
+        super().__init__()
+        inside = QWidget()
+        inside.setProperty("bare", "true")
+        self._column = QVBoxLayout(inside)
+        self._column.setContentsMargins(8, 8, 8, 8)
+        self._column.setSpacing(6)
+        self._column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setAccessibleName(name)
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(inside)
+        self.addWidget(empty)
+        self.addWidget(scroll)
+
+    def put(self, place: int, row: QWidget) -> None:
+        """Show a row at this place, also one that stands elsewhere."""
+        if self._column.indexOf(row) != place:
+            self._column.insertWidget(place, row)
+
+    def drop(self, row: QWidget) -> None:
+        """A row is not needed any more."""
+        self._column.removeWidget(row)
+        row.deleteLater()
+
+    def show_rows(self, shown: bool) -> None:
+        """Show the rows, or what says that there are none."""
+        self.setCurrentIndex(1 if shown else 0)
+
+    def fill(self, panel: QWidget) -> None:
+        """Take all of a panel's room."""
+        column = QVBoxLayout(panel)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self)
