@@ -87,7 +87,7 @@ def _main(given: Sequence[str]) -> int:
             os.environ[MASTER_VARIABLE] = master_address(options.master)
         except NepError as error:
             parser.error(str(error))
-    gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.startup.garbage`)
+    gc.disable()  # a tenth of the time to start; the window enables it again (`app.ui.startup.interpreter`)
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
     allow_many()

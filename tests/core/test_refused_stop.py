@@ -17,7 +17,7 @@ from app.core.run.runner_event import RunnerEvent
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Failed, Kind, Link, action, safe_stop
 from app.run import FAILED, run_file
-from app.ui.shell.bars.robots_chip import robots_chip
+from app.ui.shell.bars.app_bar import robots_chip
 from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace
 from tests.blocks.wire_robot import WireRobot

@@ -8,7 +8,7 @@ from PySide6.QtGui import QCursor, QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.ui.shell.bars.banner_place import FRESH_S
+from app.ui.shell.bars.banner import FRESH_S
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 

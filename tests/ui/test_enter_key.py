@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
-from app.ui.shell.enter_key import EnterKey
+from app.ui.shell.keyboard import EnterKey
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 

@@ -19,9 +19,8 @@ from app.robots import simulated
 from app.robots.description.description import parse, td_for
 from app.ui.application import Options, first_steps
 from app.ui.shell.actions.table import TABLE, shortcuts
-from app.ui.shell.coming import Coming
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.main_window import MainWindow
+from app.ui.shell.main_window import MainWindow, Placeholder
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 from app.ui.widgets.file_dialogs import SystemDialogs
@@ -602,9 +601,9 @@ def test_a_layout_that_comes_shows_its_bars_and_then_itself(
     show(qtbot, window)
     window.expect("behaviour")
     assert window.ring.target is None, "no ring round a page that is only words"
-    coming = window.findChild(Coming)
-    assert window.pages.currentWidget() is coming
-    assert coming.accessibleName() == "Getting the blocks ready."
+    placeholder = window.findChild(Placeholder)
+    assert window.pages.currentWidget() is placeholder
+    assert placeholder.accessibleName() == "Getting the blocks ready."
     assert not window.run_bar.isHidden()
     assert window.start.isHidden()
     commands.run("layout.behaviour")
@@ -632,7 +631,7 @@ def test_a_start_shows_what_was_left(
     monkeypatch.setattr(window, "begin", lambda: None)
     window.state.keep_layout("developer")
     steps = first_steps(window, commands, Options())
-    assert window.findChild(Coming).accessibleName() == "Getting the panels ready."
+    assert window.findChild(Placeholder).accessibleName() == "Getting the panels ready."
     for step in steps:
         step()
     assert window.showing == "developer"

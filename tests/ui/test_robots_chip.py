@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.ui.shell.bars.robots_chip import robots_chip
+from app.ui.shell.bars.app_bar import robots_chip
 
 
 def chip(*states: str, run: str = "idle", silent: str | None = None) -> tuple[str, str]:

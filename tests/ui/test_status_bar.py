@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.ui.shell.bars.robots_chip import robots_chip
+from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import Facts, StatusBar
 from app.ui.theme.theme import Theme
 from tests.ui import fakes

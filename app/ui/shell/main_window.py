@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import QSize, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
@@ -13,34 +13,32 @@ from app.core.faults import survived
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.shell.bars.app_bar import AppBar
-from app.ui.shell.bars.banner import BannerPlace
-from app.ui.shell.bars.banner_place import BannerRoom
-from app.ui.shell.bars.robots_chip import robots_chip
+from app.ui.shell.bars.app_bar import AppBar, robots_chip
+from app.ui.shell.bars.banner import BannerPlace, BannerRoom
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
 from app.ui.shell.bars.status_bar import Facts, StatusBar
 from app.ui.shell.bars.toast import Toast
-from app.ui.shell.coming import Coming
 from app.ui.shell.dialogs.motion_permission import MoveQuestion
 from app.ui.shell.docking.dock import Dock, fitting
 from app.ui.shell.docking.layouts import LAYOUTS, layout_named
 from app.ui.shell.docking.saved_layouts import Arrangements
 from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.documents.flush import Leaving
-from app.ui.shell.enter_key import EnterKey
 from app.ui.shell.focus_ring import FocusRing
-from app.ui.shell.keyboard import PanelFocus
+from app.ui.shell.keyboard import EnterKey, PanelFocus
 from app.ui.shell.start_page.page import Example, StartPage
 from app.ui.shell.window_state import WindowState
-from app.ui.startup.garbage import Settling
+from app.ui.startup.interpreter import GcFreezeTimer
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button
+from app.ui.widgets import Button, label
 
 TICK_MS = 33
 SMALLEST = QSize(1100, 700)
 FIRST_SIZE = QSize(1440, 900)
 START = "start"
 FACTS_EVERY = 8  # ticks
+SOON_WORDS = {"behaviour": "Getting the blocks ready."}
+OTHER_SOON_WORDS = "Getting the panels ready."
 
 
 class MainWindow(QMainWindow):
@@ -81,7 +79,7 @@ class MainWindow(QMainWindow):
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
         self.timer.timeout.connect(self._half_tick)
-        self.settling = Settling(self)
+        self.gc_freeze = GcFreezeTimer(self)
         self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
         self.show_start()
 
@@ -158,12 +156,12 @@ class MainWindow(QMainWindow):
     def expect(self, layout: str) -> None:
         """Show the bars of a layout, and in its place that it is made in a moment."""
         self.showing = layout
-        coming = Coming(layout)
-        self.pages.addWidget(coming)
-        self.pages.setCurrentWidget(coming)
-        coming.setFocus()
+        placeholder = Placeholder(layout)
+        self.pages.addWidget(placeholder)
+        self.pages.setCurrentWidget(placeholder)
+        placeholder.setFocus()
         self._show_bars(layout)
-        self.bench_made.connect(coming.deleteLater)
+        self.bench_made.connect(placeholder.deleteLater)
 
     def _show_bars(self, layout: str | None) -> None:
         self.bar.show_layout(layout)
@@ -308,8 +306,8 @@ class MainWindow(QMainWindow):
         """Start the session and the tick."""
         self.session.start()
         self.timer.start()
-        self.settling.start()
-        self.bench_made.connect(self.settling.start)
+        self.gc_freeze.start()
+        self.bench_made.connect(self.gc_freeze.start)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self._shut:
@@ -348,3 +346,16 @@ class MainWindow(QMainWindow):
         for name, bench in self.benches.items():
             self.arrangements.keep(bench, name)
         self.state.keep_theme(self.theme)
+
+
+class Placeholder(QWidget):
+    """One quiet sentence in place of a layout that is made in a moment: no start waits for its panels."""
+
+    def __init__(self, layout: str) -> None:
+        super().__init__()
+        words = SOON_WORDS.get(layout, OTHER_SOON_WORDS)
+        self.setAccessibleName(words)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setProperty("ownFocus", True)  # it only keeps the keyboard; there is nothing to ring
+        column = QVBoxLayout(self)
+        column.addWidget(label(words, "bodyLarge", role="textSecondary"), 1, Qt.AlignmentFlag.AlignCenter)

@@ -5,13 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence, QMouseEvent
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QWindow
 from PySide6.QtWidgets import QAbstractButton, QApplication
 
-from app.ui.shell.every_window import EveryWindow
 from app.ui.widgets import Button, StopButton
 
 _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
+
+
+class EveryWindow(QObject):
+    """Its `eventFilter` sees what each window gets that has had the keyboard, before anything in it does."""
+
+    def __init__(self, parent: QObject) -> None:
+        """It lives as long as ``parent``."""
+        super().__init__(parent)
+        application = QApplication.instance()
+        if isinstance(application, QGuiApplication):
+            application.focusWindowChanged.connect(self._listen_to)
+        self._listen_to(QGuiApplication.focusWindow())
+
+    def _listen_to(self, window: QWindow | None) -> None:
+        if window is not None:
+            window.removeEventFilter(self)
+            window.installEventFilter(self)
 
 
 def stop_at(place: QPoint) -> QAbstractButton | None:

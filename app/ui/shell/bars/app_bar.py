@@ -5,15 +5,22 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractButton, QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
-from app.ui.shell.bars.palette_field import PaletteField
+from app.core.session import Session
 from app.ui.shell.docking.layouts import Layout
 from app.ui.shell.logo import Logo
+from app.ui.text.numbers import spoken_key
+from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, Segments, StopButton, paint
+
+FIELD_WORDS = "Find a command or panel"
+WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
+LEAST_ROOM = 44  # px of the field: less than that for the words, and only icon and key are shown
+CHIP_WORDS = {"ready": "ready", "busy": "moving", "away": "away"}
 
 
 class AppBar(QWidget):
@@ -92,3 +99,93 @@ class AppBar(QWidget):
         painter.fillRect(rect, self._theme.colour("window"))
         paint.hairline(painter, QRectF(rect), Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()
+
+
+class PaletteField(QAbstractButton):
+    """Opens the command palette; it looks like a field, with its key at the right.
+
+    In narrow windows only icon and key are left.
+    """
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._theme, self._key = theme, ""
+        self.setText(FIELD_WORDS)
+        self.setAccessibleName(FIELD_WORDS)
+        self.setProperty("command", "palette.open")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", theme.radius("control"))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        theme.changed.connect(self.updateGeometry)
+
+    def show_key(self, key: str) -> None:
+        """The key that opens the palette now; "" for none."""
+        self._key = spoken_key(key)
+        self.updateGeometry()
+        self.update()
+
+    def _side(self) -> float:
+        return self._theme.scaled(ICON)
+
+    def _key_room(self) -> float:
+        return paint.key_width(self._theme, self._key) + 7 if self._key else 0.0
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("body")
+        wide = LEFT + self._side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_room()
+        high = max(HIGH, round(paint.height_of(font)) + 8)
+        return QSize(max(WIDE, round(wide)), high)
+
+    def minimumSizeHint(self) -> QSize:
+        least = LEFT + self._side() + GAP + (self._key_room() or LEFT)
+        return QSize(round(least), self.sizeHint().height())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect, middle = QRectF(self.rect()), self.height() / 2
+        over = self.underMouse() or self.isDown()
+        fill = theme.colour("hover" if over else "panel")
+        paint.box(painter, rect, theme.radius("control"), fill, theme.colour("borderStrong"))
+        side = self._side()
+        square = QRectF(LEFT, middle - side / 2, side, side)
+        paint_icon(painter, square, "search", theme.colour("textSecondary"))
+        font = theme.font("body")
+        left = LEFT + side + GAP
+        room = rect.width() - left - self._key_room() - 4
+        if room >= self._theme.scaled(LEAST_ROOM):
+            area = QRectF(left, 0, room, rect.height())
+            paint.words(painter, area, self.text(), font, theme.colour("textSecondary"))
+        if self._key:
+            paint.key_cap(painter, theme, rect.right() - 6, middle, self._key)
+        painter.end()
+
+
+def robots_chip(session: Session) -> tuple[str, str]:
+    """The chip's words and status: "Pepper ready", "2 robots", "Camera silent", "No robot"."""
+    links = [link for link in session.fleet.links if link.state != "away"]
+    if not links:
+        return "No robot", "off"
+    moving = [link for link in links if link.state == "not stopped"]
+    if moving:
+        others = f" and {len(moving) - 1} more" if len(moving) > 1 else ""
+        return f"{moving[0].name}{others}: {moving[0].chip.removeprefix('virtual, ')}", "error"
+    stopping = [link for link in links if link.state == "stopping"]
+    if stopping:
+        return f"{stopping[0].name if len(stopping) == 1 else f'{len(stopping)} robots'} stopping", "running"
+    silent = [link for link in links if link.state == "silent"]
+    if silent:
+        words = silent[0].silent or "silent"
+        if len(silent) > 1:
+            return f"{len(silent)} robots silent", "error"
+        return (f"{silent[0].name}: {words}" if len(links) > 1 else words[:1].upper() + words[1:]), "error"
+    if len(links) > 1:
+        return f"{len(links)} robots", "ok"
+    return f"{links[0].name} {_doing(session, links[0].state)}", "ok"
+
+
+def _doing(session: Session, state: str) -> str:
+    """What the only robot does, for its program or for a person."""
+    if not session.runs.active:
+        return CHIP_WORDS[state]
+    return "holds still" if session.runs.view().state == "paused" else "running"

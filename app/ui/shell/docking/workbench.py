@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import binascii
 from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
@@ -9,9 +11,7 @@ from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.shell.docking import dock_state
 from app.ui.shell.docking.dock import Dock, made
-from app.ui.shell.docking.dock_places import AREA, join
 from app.ui.shell.docking.layouts import Layout
 from app.ui.shell.docking.sizes import fit
 from app.ui.theme.theme import Theme
@@ -19,6 +19,8 @@ from app.ui.theme.theme import Theme
 ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
 NARROW_PX = 1280
+AREA = Qt.DockWidgetArea.LeftDockWidgetArea
+STATE_VERSION = 1
 
 
 class Workbench(QMainWindow):
@@ -189,7 +191,7 @@ class Workbench(QMainWindow):
             return
         self._narrow = narrow
         if narrow:
-            self._wide = self.saveState(dock_state.VERSION)
+            self._wide = self.saveState(STATE_VERSION)
             self.tabifyDockWidget(first, second)
             first.raise_()
         elif second in self.tabifiedDockWidgets(first):
@@ -200,7 +202,7 @@ class Workbench(QMainWindow):
     def _widen(self) -> None:
         """Put back what was before the tabs: Qt makes a tab of whatever is split off a tab."""
         opened = self.open_names()
-        if not self.restoreState(self._wide, dock_state.VERSION):
+        if not self.restoreState(self._wide, STATE_VERSION):
             self.arrange()
         for name, dock in self.docks.items():
             if name not in opened:
@@ -264,8 +266,8 @@ class Workbench(QMainWindow):
             "open": [
                 name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
             ],
-            "docks": dock_state.written(self.saveState(dock_state.VERSION)),
-            "wide": dock_state.written(self._wide),
+            "docks": state_text(self.saveState(STATE_VERSION)),
+            "wide": state_text(self._wide),
             "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
             "narrow": self._narrow,
             "moved": self._moved,
@@ -280,16 +282,16 @@ class Workbench(QMainWindow):
         for name in names:
             if isinstance(name, str) and name not in self.docks:
                 self.open(name)
-        if not self.restoreState(dock_state.read(saved.get("docks")), dock_state.VERSION):
+        if not self.restoreState(state_of(saved.get("docks")), STATE_VERSION):
             self.arrange()
             return False
         self._size_timer.stop()  # a person's sizes, not those of `arrange`
-        self._wide = dock_state.read(saved.get("wide"))
+        self._wide = state_of(saved.get("wide"))
         self._narrow, self._moved = saved.get("narrow") is True, saved.get("moved") is True
         for name, dock in self.docks.items():
-            state_of = panels.get(name) if isinstance(panels, Mapping) else None
-            if isinstance(state_of, Mapping):
-                dock.give_back(state_of)
+            kept = panels.get(name) if isinstance(panels, Mapping) else None
+            if isinstance(kept, Mapping):
+                dock.give_back(kept)
         self._tabs_soon()
         return True
 
@@ -305,3 +307,48 @@ def _raiser(dock: Dock) -> Callable[[], object]:
         dock.panel.setFocus(Qt.FocusReason.OtherFocusReason)
 
     return bring
+
+
+def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
+    """Give a panel a place: below the row above its own, beside its home, else beside the last panel."""
+    name = dock.description.name
+    placed = {
+        other.description.name: other
+        for other in docks.values()
+        if other is not dock
+        and not other.isFloating()
+        and bench.dockWidgetArea(other) != Qt.DockWidgetArea.NoDockWidgetArea
+    }
+    above = _above(layout, name)
+    home = layout.homes.get(name, "")
+    if above in placed and not placed[above].isHidden() and not bench.tabifiedDockWidgets(placed[above]):
+        bench.splitDockWidget(placed[above], dock, Qt.Orientation.Vertical)
+    elif placed:
+        bench.tabifyDockWidget(placed[home] if home in placed else list(placed.values())[-1], dock)
+    else:
+        bench.addDockWidget(AREA, dock)
+
+
+def _above(layout: Layout, name: str) -> str:
+    """The panel of the row above that of one which comes later."""
+    if name in layout.later:
+        for column in layout.columns:
+            for (names, _), (below, _) in zip(column.rows, column.rows[1:], strict=False):
+                if name in below:
+                    return names[0]
+    return ""
+
+
+def state_text(state: QByteArray) -> str:
+    """Qt's state of the docks as text for the settings."""
+    return base64.b64encode(state.data()).decode("ascii")
+
+
+def state_of(text: object) -> QByteArray:
+    """What `state_text` made of a state; empty when it is something else."""
+    if not isinstance(text, str):
+        return QByteArray()
+    try:
+        return QByteArray(base64.b64decode(text, validate=True))
+    except (binascii.Error, ValueError):
+        return QByteArray()

@@ -16,7 +16,6 @@ from app.core.session import Session
 from app.core.storage import deep_json
 from app.core.storage.settings import home
 from app.errors import AppError, DocumentError, SettingsError
-from app.ui.shell.documents.file_words import sentence_of, strange_words
 from app.ui.widgets.file_dialogs import Asks
 
 
@@ -290,3 +289,19 @@ class Files:
         what, _, then = sentence.partition("; ")
         detail = f"{then[:1].upper()}{then[1:]}." if then else ""
         self._session.alerts.put(alert, "error", f"{what}.", detail, button=button, action=action)
+
+
+def sentence_of(error: Exception) -> str:
+    """What is wrong with a file, beginning with its name."""
+    if isinstance(error, DocumentError) and error.path is not None:
+        return f"{error.path.name} {error.reason}"
+    words = str(error)
+    return words[:1].upper() + words[1:]
+
+
+def strange_words(paths: Sequence[Path]) -> str:
+    """What is wrong with files that are no behaviours."""
+    names = [path.name or str(path) for path in paths]
+    shown = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    are = "is no behaviour" if len(names) == 1 else "are no behaviours"
+    return f"{shown} {are}; behaviours are files ending in {SUFFIX}"
