@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.pictures.robot_boxes import boxes_on, camera_of
+from app.ui.pictures.boxes import boxes_on, camera_of
 from app.ui.pictures.view import SILENT_AFTER_S, PictureView, rate_sentence
 from app.ui.text.numbers import age_words
 from app.ui.widgets import Chip, Elided, EmptyAction, EmptyState

@@ -1,4 +1,4 @@
-"""What was recognised in a picture, and how it is marked."""
+"""What was recognised in a picture, how it is marked, and on which pictures it belongs."""
 
 from __future__ import annotations
 
@@ -42,6 +42,30 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[Box, ...]:
             area = QRectF(x / width, y / height, w / width, h / height)
             found.append(Box(str(item.get("name", "")), _number(item.get("confidence")), area, kind))
     return tuple(found)
+
+
+def boxes_on(link: RobotLink, topic: str) -> tuple[Box, ...]:
+    """The boxes of all detections that were made in this camera's pictures; one colour for each sensor."""
+    cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
+    found: list[Box] = []
+    detecting = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
+    for kind, sensor in enumerate(detecting):
+        if sensor.camera is None or sensor.camera in cameras:
+            found += boxes_of(link.values.get(sensor.name), kind)
+    return tuple(found)
+
+
+def camera_of(link: RobotLink) -> Sensor | None:
+    """The robot's first camera, or None."""
+    return next((sensor for sensor in link.robot.sensors if sensor.is_image and sensor.topic), None)
+
+
+def owner_of(session: Session, topic: str) -> RobotLink | None:
+    """The robot to which a topic's camera belongs, or None."""
+    for link in session.fleet.links:
+        if any(sensor.is_image and sensor.topic == topic for sensor in link.robot.sensors):
+            return link
+    return None
 
 
 def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: Box) -> None:

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.pictures.boxes import Box, paint_box
 from app.ui.pictures.placement import PicturePlace
-from app.ui.pictures.silent import grey, paint_around, paint_silent
 from app.ui.text.numbers import age_words
+from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
@@ -25,6 +25,9 @@ LABEL_EDGE = 8
 SHARP_FROM = 2.0  # so many pixels of the screen for one of the picture: then it has edges
 AGE_EVERY = 8  # refreshes: nobody reads an age 30 times a second
 OLDEST_S = 3600.0
+COARSE = QSize(16, 12)
+DIMMED, SILENT = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
+ICON = 28.0
 
 
 def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
@@ -219,6 +222,38 @@ class PictureView(QWidget):
         tag = QRectF(LABEL_EDGE, self.height() - LABEL_EDGE - high, width, high)
         paint.box(painter, tag, 4, QColor(0, 0, 0, 190))
         paint.words(painter, tag.adjusted(8, 0, -4, 0), self.words, font, QColor("white"))
+
+
+def paint_around(painter: QPainter, view: QRectF, image: QImage) -> None:
+    """Fill the view with the picture's own colours, blurred and dark: beside it there is no black."""
+    ignore, smooth = Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation
+    painter.save()
+    painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+    painter.drawImage(view, image.scaled(COARSE, ignore, smooth))
+    painter.restore()
+    painter.fillRect(view, DIMMED)
+
+
+def grey(image: QImage) -> QImage:
+    """The same picture without colours."""
+    return image.convertToFormat(QImage.Format.Format_Grayscale8)
+
+
+def paint_silent(painter: QPainter, theme: Theme, view: QRectF, words: str) -> None:
+    """Over a grey picture: a camera, and how old the picture is."""
+    painter.fillRect(view, SILENT)
+    font = theme.font("bodyLarge")
+    font.setWeight(font.Weight.DemiBold)
+    line = paint.height_of(font)
+    with_icon = view.height() >= ICON + line + 12
+    middle = view.center()
+    if with_icon:
+        square = QRectF(0, 0, ICON, ICON)
+        square.moveCenter(QPointF(middle.x(), middle.y() - line / 2 - 2))
+        paint_icon(painter, square, "camera", QColor("white"))
+    top = middle.y() + ICON / 2 - line / 2 + 4 if with_icon else middle.y() - line / 2
+    room = QRectF(view.left() + 8, top, view.width() - 16, line + 2)
+    paint.words(painter, room, words, font, QColor("white"), paint.CENTRE)
 
 
 def _age_of(picture: Picture) -> str:

@@ -14,8 +14,8 @@ from app.core.messages import snapshots
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.image.actions import PictureActions
 from app.ui.panels.image.snapshot import SnapshotJob
+from app.ui.pictures.boxes import boxes_on, owner_of
 from app.ui.pictures.placement import PicturePlace
-from app.ui.pictures.robot_boxes import boxes_on, owner_of
 from app.ui.pictures.zoom import ZoomablePicture
 from app.ui.text import plain
 from app.ui.widgets import EmptyAction, EmptyState, IconButton
