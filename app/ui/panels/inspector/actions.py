@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 
-from app.ui.panels.inspector.footer import plain_words
+from app.ui.panels.inspector.values import plain_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable

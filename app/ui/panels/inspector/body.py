@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from app.ui.panels.inspector.compare import CompareStrip
+from app.ui.panels.inspector.diff import Counts, changes_words
 from app.ui.panels.inspector.find import FindBar
 from app.ui.panels.inspector.footer import Foot
 from app.ui.panels.inspector.hex_view import HexView
@@ -16,12 +16,36 @@ from app.ui.panels.inspector.tree_model import TreeModel
 from app.ui.panels.inspector.tree_view import TreeView
 from app.ui.text.numbers import size_words
 from app.ui.theme.theme import Theme
-from app.ui.widgets import EmptyAction, EmptyState, IconButton, Line, Segments, label
+from app.ui.widgets import Elided, EmptyAction, EmptyState, IconButton, Line, Segments, label
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
 
 NOTHING, LARGE, TREE, RAW = range(4)
+
+
+class CompareStrip(QWidget):
+    """A line above the tree while messages are compared: with what, how they differ, changes only."""
+
+    only_changed = Signal(bool)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._with = ""
+        self.words = Elided("small", "textSecondary")
+        self.only = IconButton(theme, "filter", "Show changes only", checkable=True, size=24)
+        self.only.toggled.connect(self.only_changed)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 3, 8, 3)
+        row.setSpacing(6)
+        row.addWidget(self.words, 1)
+        row.addWidget(self.only)
+        self.hide()
+
+    def say(self, compared_with: str, counts: Counts, whole: bool) -> None:
+        """``Message before: 3 changed, 1 added``."""
+        self.words.setText(f"{compared_with}: {changes_words(counts, whole)}")
+        self.setAccessibleDescription(self.words.text())
 
 
 class InspectorBody(QWidget):

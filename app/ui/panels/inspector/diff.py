@@ -13,7 +13,10 @@ from app.ui.panels.inspector.values import is_container, keys_of, size_of, value
 
 Mark = Literal["", "changed", "added", "removed"]
 Key = str | int
-MOST = 5000  # children of one value that are looked through for changes
+MOST_CHILDREN = 5000  # of one value that are looked through for changes
+MOST_VALUES = 20_000  # of a message that are counted
+Part = tuple[Key, object, object, Mark]
+Counts = dict[Mark, int]
 
 
 class _Nothing:
@@ -27,8 +30,9 @@ class _Nothing:
 
 
 OFF: Final = _Nothing("nothing to compare with")
+
+
 MISSING: Final = _Nothing("missing")
-Part = tuple[Key, object, object, Mark]
 
 
 def differs(before: object, after: object) -> bool:
@@ -58,16 +62,48 @@ def parts_of(
 
     A child is its key, its value, the value before, and how they differ. What was removed stands after what
     is there, with its old value. All below something added is added, all below something removed is removed
-    (``mark`` is the parent's). For ``changes_only`` the first `MOST` children are looked through.
+    (``mark`` is the parent's). For ``changes_only`` the first `MOST_CHILDREN` are looked through.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         whole: Mark = "removed" if mark == "removed" else "added"
         pairs = zip(keys_of(value, count), values_of(value, count), strict=False)
         return [(key, below, MISSING, whole) for key, below in pairs], size_of(value)
     if changes_only:
-        found = [part for part in islice(_compared(value, base), MOST) if part[3]]
+        found = [part for part in islice(_compared(value, base), MOST_CHILDREN) if part[3]]
         return found[:count], len(found)
     return list(islice(_compared(value, base), count)), _total(value, base)
+
+
+def count_changes(value: object, base: object, most: int = MOST_VALUES) -> tuple[Counts, bool]:
+    """How many values were changed, added and removed, and whether these are all.
+
+    Of something added or removed only its top counts. At most ``most`` values are looked at, and the first
+    ones of long lists.
+    """
+    counts: Counts = {"changed": 0, "added": 0, "removed": 0}
+    if base is OFF:
+        return counts, True
+    whole = True
+    waiting: list[tuple[object, object, Mark]] = [(value, base, mark_of(value, base))]
+    looked = 0
+    while waiting and looked < most:
+        here, before, mark = waiting.pop()
+        looked += 1
+        if mark == "changed" and is_container(here) and is_container(before):
+            parts, _total = parts_of(here, before, mark, most, changes_only=True)
+            whole = whole and max(size_of(here), size_of(before)) <= MOST_CHILDREN
+            waiting += [(below, was, how) for _key, below, was, how in parts]
+        elif mark:
+            counts[mark] += 1
+    return counts, whole and not waiting
+
+
+def changes_words(counts: Counts, whole: bool = True) -> str:
+    """``3 changed, 1 added``; ``no difference``; ``at least`` in front when not all was looked through."""
+    said = ", ".join(f"{count} {mark}" for mark, count in counts.items() if count)
+    if not said:
+        return "no difference" if whole else "no difference at the start of long lists"
+    return said if whole else f"at least {said}"
 
 
 def _compared(value: object, base: object) -> Iterator[Part]:

@@ -1,83 +1,23 @@
-"""Parts of the inspector: what it says of pictures, what it copies, and its foot."""
+"""The foot of the inspector: the path of the chosen value, the facts of the message, the legend."""
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.messages.lazy_json import LazyList, LazyObject
 from app.ui.text import plain
 from app.ui.text.numbers import age_words, grouped, latency_words, size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Changing, IconButton, Line, label, paint
-from nep.errors import NepError
 
 if TYPE_CHECKING:
-    from app.core.network.topics import Topic
     from nep.messages.message import Message
 
 FACTS_S = 0.1  # nobody reads faster, and each time is painted
-LARGE_BYTES = 1_000_000  # above, a message is never decoded in the window's thread
-
-
-def image_summary(message: Message) -> Mapping[str, object]:
-    """What is worth reading of a picture: how it is coded, its shape, its bytes; never its pixels."""
-    shape = message.extension.get("shape")
-    if shape is None:
-        shape = list(getattr(message.payload, "shape", ()))
-    height, width, *depth = (
-        [*shape, 0, 0][: max(2, len(shape))] if isinstance(shape, (list, tuple)) else (0, 0)
-    )
-    return {
-        "encoding": message.extension.get("encoding", "not told"),
-        "width": width,
-        "height": height,
-        "channels": depth[0] if depth else 1,
-        "size": size_words(message.size_bytes),
-    }
-
-
-def tells_its_shape(message: Message) -> bool:
-    """Whether it is a picture that can be summed up without decoding it."""
-    return message.codec == "image" and message.extension.get("shape") is not None
-
-
-def plain_words(value: object) -> str:
-    """A value for the clipboard: text as it is, everything else as JSON."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, (bytes, bytearray, memoryview)):
-        return bytes(value).hex(" ")
-    if isinstance(value, (LazyList, LazyObject)):
-        return str(value.text, "utf-8", "replace")
-    return json.dumps(value, indent=2, ensure_ascii=False, default=str)
-
-
-def payload_or(message: Message, otherwise: object) -> object:
-    """A message's decoded value; ``otherwise`` for what can't be read or is too large to be read here."""
-    if message.size_bytes > LARGE_BYTES or message.codec == "image":
-        return otherwise
-    try:
-        return message.payload
-    except NepError:
-        return otherwise
-
-
-def live_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
-    """The words, status and icon of the chip that says whether what is shown is still coming."""
-    if frozen:
-        return "frozen", "off", "snowflake"
-    if topic is None:
-        return "gone", "off", ""
-    if topic.gone_s is not None:
-        return f"gone {int(topic.gone_s)} s", "off", ""
-    return "live", "info", ""
 
 
 def message_facts(message: Message, since_ns: int = 0) -> str:

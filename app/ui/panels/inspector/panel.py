@@ -14,16 +14,9 @@ from app.core.messages.reader import Reader, Reading
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE, InspectorBody
-from app.ui.panels.inspector.compare import count_changes
-from app.ui.panels.inspector.diff import OFF
-from app.ui.panels.inspector.footer import (
-    LARGE_BYTES,
-    image_summary,
-    live_words,
-    message_facts,
-    payload_or,
-    tells_its_shape,
-)
+from app.ui.panels.inspector.diff import OFF, count_changes
+from app.ui.panels.inspector.footer import message_facts
+from app.ui.panels.inspector.values import LARGE_BYTES, image_summary, payload_or, tells_its_shape
 from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.menus import Menu
 from nep.errors import NepError
@@ -117,7 +110,7 @@ class InspectorPanel(PanelWidget):
         if not self._topic:
             return
         topic = self.session.topics.get(self._topic)
-        self.live.set(*live_words(topic, self.frozen))
+        self.live.set(*chip_words(topic, self.frozen))
         newest = topic.newest if topic is not None and topic.gone_s is None else None
         if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
             self._take(topic, newest)
@@ -316,6 +309,17 @@ class InspectorPanel(PanelWidget):
     def shut(self) -> None:
         self._leave()
         self.reader.close()
+
+
+def chip_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
+    """The words, status and icon of the chip that says whether what is shown is still coming."""
+    if frozen:
+        return "frozen", "off", "snowflake"
+    if topic is None:
+        return "gone", "off", ""
+    if topic.gone_s is not None:
+        return f"gone {int(topic.gone_s)} s", "off", ""
+    return "live", "info", ""
 
 
 PANEL = Panel("inspector", "Inspector", "list-tree", (ANY_TYPE,), InspectorPanel)

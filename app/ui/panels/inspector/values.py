@@ -1,12 +1,22 @@
-"""Decoded values as the tree shows them: their keys, their words, and where a word is found in them."""
+"""Decoded values as the inspector shows them: keys, words, where a word is found, and what is copied."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
+from typing import TYPE_CHECKING
+
+from app.core.messages.lazy_json import LazyList, LazyObject
+from app.ui.text.numbers import size_words
+from nep.errors import NepError
+
+if TYPE_CHECKING:
+    from nep.messages.message import Message
 
 TEXT_LIMIT = 400
 SEARCH_LIMIT = 20_000
+LARGE_BYTES = 1_000_000  # above, a message is never decoded in the window's thread
 
 
 def is_container(value: object) -> bool:
@@ -71,3 +81,46 @@ def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tup
             yield path
         inside = zip(keys_of(here, limit), values_of(here, limit), strict=False)
         waiting.extend(((*path, key), below) for key, below in reversed(list(inside)))
+
+
+def plain_words(value: object) -> str:
+    """A value for the clipboard: text as it is, everything else as JSON."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return bytes(value).hex(" ")
+    if isinstance(value, (LazyList, LazyObject)):
+        return str(value.text, "utf-8", "replace")
+    return json.dumps(value, indent=2, ensure_ascii=False, default=str)
+
+
+def payload_or(message: Message, otherwise: object) -> object:
+    """A message's decoded value; ``otherwise`` for what can't be read or is too large to be read here."""
+    if message.size_bytes > LARGE_BYTES or message.codec == "image":
+        return otherwise
+    try:
+        return message.payload
+    except NepError:
+        return otherwise
+
+
+def tells_its_shape(message: Message) -> bool:
+    """Whether it is a picture that can be summed up without decoding it."""
+    return message.codec == "image" and message.extension.get("shape") is not None
+
+
+def image_summary(message: Message) -> Mapping[str, object]:
+    """What is worth reading of a picture: how it is coded, its shape, its bytes; never its pixels."""
+    shape = message.extension.get("shape")
+    if shape is None:
+        shape = list(getattr(message.payload, "shape", ()))
+    height, width, *depth = (
+        [*shape, 0, 0][: max(2, len(shape))] if isinstance(shape, (list, tuple)) else (0, 0)
+    )
+    return {
+        "encoding": message.extension.get("encoding", "not told"),
+        "width": width,
+        "height": height,
+        "channels": depth[0] if depth else 1,
+        "size": size_words(message.size_bytes),
+    }
