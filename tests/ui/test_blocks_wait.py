@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QWidget
 
-from app.ui.panels.behaviour.blocks_wait import PATIENCE_S, BlocksWait
+from app.ui.panels.behaviour.panel import WAIT_UNTIL_S, BlocksWait
 
 
 def test_words_come_late_and_go_with_the_page(qtbot) -> None:
@@ -14,7 +14,7 @@ def test_words_come_late_and_go_with_the_page(qtbot) -> None:
     now = [10.0]
     wait = BlocksWait(place, lambda: now[0])
     wait.tell(ready=False)
-    now[0] += PATIENCE_S - 0.01
+    now[0] += WAIT_UNTIL_S - 0.01
     wait.tell(ready=False)
     assert wait.words.isHidden()
     now[0] += 0.02

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from app.ui.robot_drawing.pepper_face import EMOTIONS
+from app.ui.robot_drawing.pepper import EMOTIONS
 from app.ui.robot_drawing.room import Stage
 from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, Room, Thing

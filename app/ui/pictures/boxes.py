@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+
+if TYPE_CHECKING:
+    from app.core.robots.robot_link import RobotLink
+    from app.core.session import Session
+    from app.robots.description.description import Sensor
 
 # Boxes lie on pictures, whatever the theme: two bright colours with dark words.
 BOX_COLOURS = ("#FFC53D", "#5FD4F4", "#7BE0A0", "#F79AC0")

@@ -19,7 +19,7 @@ OUR_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600
 """Labels between the kinds of text in the tokens: size and weight."""
 
 
-class Look(Protocol):
+class ThemeValues(Protocol):
     """What the sheet asks of a theme."""
 
     @property
@@ -119,38 +119,38 @@ Workbench > QTabBar::tab {{ width: 0; height: 0; margin: 0; padding: 0; border: 
 """
 
 
-def _labels(look: Look) -> str:
-    kinds = {name: (kind.size_px, kind.weight) for name, kind in look.text_kinds().items()} | OUR_KINDS
+def _labels(theme: ThemeValues) -> str:
+    kinds = {name: (kind.size_px, kind.weight) for name, kind in theme.text_kinds().items()} | OUR_KINDS
     rules = []
     for name, (size_px, weight) in kinds.items():
-        family = look.family("mono" if name == "code" else "text")
+        family = theme.family("mono" if name == "code" else "text")
         rules.append(
             f'QLabel[kind="{name}"] {{ font-family: "{family}"; font-weight: {weight};'
-            f" font-size: {round(look.scaled(size_px))}px; }}"
+            f" font-size: {round(theme.scaled(size_px))}px; }}"
         )
-    rules.extend(f'QLabel[role="{role}"] {{ color: {look.hex(role)}; }}' for role in LABEL_ROLES)
+    rules.extend(f'QLabel[role="{role}"] {{ color: {theme.hex(role)}; }}' for role in LABEL_ROLES)
     return "\n".join(rules)
 
 
 class _Roles(dict[str, str]):
     """Looks every name up in the theme when the sheet asks for it."""
 
-    def __init__(self, look: Look) -> None:
+    def __init__(self, theme: ThemeValues) -> None:
         super().__init__()
-        self._look = look
+        self._theme = theme
 
     def __missing__(self, role: str) -> str:
-        return self._look.hex(role)
+        return self._theme.hex(role)
 
 
-def build(look: Look) -> str:
-    """The style sheet in the colours and sizes of ``look``."""
-    roles = _Roles(look)
+def build(theme: ThemeValues) -> str:
+    """The style sheet in the colours and sizes of ``theme``."""
+    roles = _Roles(theme)
     roles.update(
-        small=str(look.radius("small")),
-        control=str(look.radius("control")),
-        panel_radius=str(look.radius("panel")),
-        field=look.hex("sunken") if look.dark else look.hex("panel"),
-        small_text=str(round(look.scaled(look.text_kinds()["small"].size_px))),
+        small=str(theme.radius("small")),
+        control=str(theme.radius("control")),
+        panel_radius=str(theme.radius("panel")),
+        field=theme.hex("sunken") if theme.dark else theme.hex("panel"),
+        small_text=str(round(theme.scaled(theme.text_kinds()["small"].size_px))),
     )
-    return SHEET.format_map(roles) + _labels(look)
+    return SHEET.format_map(roles) + _labels(theme)

@@ -6,17 +6,16 @@ other module writes a colour down; painters ask ``theme.colour("accent")``. A ch
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal, get_args
 
 from PySide6.QtCore import QObject, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QGuiApplication, QIcon, QPalette, QStyleHints
 from PySide6.QtWidgets import QApplication, QStyleFactory
 
-from app.ui.theme import blockly, fonts, palette, style_sheet, system
+from app.ui.theme import fonts, style_sheet, system
 from app.ui.theme import tokens as theme_tokens
 from app.ui.theme.icons import IconEngine
-from app.ui.theme.palette import qt_colour as qt_colour
 from app.ui.theme.system import Wish
 from app.ui.theme.tokens import Status, Tokens
 
@@ -27,6 +26,29 @@ DISPLAY_SPACING_EM = -0.02
 TEXT_PERCENT = (100, 200)
 STRONGER = frozenset({"border", "borderStrong", "okBorder", "warnBorder", "errorBorder"})
 DEPRIVED_OF_TINT = ("okTint", "warnTint", "errorTint", "infoTint", "accentTint", "changedTint")
+PALETTE_ROLES: Mapping[QPalette.ColorRole, str] = {
+    QPalette.ColorRole.Window: "window",
+    QPalette.ColorRole.WindowText: "text",
+    QPalette.ColorRole.Text: "text",
+    QPalette.ColorRole.ButtonText: "text",
+    QPalette.ColorRole.Base: "panel",
+    QPalette.ColorRole.AlternateBase: "sunken",
+    QPalette.ColorRole.Button: "panel",
+    QPalette.ColorRole.Mid: "border",
+    QPalette.ColorRole.Midlight: "border",
+    QPalette.ColorRole.Dark: "controlBorder",
+    QPalette.ColorRole.Light: "raised",
+    QPalette.ColorRole.Shadow: "borderStrong",
+    QPalette.ColorRole.Highlight: "selected",
+    QPalette.ColorRole.HighlightedText: "selectedText",
+    QPalette.ColorRole.Accent: "accent",
+    QPalette.ColorRole.Link: "accentText",
+    QPalette.ColorRole.LinkVisited: "accentText",
+    QPalette.ColorRole.ToolTipBase: "tooltip",
+    QPalette.ColorRole.ToolTipText: "tooltipText",
+    QPalette.ColorRole.PlaceholderText: "textTertiary",
+}
+DISABLED_ROLES = (QPalette.ColorRole.Text, QPalette.ColorRole.WindowText, QPalette.ColorRole.ButtonText)
 
 
 class Theme(QObject):
@@ -180,7 +202,7 @@ class Theme(QObject):
 
     def palette(self) -> QPalette:
         """The Qt palette of UI.md §7."""
-        return palette.build(self.colour)
+        return _palette(self.colour)
 
     def style_sheet(self) -> str:
         """The one style sheet, for the application."""
@@ -266,10 +288,29 @@ class Theme(QObject):
 
     def blockly_tokens(self) -> dict[str, object]:
         """What the page of the block editor needs: all roles and block colours of the mode that shows now."""
-        return blockly.tokens_for_page(
+        return theme_tokens.tokens_for_page(
             self._tokens,
             self.hex,
             dark=self._dark,
             reduced_motion=self.reduced_motion,
             text_percent=self._text_percent,
         )
+
+
+def _palette(colour: Callable[[str], QColor]) -> QPalette:
+    """The palette; ``colour`` gives that of a role."""
+    palette = QPalette()
+    for role, name in PALETTE_ROLES.items():
+        palette.setColor(role, colour(name))
+    for role in DISABLED_ROLES:
+        palette.setColor(QPalette.ColorGroup.Disabled, role, colour("textDisabled"))
+    return palette
+
+
+def qt_colour(text: str) -> QColor:
+    """A QColor from a token; ``#RRGGBBAA`` has its alpha last, which Qt does not know."""
+    if len(text) == len("#RRGGBBAA"):
+        colour = QColor(text[:7])
+        colour.setAlpha(int(text[7:], 16))
+        return colour
+    return QColor(text)

@@ -1,13 +1,13 @@
 """The design tokens, parsed once: names of roles, sizes and durations become typed, frozen values.
 
 Colours keep the form of the file (``#RRGGBB`` or ``#RRGGBBAA``); `app.ui.theme.theme` makes Qt values from
-them.
+them. Here too is what of them the page of the block editor is given.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,8 @@ from typing import cast
 from app import resources
 
 Numbers = Mapping[str, "int | float | Numbers | list[int]"]
+# Statuses whose icon the tokens describe in words: their dot is drawn, not loaded.
+_DRAWN_ICONS = MappingProxyType({"a filled dot 10 px": "dot"})
 
 
 @dataclass(frozen=True)
@@ -54,10 +56,6 @@ class Tokens:
     icons: Mapping[str, str]
     families: Mapping[str, str]
     fallback: tuple[str, ...]
-
-
-# Statuses whose icon the tokens describe in words: their dot is drawn, not loaded.
-_DRAWN_ICONS = MappingProxyType({"a filled dot 10 px": "dot"})
 
 
 def load(path: Path | None = None) -> Tokens:
@@ -114,3 +112,26 @@ def _status(raw: Mapping[str, object]) -> Mapping[str, Status]:
 
 def _texts(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:
     return {name: TextKind(kind["size_px"], kind["line_px"], kind["weight"]) for name, kind in raw.items()}
+
+
+def tokens_for_page(
+    tokens: Tokens, colour: Callable[[str], str], *, dark: bool, reduced_motion: bool, text_percent: int
+) -> dict[str, object]:
+    """All roles and block colours of the mode that shows now; ``colour`` gives a role's colour."""
+    scheme = "dark" if dark else "light"
+    return {
+        "dark": dark,
+        "colour": {role: colour(role) for role in tokens.colours[scheme]},
+        "block": {
+            name: {
+                **parts[scheme],
+                "text": tokens.block_text[name],
+                "icon": tokens.block_icons[name],
+            }
+            for name, parts in tokens.blocks.items()
+        },
+        "glow": tokens.raw.get("blockGlow", {}),
+        "font": {"text": tokens.families["text"], "mono": tokens.families["mono"]},
+        "reducedMotion": reduced_motion,
+        "textPercent": text_percent,
+    }

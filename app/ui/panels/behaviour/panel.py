@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
@@ -11,13 +12,12 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.behaviour.blocks_wait import BlocksWait
 from app.ui.panels.behaviour.editor import Editor, blockly
 from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
-from app.ui.panels.behaviour.title import BehaviourTitle
-from app.ui.widgets import EmptyAction, EmptyState
+from app.ui.panels.behaviour.tabs import BehaviourTitle
+from app.ui.widgets import EmptyAction, EmptyState, label
 from app.ui.widgets.indicators import ROBOT_STATUS
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed f
 TOOLBOX_WIDTH = 196
 EMPTY_SIZE = (460, 250)
 ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
+WAIT_WORDS = "Getting the blocks ready."
+WAIT_UNTIL_S = 0.5
 
 
 class BehaviourPanel(PanelWidget):
@@ -286,6 +288,37 @@ class BehaviourPanel(PanelWidget):
     def shut(self) -> None:
         self._sensors = self._offered = ()
         self._look_at(set())
+
+
+class BlocksWait:
+    """Says in the middle of ``place`` that the blocks are on their way.
+
+    Only after half a second: a page that is quick is not announced, so nothing flickers.
+    """
+
+    def __init__(self, place: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
+        """``clock`` gives seconds."""
+        self._place, self._clock = place, clock
+        self._since: float | None = None
+        self.words = label(WAIT_WORDS, "bodyLarge", role="textSecondary", wrap=True)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.words.setParent(place)
+        self.words.hide()
+
+    def tell(self, *, ready: bool) -> None:
+        """Whether the page is there now; call it with every refresh."""
+        now = self._clock()
+        if ready:
+            self._since = None
+        elif self._since is None:
+            self._since = now
+        late = self._since is not None and now - self._since >= WAIT_UNTIL_S
+        if late:
+            self.words.setGeometry(self._place.rect())
+            self.words.raise_()
+        if late != self.words.isVisibleTo(self._place):
+            self.words.setVisible(late)
 
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:

@@ -12,8 +12,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.robots.description.description import Action
 from app.ui.panels.robots.controls.chooser import Pictures
 from app.ui.panels.robots.form import ActionForm
-from app.ui.panels.robots.tries import end_words, left_words, now_words, output_words, progress_of
-from app.ui.panels.robots.try_list import TryList
+from app.ui.panels.robots.tries import TryList, end_words, left_words, now_words, output_words, progress_of
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, set_role
 from app.ui.widgets.cards import Tile

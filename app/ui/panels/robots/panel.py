@@ -23,19 +23,70 @@ from app.errors import AppError, RobotInputError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.list import LIST_WIDTH, RobotList
-from app.ui.panels.robots.robot_head import RobotHead
-from app.ui.panels.robots.session_pictures import SessionPictures
 from app.ui.text.numbers import plural
-from app.ui.widgets import EmptyAction, EmptyState, Line, label
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, Chip, Elided, EmptyAction, EmptyState, Line, SearchField, label
+from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.indicators import ROBOT_STATUS
 
 if TYPE_CHECKING:
+    from app.core.messages.image_streams import ImageStream
     from app.core.network.watches import Look, Watch
     from app.core.robots.robot_link import RobotLink
+    from app.core.session import Session
 
 UNFOLDED = 4
 LIST_FROM_WIDTH = 760
 FINDER_FROM_WIDTH, ABOUT_FROM_WIDTH = 620, 440
+FINDER_WIDTH = 180
+PICTURE_CODEC = "image"
+
+
+class RobotHead(QWidget):
+    """The head of the chosen robot: its name, how it is, and its own Stop; the panel fills it."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.name = label("", "heading")
+        self.chip = Chip(theme)
+        self.about = Elided("body", "textSecondary")
+        self.finder = SearchField(theme, "Find an action")
+        self.finder.setFixedWidth(FINDER_WIDTH)
+        self.finder.setMinimumHeight(theme.size("control", "form"))
+        self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
+        self.stop.fill_icon = True
+        row = Flow(self)
+        row.setContentsMargins(16, 7, 16, 8)
+        row.addWidget(self.name)
+        row.addWidget(self.chip)
+        row.add_elastic(self.about)
+        row.push()
+        row.addWidget(self.finder)
+        row.addWidget(self.stop)
+
+
+class SessionPictures:
+    """The picture topics and streams of the session, for forms that want a picture."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._opened: list[ImageStream] = []
+
+    @property
+    def streams(self) -> Sequence[ImageStream]:
+        """Those that are open now."""
+        self._opened = [stream for stream in self._opened if not stream.closed]
+        return self._opened
+
+    def topics(self) -> Sequence[str]:
+        """The picture topics that there are now."""
+        return sorted(t.name for t in self._session.topics if t.codec == PICTURE_CODEC and t.gone_s is None)
+
+    def stream(self, topic: str) -> ImageStream:
+        """Look at one until it is closed."""
+        made = self._session.images.stream(topic)
+        self._opened = [*self.streams, made]
+        return made
 
 
 class RobotsPanel(PanelWidget):

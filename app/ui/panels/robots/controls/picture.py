@@ -11,17 +11,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from PySide6.QtCore import Qt, QTimer, QUrl, Signal
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
-from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, QSize, Qt, QTimer, QUrl, Signal
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage, QPainter, QPainterPath, QPaintEvent
+from PySide6.QtWidgets import QFileDialog, QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import Control, connect, line_field
 from app.ui.panels.robots.controls.picture_file import FILES, encoded, image_of, read_picture
-from app.ui.panels.robots.controls.thumbnail import Thumbnail
 from app.ui.text import plain
+from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, label
+from app.ui.widgets import Button, label, paint
 from app.ui.widgets.file_dialogs import show_free
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.menus import Menu, drop_below
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
 
 LOOK_MS = 200
+THUMBNAIL = QSize(72, 54)
 
 
 class Pictures(Protocol):
@@ -53,6 +54,51 @@ class NoPictures:
     def stream(self, topic: str) -> ImageStream:
         """There is none to look at: KeyError."""
         raise KeyError(topic)
+
+
+class Thumbnail(QWidget):
+    """A small picture, or an icon while there is none."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._image: QImage | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("The chosen picture")
+
+    @property
+    def image(self) -> QImage | None:
+        """What it shows."""
+        return self._image
+
+    def show_image(self, image: QImage | None) -> None:
+        """Show another picture, or none."""
+        self._image = image
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        return THUMBNAIL
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        rect, radius = QRectF(self.rect()), self._theme.radius("small")
+        paint.box(painter, rect, radius, theme.colour("sunken"), theme.colour("border"))
+        if self._image is None:
+            square = QRectF(rect.center().x() - 10, rect.center().y() - 10, 20, 20)
+            paint_icon(painter, square, "image", theme.colour("textTertiary"))
+        else:
+            inner = rect.adjusted(1, 1, -1, -1)
+            shape = QPainterPath()
+            shape.addRoundedRect(inner, radius - 1, radius - 1)
+            painter.setClipPath(shape)
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+            size = self._image.size().scaled(
+                inner.size().toSize(), Qt.AspectRatioMode.KeepAspectRatioByExpanding
+            )
+            place = QRectF(0, 0, size.width(), size.height())
+            place.moveCenter(inner.center())
+            painter.drawImage(place, self._image)
+        painter.end()
 
 
 class PictureChoice(QWidget):
