@@ -44,7 +44,7 @@ with nep.master("127.0.0.1:0", learn_s=0.0) as master:
 
 NODES = """
 import os, sys, time, zmq
-from nep.backends.zeromq.pace import Pace
+from nep.backends.zeromq.master_session import Pace
 from nep.protocol.encoding import decode_answer, encode_request
 from nep.protocol.records import (NodeRecord, PublisherCount, PublisherRecord,
     SubscriberCount, SubscriberRecord)

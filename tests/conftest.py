@@ -89,7 +89,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
     Whoever had to give up waiting needs this long.
     """
-    monkeypatch.setattr("nep.backends.zeromq.backend.HANDSHAKE_S", GREETINGS_S)
+    monkeypatch.setattr("nep.backends.zeromq.transport.HANDSHAKE_S", GREETINGS_S)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.zeromq.legacy_framing import from_frame, to_frame
+from nep.backends.zeromq.legacy import from_frame, to_frame
 from nep.errors import WireError
 
 

@@ -11,7 +11,7 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.zeromq.pace import Pace
+from nep.backends.zeromq.master_session import Pace
 from nep.masters import leases
 from nep.masters.graph import Graph
 from nep.masters.leases import LEASE_S, Leases

@@ -10,9 +10,8 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.zeromq.context import SharedContext, join
-from nep.backends.zeromq.master_name import MasterName
-from nep.backends.zeromq.master_session import MasterLink
+from nep.backends.zeromq.io_thread import SharedContext, shared_context
+from nep.backends.zeromq.master_session import MasterLink, MasterName
 from nep.masters.master import Master
 from nep.protocol.records import NodeRecord
 from tests.nep.programs import eventually
@@ -81,7 +80,7 @@ def test_a_name_is_asked_for_again_only_after_a_while(caplog: pytest.LogCaptureF
 
 @pytest.fixture
 def shared() -> Iterator[SharedContext]:
-    made = join()
+    made = shared_context()
     yield made
     made.leave()
 

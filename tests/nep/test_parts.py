@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 import nep
 from nep.backends.base import Backend
-from nep.backends.zeromq.audience import MAX_SUBSCRIBERS, Audience
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.loss import UNLISTED_MAX, Sources
+from nep.backends.zeromq.publisher import MAX_SUBSCRIBERS, Subscriptions
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
@@ -391,20 +391,22 @@ def test_publishers_that_nobody_lists_are_remembered_up_to_a_bound() -> None:
 
 
 def test_a_flood_of_hellos_is_greeted_up_to_a_bound() -> None:
-    audience = Audience("t", 7)
+    subscriptions = Subscriptions("t", 7)
     for number in range(MAX_SUBSCRIBERS + 1000):
-        greeted = audience.note(b"\1" + hello_part(number, "t", tells=True), 0)
+        greeted = subscriptions.note(b"\1" + hello_part(number, "t", tells=True), 0)
         assert (greeted is not None) == (number < MAX_SUBSCRIBERS)
-    assert len(audience.seen) == len(audience.hellos) == len(audience.windows) == MAX_SUBSCRIBERS
-    assert audience.refusals.count == 1000
-    assert audience.note(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
-    assert audience.note(b"\0" + hello_part(5, "t", tells=True), 0) is None
-    assert audience.note(b"\1" + hello_part(77_777, "t"), 0) is not None
-    assert not audience.tells_all
+    assert (
+        len(subscriptions.seen) == len(subscriptions.hellos) == len(subscriptions.windows) == MAX_SUBSCRIBERS
+    )
+    assert subscriptions.refusals.count == 1000
+    assert subscriptions.note(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
+    assert subscriptions.note(b"\0" + hello_part(5, "t", tells=True), 0) is None
+    assert subscriptions.note(b"\1" + hello_part(77_777, "t"), 0) is not None
+    assert not subscriptions.tells_all
     for number in range(50_000):  # nor do other filters pile up
-        audience.note(b"\1t\0" + b"%d" % number, 0)
-        audience.note(b"\1t", 0)
-    assert len(audience.apart) == 1
+        subscriptions.note(b"\1t\0" + b"%d" % number, 0)
+        subscriptions.note(b"\1t", 0)
+    assert len(subscriptions.apart) == 1
 
 
 def test_a_batch_of_a_sink_has_a_bound() -> None:

@@ -3,4 +3,9 @@
 Its publishers, subscribers and sockets, the thread that serves them, and the session with the master.
 """
 
-from nep.backends.zeromq.backend import BACKEND as BACKEND
+from nep.backends.base import Backend
+from nep.backends.zeromq.transport import ZeromqCarrier
+
+__all__ = ["BACKEND"]
+
+BACKEND = Backend("zeromq", ZeromqCarrier, aliases=("zmq",))

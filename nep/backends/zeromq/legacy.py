@@ -1,7 +1,14 @@
-"""Direct connections: no master, one address that one side binds; the frames of the original NEP."""
+"""Direct connections: no master, one address that one side binds; the frames of the original NEP.
+
+Such a frame says one datum in one part. Up to 0.5.4.5 (generation A) the topic stands in front
+(`topic {"a":1}`), from 0.5.4.8 on (B) it does not, but for `dictionary`; `image` always has it, `images`,
+`bytes` and `msgpack` never. Pictures are base64.
+"""
 
 from __future__ import annotations
 
+import base64
+import binascii
 import logging
 import threading
 import time
@@ -13,10 +20,8 @@ from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.connection import Direct
 from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, Backlog
 from nep.backends.zeromq.io_thread import Rest
-from nep.backends.zeromq.legacy_framing import from_frame, to_frame
-from nep.backends.zeromq.readable import Into
-from nep.backends.zeromq.refusals import Refusals
 from nep.backends.zeromq.sockets import (
+    Refusals,
     Socket,
     bind,
     connect,
@@ -24,13 +29,18 @@ from nep.backends.zeromq.sockets import (
     wait_shortly,
     wait_until,
 )
+from nep.backends.zeromq.sub_socket import Into
 from nep.backends.zeromq.subscriber import SocketInlet
 from nep.errors import ClosedError, WireError
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 
-__all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach"]
+__all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach", "from_frame", "has_prefix", "to_frame"]
+
+_ALWAYS = frozenset({"dictionary", "image"})
+_NEVER = frozenset({"bytes", "msgpack", "images"})
+_JSON_BEGINS = frozenset(b'{["-0123456789tfnNI')
 
 _MARKS = {"image": 64, "bytes": 1000}
 _MARK = 10_000
@@ -39,6 +49,39 @@ hold for all of them together, so that one subscriber that reads nothing takes n
 _logger = logging.getLogger("nep")
 _TOLD_MS = 100
 """How soon after its linger libzmq says that a socket is closed."""
+
+
+def has_prefix(generation: str, msg_type: str) -> bool:
+    """Whether a program of this generation writes the topic in front."""
+    return msg_type in _ALWAYS or (generation == "A" and msg_type not in _NEVER)
+
+
+def to_frame(topic: str, generation: str, msg_type: str, codec: str, data: bytes | memoryview) -> bytes:
+    """The frame that says `data`, which are bytes of the native codec."""
+    body = base64.b64encode(data) if codec == "image" else bytes(data)
+    return topic.encode() + b" " + body if has_prefix(generation, msg_type) else body
+
+
+def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | None:
+    """The datum in `frame`, of either generation; None when it belongs to another topic of the same port.
+
+    Raises `WireError` for a picture that is not base64.
+    """
+    prefix = topic.encode() + b" "
+    if msg_type in _NEVER and codec != "image":
+        return frame
+    if frame.startswith(prefix):
+        frame = frame[len(prefix) :]
+    elif (codec == "json" and frame[:1] and frame[0] not in _JSON_BEGINS) or (
+        codec == "image" and b" " in frame[:300]
+    ):
+        return None
+    if codec != "image":
+        return frame
+    try:
+        return base64.b64decode(frame, validate=True)
+    except binascii.Error as error:
+        raise WireError("a picture is not base64", len(frame)) from error
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:

@@ -1,4 +1,4 @@
-"""NativeOutlet: a publisher's XPUB socket.
+"""NativeOutlet: a publisher's XPUB socket, and who reads there.
 
 Sends happen in the publisher's thread; subscriptions are read by whoever uses the socket next, the publisher
 or the node's thread. A subscriber counts as connected when its hello has been read: see `docs/wire.md`.
@@ -14,13 +14,10 @@ from collections.abc import Callable, Iterable, Sequence
 import zmq
 
 from nep.backends.base import PublisherSpec
-from nep.backends.zeromq.audience import Audience
-from nep.backends.zeromq.bindings import Places
-from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
+from nep.backends.zeromq.bindings import SMALL, Bindings
+from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog, Window
 from nep.backends.zeromq.io_thread import Rest, Served
-from nep.backends.zeromq.local import SMALL
-from nep.backends.zeromq.refusals import Refusals
-from nep.backends.zeromq.sockets import Part, Socket, send_mark, sendable, wait_until
+from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.protocol.records import Expected, PublisherCount
@@ -32,19 +29,21 @@ from nep.protocol.wire import (
     form_of,
     pack_quickly,
     parse_hello,
+    parse_read,
     topic_part,
 )
 from nep.protocol.wire import EXTENSION as EXTENSION_FLAG
 
-__all__ = ["NativeOutlet"]
+__all__ = ["MAX_SUBSCRIBERS", "NativeOutlet", "Subscriptions"]
 
 _logger = logging.getLogger("nep")
+MAX_SUBSCRIBERS = 10_000
+"""Whoever says hello after so many is not greeted: it gets messages as one who says no hello."""
 
 _SNDMORE = int(zmq.SNDMORE)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
-
 _NO_COPY_BYTES = 65_536
 _ONE_PART_BYTES = 16_384
 """Smaller messages go out in one part where all who subscribe read that: see docs/adr/0009-one-part.md."""
@@ -53,6 +52,92 @@ _LOOK_NS = 500_000
 after it, because sending may have swallowed the descriptor's signal."""
 _SERVE_S = 0.02
 _BYE_AGAIN_S = 0.05
+
+
+class Subscriptions:
+    """Who reads at a publisher's port, from the subscriptions that come in there. No sockets.
+
+    Those who said hello to this publisher of `topic`, and the filters of others.
+
+    It lives under its outlet's lock.
+    """
+
+    def __init__(self, topic: str, publisher: int) -> None:
+        self.seen: dict[int, int] = {}
+        """Subscribers that said hello and have not gone, and how many messages there had been then."""
+        self.hellos: dict[int, bytes] = {}
+        """Under which first part each of them is reached alone."""
+        self.apart: dict[bytes, int] = {}
+        """Filters by which somebody reads who did not say that it reads messages of one part; of how many."""
+        self.windows: dict[int, Window] = {}
+        """What is under way to those that tell what they have read."""
+        self.refusals = Refusals()
+        self._id = publisher
+        self._name = topic
+        self._topic = topic_part(topic)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether anybody reads."""
+        return bool(self.seen or self.apart)
+
+    @property
+    def tells_all(self) -> bool:
+        """Whether all who read tell what they have read."""
+        return not self.apart and len(self.windows) == len(self.seen)
+
+    def forget(self) -> None:
+        """Forget all who said hello."""
+        self.seen.clear()
+        self.hellos.clear()
+        self.windows.clear()
+
+    def note(self, event: bytes, count: int) -> bytes | None:
+        """Somebody came or went, after `count` messages; the first part under which to greet a subscriber."""
+        is_wanted, what = event[:1] == b"\1", event[1:]
+        hello = parse_hello(what)
+        if hello is None:
+            read = parse_read(what)
+            if read is not None:
+                if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
+                    self.windows[read.subscriber].read(read.seq, read.bound_bytes)
+                return None
+            self._note_filter(what, is_wanted=is_wanted)
+            return None
+        if hello.topic != self._name:
+            return None  # a subscriber of whoever had this port before
+        if not is_wanted:
+            self.seen.pop(hello.subscriber, None)
+            self.hellos.pop(hello.subscriber, None)
+            self.windows.pop(hello.subscriber, None)
+            return None
+        if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
+            self._refuse(f"the hello of one more than {MAX_SUBSCRIBERS} subscribers")
+            return None
+        if hello.one_part:  # its own filter came before
+            left = self.apart.pop(self._topic, 0) - 1
+            if left > 0:
+                self.apart[self._topic] = left
+        self.seen[hello.subscriber] = count
+        self.hellos[hello.subscriber] = what
+        self.windows.pop(hello.subscriber, None)
+        if hello.tells:
+            self.windows[hello.subscriber] = Window()  # a connection of its own: nothing is under way
+        return what
+
+    def _note_filter(self, what: bytes, *, is_wanted: bool) -> None:
+        """Each filter that comes is told, and the last of its kind that goes."""
+        if not self._topic.startswith(what):
+            self._refuse(f"{len(what)} bytes that are no subscription of it")
+            return
+        if is_wanted:
+            self.apart[what] = self.apart.get(what, 0) + 1
+        else:
+            self.apart.pop(what, None)
+
+    def _refuse(self, reason: str) -> None:
+        if self.refusals.add(reason):
+            _logger.info("'%s' was sent %s", self._name, self.refusals.told())
 
 
 class NativeOutlet:
@@ -75,7 +160,7 @@ class NativeOutlet:
         self._serve_soon = serve_soon
         self._socket = socket
         send_mark(socket)
-        self._places = Places(socket, may_be_local=spec.codec.name in SMALL)
+        self._bindings = Bindings(socket, may_be_local=spec.codec.name in SMALL)
         # Without pyzmq's layer for routing ids and groups, which takes half of the time.
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
         self._bytes = 0
@@ -86,8 +171,8 @@ class NativeOutlet:
         self._backlog = Backlog()
         self._last_stamp_ns: int | None = None
         self._problem = ""
-        self._audience = Audience(spec.topic, spec.id)
-        self._seen, self._apart = self._audience.seen, self._audience.apart
+        self._subscriptions = Subscriptions(spec.topic, spec.id)
+        self._seen, self._apart = self._subscriptions.seen, self._subscriptions.apart
         self._names: dict[int, str] = {}
         self._waited: set[int] = set()
         self._latched: tuple[Part, ...] | None = None
@@ -140,33 +225,33 @@ class NativeOutlet:
             )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Be reached at these addresses of this computer from now on; the endpoints. See `Places.move`."""
+        """Be reached at these addresses of this computer from now on; the endpoints. See `Bindings.move`."""
         with self._lock:
-            endpoints = () if self._socket.closed else self._places.move(hosts)
+            endpoints = () if self._socket.closed else self._bindings.move(hosts)
             self._read_subscriptions()  # binding may have swallowed the descriptor's signal
             return endpoints
 
     def leave_local(self) -> None:
         """Be reached by TCP only from now on."""
         with self._lock:
-            if not self._socket.closed and self._places.is_local:
-                self._places.leave_local()
+            if not self._socket.closed and self._bindings.is_local:
+                self._bindings.leave_local()
                 self._read_subscriptions()
 
     @property
     def refusals(self) -> Refusals:
         """What was sent to it and is no subscription."""
-        return self._audience.refusals
+        return self._subscriptions.refusals
 
     @property
     def endpoints(self) -> tuple[str, ...]:
         """All that its socket is bound to by `move`."""
-        return self._places.endpoints
+        return self._bindings.endpoints
 
     @property
     def is_local(self) -> bool:
-        """Whether programs of this computer reach it without TCP: see `local`."""
-        return self._places.is_local
+        """Whether programs of this computer reach it without TCP: see `bindings`."""
+        return self._bindings.is_local
 
     # ---- sending
 
@@ -235,13 +320,13 @@ class NativeOutlet:
 
     def _send_to_those_with_room(self, tail: tuple[Part, ...], size: int) -> None:
         """To all at once; while somebody has no room, to everybody else alone. With the lock held."""
-        windows = self._audience.windows
+        windows = self._subscriptions.windows
         since = self._bytes - size - self._settled_bytes  # sent to all
         if since:
             for window in windows.values():
                 window.sent(self.count - 1, since)
         self._settled_bytes = self._bytes
-        is_told = self._audience.tells_all
+        is_told = self._subscriptions.tells_all
         has_room = {each: window.has_room(size) for each, window in windows.items()}
         if all(has_room.values()) and (is_told or self._backlog.has_room(size)):
             if is_told:
@@ -255,7 +340,7 @@ class NativeOutlet:
             taking = {each: window for each, window in windows.items() if has_room[each]}
             for each, window in windows.items():
                 if each in taking:
-                    self._send_parts(self._audience.hellos[each], tail)
+                    self._send_parts(self._subscriptions.hellos[each], tail)
                 else:
                     window.missed()
         for window in taking.values():
@@ -263,7 +348,7 @@ class NativeOutlet:
         now = time.monotonic()
         for each, window in windows.items():
             if window.is_to_ask(now, has_room=has_room[each]):
-                self._send_parts(self._audience.hellos[each], (self._notice(0),))
+                self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
 
     def _send_tracked(self, tail: tuple[Part, ...], size: int) -> None:
         """Send to all, and note until when libzmq holds it, with all of `size` bytes since the last one."""
@@ -295,10 +380,10 @@ class NativeOutlet:
     def _read_subscriptions(self) -> None:
         """With the lock held: until the socket has nothing more."""
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
-            own = self._audience.note(self._socket.recv(zmq.DONTWAIT), self.count)
+            own = self._subscriptions.note(self._socket.recv(zmq.DONTWAIT), self.count)
             # First: whoever gets the echo may rely on being counted.
             self.subscribers = len(self._seen)
-            self.is_heard = self._audience.is_there
+            self.is_heard = self._subscriptions.is_there
             if own is not None:
                 self._greet(own)
             self._changed.notify_all()
@@ -306,16 +391,16 @@ class NativeOutlet:
                 self._tell_what_was_missed()
 
     def _tell_what_was_missed(self) -> None:
-        for each, window in self._audience.windows.items():
+        for each, window in self._subscriptions.windows.items():
             if window.is_to_tell():
-                self._send_parts(self._audience.hellos[each], (self._notice(0),))
+                self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
 
     def _greet(self, own: bytes) -> None:
         """What was latched, then the echo: from here on the subscriber counts."""
         if self._latched is not None:
             self._send_parts(own, self._latched)
             hello = parse_hello(own)
-            window = self._audience.windows.get(hello.subscriber) if hello is not None else None
+            window = self._subscriptions.windows.get(hello.subscriber) if hello is not None else None
             if window is not None:
                 window.sent(self.count, len(self._latched[1]))
         self._send_parts(own, (self._notice(0),))
@@ -351,7 +436,7 @@ class NativeOutlet:
                         sum(map(bool, owed)),
                         max(owed),
                     )
-                self._audience.forget()
+                self._subscriptions.forget()
                 self.subscribers = 0
 
     def release(self) -> None:
@@ -362,6 +447,6 @@ class NativeOutlet:
 
     def _bye(self) -> None:
         if not self._socket.closed:
-            for own in self._audience.hellos.values():
+            for own in self._subscriptions.hellos.values():
                 self._send_parts(own, (self._notice(BYE),))
             self._read_subscriptions()

@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import zmq
 
-from nep.backends.zeromq.refusals import Refusals
-from nep.backends.zeromq.sockets import Socket, wait_until
+from nep.backends.zeromq.sockets import Refusals, Socket, wait_until
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.protocol.encoding import call_of_view, decode_answer, encode_request
 from nep.protocol.requests import Push, Refused, Reply, Request

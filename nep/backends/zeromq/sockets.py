@@ -1,8 +1,9 @@
-"""What all native sockets need: bounds in bytes, free ports, waits in slices."""
+"""What all native sockets need: bounds, free ports, addresses, waits in slices, a count of what was refused."""
 
 from __future__ import annotations
 
 import errno
+import ipaddress
 import socket
 import threading
 import time
@@ -10,20 +11,24 @@ from collections.abc import Callable
 
 import zmq
 
-from nep.backends.zeromq.master_name import in_numbers
 from nep.errors import AddressInUseError, NepError
 from nep.system.addresses import endpoint_of, host_of, is_endpoint, is_loopback
 from nep.system.descriptors import check_room
+from nep.system.log_rarely import is_told
 
 __all__ = [
     "LOOPBACK",
     "SHORT_WAIT_S",
     "Part",
+    "Refusals",
     "bind",
     "bind_free_port",
     "connect",
     "host_towards",
+    "in_numbers",
+    "is_number",
     "keep_alive",
+    "look_up",
     "receive_mark",
     "send_mark",
     "sendable",
@@ -31,9 +36,10 @@ __all__ = [
     "wait_until",
 ]
 
+_TOLD_S = 5.0
+
 Socket = zmq.Socket[bytes]
 Part = bytes | memoryview | zmq.Frame
-
 LOOPBACK = "127.0.0.1"
 SHORT_WAIT_S = 0.005
 """How long a reader may wait in a subscriber's socket, holding its lock. A shorter time is not quicker: a
@@ -48,8 +54,33 @@ _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)
 """Ports that programs of the original NEP expect to find something else on."""
 
 
+class Refusals:
+    """What came on a port and could not be understood: counted, and named for some seconds.
+
+    Not thread-safe: it lives under its socket's lock.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._reason = ""
+        self._last_at = 0.0
+
+    def add(self, reason: str) -> bool:
+        """One more, and why. Whether to log it: the first, the tenth, the hundredth, ..."""
+        self.count += 1
+        self._reason = reason
+        self._last_at = time.monotonic()
+        return is_told(self.count)
+
+    def told(self) -> str:
+        """The newest reason and how many there were; empty when there was none in the last seconds."""
+        if not self.count or time.monotonic() - self._last_at > _TOLD_S:
+            return ""
+        return f"{self._reason} ({self.count} so far)"
+
+
 def send_mark(owner: Socket) -> None:
-    """Let libzmq queue so many messages for each connection. Their bytes are bounded elsewhere: see `window`.
+    """Let libzmq queue so many messages for each connection. Their bytes are bounded by `byte_window`.
 
     Before it is bound: libzmq does not stand another mark while there are connections.
     """
@@ -94,6 +125,33 @@ def connect(owner: Socket, address: str) -> str:
     endpoint = endpoint_of(in_numbers(address))
     owner.connect(endpoint)
     return endpoint
+
+
+def look_up(host: str) -> str:
+    """The first IPv4 address of a name. May wait for long; raises `OSError`, `UnicodeError`."""
+    return str(socket.getaddrinfo(host, None, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
+
+
+def in_numbers(address: str) -> str:
+    """An address with a number as its host, asked for in the caller's thread. Raises `NepError`."""
+    host = host_of(address)
+    if is_number(host):
+        return address
+    try:
+        return f"{look_up(host)}:{address.rpartition(':')[2]}"
+    except (OSError, UnicodeError) as error:
+        raise NepError(
+            f"no computer is called '{host}' here; look for a typing error, or write its address in numbers"
+        ) from error
+
+
+def is_number(host: str) -> bool:
+    """Whether it is an IPv4 address, for which nobody has to be asked."""
+    try:
+        ipaddress.IPv4Address(host)
+    except ValueError:
+        return False
+    return True
 
 
 def host_towards(address: str) -> str | None:

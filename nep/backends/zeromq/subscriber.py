@@ -1,4 +1,7 @@
-"""SocketInlet: a subscriber's socket with its lock, its inbox and its readers.
+"""A subscriber's socket with its lock, its inbox and its readers.
+
+`SocketInlet` reads from any `Readable`, a socket that turns parts into messages; `NativeInlet` is the one of
+the native wire, which connects to publishers as they come.
 
 Whoever reads takes a lease on the socket for a moment, and the node's thread leaves it alone as long: a loop
 of `listen` gets its messages straight from the socket, in its own thread. When nobody reads, the node's
@@ -17,27 +20,31 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Generic, Protocol, TypeVar
 
 import zmq
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.zeromq.ahead import ROOM_BYTES, Ahead
 from nep.backends.zeromq.io_thread import IoThread, Rest
-from nep.backends.zeromq.reporting import R, Reporting
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, wait_until
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
+from nep.backends.zeromq.sub_socket import Into, SubSocket
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
+from nep.protocol.records import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
-__all__ = ["SocketInlet"]
+__all__ = ["NativeInlet", "Readable", "SocketInlet"]
+
+_AHEAD_BYTES = 2**18
+_BRISK_S = 10e-6
+"""A reader that comes back sooner than this after a message gets several at once: twice as many each time."""
+_AHEAD_MOST = 64
 
 _logger = logging.getLogger("nep")
-
 _POLLIN = int(zmq.POLLIN)
 _NEVER = math.inf
-
 LEASE_S = 0.02
 _LATE_S = 3 * LEASE_S
 """The node's thread is called when it would come later than this after a read."""
@@ -50,23 +57,91 @@ _BATCH_BYTES = 64 * 2**20
 _FEW = 50
 
 
-class SocketInlet(Reporting[R]):
+class Readable(Protocol):
+    """A socket that turns what comes into messages. It is used under the inlet's lock only."""
+
+    fd: int
+    refusals: Refusals
+    """Messages that could not be understood."""
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+
+    @property
+    def lost(self) -> int | None:
+        """Messages that did not; None when nobody can know."""
+
+    @property
+    def problem(self) -> str:
+        """What is wrong as long as nothing changes; empty when nothing is."""
+
+    @property
+    def has_input(self) -> bool:
+        """Whether something can be read. Also takes note of connections that came and went."""
+
+    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
+
+        With `may_wait` the first is waited for, `SHORT_WAIT_S` at most.
+        """
+
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`."""
+
+    def dropped(self, count: int) -> None:
+        """So many messages that had been received were dropped for lack of room."""
+
+    def close(self) -> None:
+        """Close the socket."""
+
+
+class _ReadAhead:
+    """How many messages a reader gets at once.
+
+    Reading one message when there are no more costs a failed read: only brisk readers read ahead.
+    """
+
+    def __init__(self, max_messages: int) -> None:
+        self._most = max(1, min(_AHEAD_MOST, max_messages))
+        self.now = 1
+        """How many it reads at once now."""
+        self.span_s = _BRISK_S
+        """Whoever comes back sooner than this is brisk."""
+
+    def more(self) -> int:
+        """How many messages to read for a brisk reader."""
+        self.now = min(2 * self.now, self._most)
+        self.span_s = self.now * _BRISK_S
+        return self.now
+
+    def begin(self) -> None:
+        """There were not as many, or the reader takes its time: begin with one again."""
+        self.now = 1
+        self.span_s = _BRISK_S
+
+
+R = TypeVar("R", bound=Readable)
+
+
+class SocketInlet(Generic[R]):
     """Reads from `readable`. `on_close` unregisters; it is called once, without the lock."""
 
     def __init__(
         self, readable: R, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
     ) -> None:
-        super().__init__(readable, spec)
+        self.spec = spec
         self.is_closed = False
         self.fd = readable.fd
         self._io = io
         self._on_close = on_close
+        self._readable = readable
         self._read = readable.read
         self._read_into = readable.read_into
         self._keeps_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
         """What was read ahead, in front of the inbox; anybody may take from its left without the lock."""
-        self._ahead = Ahead(spec.max_messages)
+        self._ahead = _ReadAhead(spec.max_messages)
         self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
@@ -76,6 +151,7 @@ class SocketInlet(Reporting[R]):
         self._waiters: list[Waker] = []
         self._waker: Waker | None = None
         self._woken: set[Waker] = set()
+        self._problem = ""
         # `with` is three times faster on the lock itself than on the condition over it.
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
@@ -125,6 +201,33 @@ class SocketInlet(Reporting[R]):
             message = self._next()
             self._is_brisk = message is not None
             return message
+
+    # ---- what it tells
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self._readable.received
+
+    @property
+    def lost(self) -> int | None:
+        """Messages that did not arrive, or were dropped here for lack of room."""
+        return self._readable.lost
+
+    @property
+    def refused(self) -> int:
+        """What came and was no message at all."""
+        return self._readable.refusals.count
+
+    def report(self, problem: str) -> None:
+        """The reader's trouble with a message, for the next renewal."""
+        self._problem = problem
+
+    def counts(self) -> SubscriberCount:
+        """The statistics for a renewal."""
+        problem = self._problem or self._readable.refusals.told() or self._readable.problem
+        lost = None if self.lost is None else as_count(self.lost)
+        return SubscriberCount(self.spec.id, as_count(self.received), lost, problem)
 
     # ---- waiting
 
@@ -252,7 +355,7 @@ class SocketInlet(Reporting[R]):
                     self._ahead.begin()
                 return self._read(may_wait=may_wait)
             most = self._ahead.more()
-            if self._read_into(self.ready, most, ROOM_BYTES, may_wait=may_wait) < most:
+            if self._read_into(self.ready, most, _AHEAD_BYTES, may_wait=may_wait) < most:
                 self._ahead.begin()
         if self.ready:
             return self.ready.popleft()
@@ -287,3 +390,80 @@ class SocketInlet(Reporting[R]):
         self._woken.update(self._waiters)
         for waker in self._waiters:
             waker.wake()
+
+
+class NativeInlet(SocketInlet[SubSocket]):
+    """See `SocketInlet`. The methods for publishers are called by the link to the master."""
+
+    def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
+        """Wait until these publishers have echoed.
+
+        Who says bye meanwhile, or cannot be connected to, is not waited for.
+        """
+        wanted = frozenset(publishers)
+        sources = self._readable.sources
+        return self.read_until(
+            lambda: all(
+                source.has_echoed or source.problem for each, source in sources.items() if each in wanted
+            ),
+            timeout_s,
+            waker,
+        )
+
+    def wait_for_any(self, timeout_s: float, waker: Waker) -> bool:
+        """Wait until some publisher has echoed."""
+        sources = self._readable.sources
+        return self.read_until(
+            lambda: any(source.has_echoed for _each, source in sources.items()), timeout_s, waker
+        )
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it is connected."""
+        return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
+
+    def connect(self, remotes: Iterable[RemotePublisher]) -> None:
+        """Connect to these publishers; twice is once."""
+        with self._turn():
+            if not self.is_closed:
+                for remote in remotes:
+                    self._readable.connect(remote)
+                self._after_use()
+
+    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
+        """These are all publishers of the topic: connect to new ones; others are silent."""
+        known = tuple(remotes)
+        self.connect(known)
+        listed = {remote.publisher.id for remote in known}
+        with self._turn():
+            for each, source in self._readable.sources.items():
+                if each not in listed and source.remote is not None:
+                    source.is_lapsed = True
+
+    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
+        """A publisher is unlisted. Its connection stays until its bye comes, or it is replaced."""
+        with self._turn():
+            source = self._readable.sources.find(publisher)
+            if source is not None and is_closed:
+                self._readable.sources.closing(publisher, final, time.monotonic())
+            elif source is not None:
+                source.is_lapsed = True
+
+    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+        """Once a second: leave publishers that have closed without a bye; reconcile losses.
+
+        `last_seqs` is the master's word on what publishers have sent.
+        """
+        with self._turn():
+            if self.is_closed:
+                return
+            sources = self._readable.sources
+            for publisher in sources.ended(now):
+                source = sources.get(publisher)
+                if source.last is not None:
+                    sources.reached(publisher, source.final)
+                self._readable.leave(publisher)
+            if not self._readable.has_input:
+                for publisher, seq in last_seqs:
+                    sources.promised(publisher, seq)
+            self._after_use()

@@ -9,17 +9,15 @@ from contextlib import contextmanager
 
 import zmq
 
-from nep.backends.base import HANDSHAKE_S, Backend, Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.backends.base import HANDSHAKE_S, Inlet, Outlet, PublisherSpec, SubscriberSpec
 from nep.backends.connection import Configuration, Direct
-from nep.backends.zeromq.context import SharedContext, join
-from nep.backends.zeromq.inlet import NativeInlet
-from nep.backends.zeromq.io_thread import IoThread
+from nep.backends.zeromq.io_thread import IoThread, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalInlet, OriginalOutlet, OriginalSub, attach
 from nep.backends.zeromq.master_session import MasterLink
 from nep.backends.zeromq.publisher import NativeOutlet
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
-from nep.backends.zeromq.subscriber import SocketInlet
+from nep.backends.zeromq.subscriber import NativeInlet, SocketInlet
 from nep.errors import ClosedError, NepError
 from nep.protocol.graph_view import GraphView
 from nep.protocol.records import NodeRecord, PublisherRecord, SubscriberRecord
@@ -28,7 +26,7 @@ from nep.system.descriptors import check_room
 from nep.system.forks import give_up, watch
 from nep.system.wakeup import Waker
 
-__all__ = ["BACKEND", "ZeromqCarrier"]
+__all__ = ["ZeromqCarrier"]
 
 DIRECT_WAIT_S = 0.3
 """Without a master nobody knows whether there is another side: it gets so long to connect."""
@@ -36,7 +34,6 @@ _LEAVE_S = 0.3
 _THREAD_FILES = 4
 _MOST_LINKS = 8
 """So many masters' connections are kept though nothing is registered with them."""
-
 _Outlet = NativeOutlet | OriginalOutlet
 _Inlet = NativeInlet | OriginalInlet
 
@@ -50,7 +47,7 @@ class ZeromqCarrier:
 
     def __init__(self, node: NodeRecord) -> None:
         self._node = node
-        self._shared: SharedContext = join()
+        self._shared: SharedContext = shared_context()
         self._io = self._shared.io
         self._sinks: IoThread | None = None
         self._lock = threading.Lock()
@@ -358,6 +355,3 @@ def _closed_on_error(close: Callable[[], object]) -> Iterator[None]:
     except BaseException:
         close()
         raise
-
-
-BACKEND = Backend("zeromq", ZeromqCarrier, aliases=("zmq",))
