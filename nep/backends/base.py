@@ -1,8 +1,8 @@
 """The contract of back ends. `nep.backends.memory` is the template; one contract test runs over all of them.
 
-A `Backend` opens one `Carrier` for a node; the carrier makes `Outlet`s (for publishers) and `Inlet`s (for
-subscribers). All of them may be used from any thread. Sequence numbers and `count` begin with 1 at the first
-message published, whether somebody listens or not.
+A `Backend` opens one `Transport` for a node; that makes a `PublisherTransport` for each publisher and a
+`SubscriberTransport` for each subscriber. All of them may be used from any thread. Sequence numbers and
+`count` begin with 1 at the first message published, whether somebody listens or not.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from nep.protocol.records import NodeRecord
 __all__ = [
     "HANDSHAKE_S",
     "Backend",
-    "Carrier",
-    "Inlet",
-    "Outlet",
     "PublisherSpec",
+    "PublisherTransport",
     "Sink",
     "SubscriberSpec",
+    "SubscriberTransport",
+    "Transport",
 ]
 
 HANDSHAKE_S = 0.5
 """How long a new publisher or subscriber waits for the other side, at most."""
 
 Sink = Callable[[Sequence[Message]], None]
-"""Takes messages in batches, in a thread of the carrier's sinks; it returns soon and does not raise."""
+"""Takes messages in batches, in a thread of the transport's sinks; it returns soon and does not raise."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,10 @@ class PublisherSpec:
 
 @dataclass(frozen=True)
 class SubscriberSpec:
-    """What a subscriber shall be. With a `sink` nothing is kept for `Inlet.poll`. `number` proves the id."""
+    """What a subscriber shall be. With a `sink` nothing is kept for `SubscriberTransport.poll`.
+
+    `number` proves the id.
+    """
 
     id: int
     topic: str
@@ -71,7 +74,7 @@ class SubscriberSpec:
     number: int = 0
 
 
-class Outlet(Protocol):
+class PublisherTransport(Protocol):
     """What a publisher sends through."""
 
     @property
@@ -103,7 +106,7 @@ class Outlet(Protocol):
         """Unregister, and deliver what is on its way within `timeout_s`; what was not is logged."""
 
 
-class Inlet(Protocol):
+class SubscriberTransport(Protocol):
     """What a subscriber receives through."""
 
     ready: deque[Message]
@@ -124,7 +127,7 @@ class Inlet(Protocol):
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed, or its carrier was."""
+        """Whether it was closed, or its transport was."""
 
     def poll(self) -> Message | None:
         """The next message if one is there. Does not wait."""
@@ -142,20 +145,20 @@ class Inlet(Protocol):
         """In a child that was forked: be closed and empty, without taking a lock or touching a socket."""
 
 
-class Carrier(Protocol):
+class Transport(Protocol):
     """One node's way to the others."""
 
-    def publisher(self, spec: PublisherSpec) -> Outlet:
+    def publisher(self, spec: PublisherSpec) -> PublisherTransport:
         """A new publisher: the first message reaches every subscriber that was there before.
 
         Raises `MasterUnreachable`, `AddressInUseError`, `RequestRefusedError`.
         """
 
-    def subscriber(self, spec: SubscriberSpec) -> Inlet:
+    def subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
         """A new subscriber: what is published after this arrives. Raises as `publisher` does."""
 
-    def wait(self, inlets: Sequence[Inlet], timeout_s: float) -> None:
-        """Wait until one of `inlets` may have a message or `wake` is called, at most `timeout_s` seconds."""
+    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
+        """Wait until one of `subscribers` may have a message or `wake` is called, `timeout_s` at most."""
 
     def wake(self) -> None:
         """End all waits that are under way."""
@@ -167,7 +170,7 @@ class Carrier(Protocol):
         """Nothing is sent any more; say so, and wait for nothing. `close` follows, at once or later."""
 
     def close(self, timeout_s: float) -> None:
-        """Close all outlets and inlets, unregister, end the thread."""
+        """Close all publishers and subscribers, unregister, end the thread."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +178,6 @@ class Backend:
     """A plug-in that carries bytes. `open` raises `BackendUnavailableError` when `needs` is not installed."""
 
     name: str
-    open: Callable[[NodeRecord], Carrier]
+    open: Callable[[NodeRecord], Transport]
     needs: str = ""
     aliases: tuple[str, ...] = ()

@@ -11,7 +11,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from nep.backends.base import Backend, Inlet, PublisherSpec, SubscriberSpec
+from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.errors import NepError, RequestRefusedError
 from nep.masters.graph import Graph, GraphView
@@ -45,9 +45,9 @@ class _Hub:
     def __init__(self) -> None:
         self.lock = threading.RLock()
         self.graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-        self.carriers: dict[str, MemoryCarrier] = {}
-        self.outlets: dict[str, list[MemoryOutlet]] = {}
-        self.inlets: dict[str, tuple[MemoryInlet, ...]] = {}
+        self.transports: dict[str, MemoryTransport] = {}
+        self.publishers: dict[str, list[MemoryPublisher]] = {}
+        self.subscribers: dict[str, tuple[MemorySubscriber, ...]] = {}
 
     def ask(self, request: requests.Request) -> None:
         """Tell the graph. Raises `RequestRefusedError`."""
@@ -59,14 +59,14 @@ class _Hub:
     def forget(self, node_id: str) -> None:
         """A node leaves."""
         with self.lock:
-            self.carriers.pop(node_id, None)
+            self.transports.pop(node_id, None)
             self.ask(requests.Leave(node_id))
 
     def view(self) -> GraphView:
         """The graph with everybody's statistics of this moment."""
         with self.lock:
-            for carrier in self.carriers.values():
-                self.ask(carrier.renewal(self))
+            for transport in self.transports.values():
+                self.ask(transport.renewal(self))
             return self.graph.view()
 
 
@@ -91,11 +91,11 @@ def _hub(configuration: Configuration) -> _Hub:
         return _hubs.setdefault(configuration.master, _Hub())
 
 
-class MemoryOutlet:
-    """A publisher: hands every message to the inlets of its topic."""
+class MemoryPublisher:
+    """A publisher: hands every message to the subscribers of its topic."""
 
-    def __init__(self, carrier: MemoryCarrier, hub: _Hub, spec: PublisherSpec) -> None:
-        self._carrier = carrier
+    def __init__(self, transport: MemoryTransport, hub: _Hub, spec: PublisherSpec) -> None:
+        self._transport = transport
         self.hub = hub
         self.spec = spec
         self.count = 0
@@ -109,8 +109,8 @@ class MemoryOutlet:
 
     @property
     def subscribers(self) -> int:
-        """How many inlets there are on the topic."""
-        return len(self.hub.inlets.get(self.spec.topic, ()))
+        """How many subscribers there are on the topic."""
+        return len(self.hub.subscribers.get(self.spec.topic, ()))
 
     @property
     def is_heard(self) -> bool:
@@ -149,27 +149,27 @@ class MemoryOutlet:
             )
             if self.spec.is_latched:
                 self.latched = message
-            for inlet in self.hub.inlets.get(self.spec.topic, ()):
-                inlet.put(message)
+            for subscriber in self.hub.subscribers.get(self.spec.topic, ()):
+                subscriber.put(message)
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - nothing is ever on its way here
         """Unregister. Everything was delivered when it was sent."""
         with self.hub.lock:
             if not self.is_closed:
                 self.is_closed = True
-                left = [each for each in self.hub.outlets[self.spec.topic] if each is not self]
-                self.hub.outlets[self.spec.topic] = left
+                left = [each for each in self.hub.publishers[self.spec.topic] if each is not self]
+                self.hub.publishers[self.spec.topic] = left
                 if not left:
-                    del self.hub.outlets[self.spec.topic]
-                self._carrier.forget(self)
-                self.hub.ask(requests.RemovePublisher(self._carrier.node.id, self.spec.id, self.count))
+                    del self.hub.publishers[self.spec.topic]
+                self._transport.forget(self)
+                self.hub.ask(requests.RemovePublisher(self._transport.node.id, self.spec.id, self.count))
 
 
-class MemoryInlet:
+class MemorySubscriber:
     """A subscriber: its inbox, or its sink."""
 
-    def __init__(self, carrier: MemoryCarrier, hub: _Hub, spec: SubscriberSpec) -> None:
-        self._carrier = carrier
+    def __init__(self, transport: MemoryTransport, hub: _Hub, spec: SubscriberSpec) -> None:
+        self._transport = transport
         self.hub = hub
         batch = 0 if spec.sink is None else _BATCH_BYTES
         self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
@@ -181,25 +181,25 @@ class MemoryInlet:
 
     def put(self, message: Message) -> None:
         """Called by publishers."""
-        with self._carrier.changed:
+        with self._transport.changed:
             dropped = self.inbox.put(message)
             self.received += 1 - dropped
             self.lost += dropped
-            self._carrier.changed.notify_all()
+            self._transport.changed.notify_all()
 
     def poll(self) -> Message | None:
         """The next message if one is there."""
-        with self._carrier.changed:
+        with self._transport.changed:
             return self.inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
         """The next message, waited for."""
-        self._carrier.wait((self,), timeout_s)
+        self._transport.wait((self,), timeout_s)
         return self.poll()
 
     def take_batch(self) -> list[Message]:
         """What a sink gets at once."""
-        with self._carrier.changed:
+        with self._transport.changed:
             return self.inbox.take_all(_BATCH_BYTES)
 
     def report(self, problem: str) -> None:
@@ -207,7 +207,7 @@ class MemoryInlet:
         self.problem = problem
 
     def forked(self) -> None:
-        """In a child. See `Inlet.forked`."""
+        """In a child. See `SubscriberTransport.forked`."""
         self.is_closed = True
 
     def close(self) -> None:
@@ -216,16 +216,16 @@ class MemoryInlet:
             if self.is_closed:
                 return
             self.is_closed = True
-            others = tuple(each for each in self.hub.inlets[self.spec.topic] if each is not self)
-            self.hub.inlets[self.spec.topic] = others
+            others = tuple(each for each in self.hub.subscribers[self.spec.topic] if each is not self)
+            self.hub.subscribers[self.spec.topic] = others
             if not others:
-                del self.hub.inlets[self.spec.topic]
-            self._carrier.forget(self)
-            self.hub.ask(requests.RemoveSubscriber(self._carrier.node.id, self.spec.id))
-        self._carrier.wake()
+                del self.hub.subscribers[self.spec.topic]
+            self._transport.forget(self)
+            self.hub.ask(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
+        self._transport.wake()
 
 
-class MemoryCarrier:
+class MemoryTransport:
     """One node's way to the others of its process."""
 
     def __init__(self, node: NodeRecord) -> None:
@@ -234,13 +234,13 @@ class MemoryCarrier:
         self._wakes = 0
         self._load = CpuLoad()
         self._hubs: set[_Hub] = set()
-        self._outlets: tuple[MemoryOutlet, ...] = ()
-        self._inlets: tuple[MemoryInlet, ...] = ()
-        self._sinks: list[MemoryInlet] = []
+        self._publishers: tuple[MemoryPublisher, ...] = ()
+        self._subscribers: tuple[MemorySubscriber, ...] = ()
+        self._sinks: list[MemorySubscriber] = []
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
 
-    def publisher(self, spec: PublisherSpec) -> MemoryOutlet:
+    def publisher(self, spec: PublisherSpec) -> MemoryPublisher:
         """Register a publisher."""
         hub = self._join(spec.configuration)
         with hub.lock:
@@ -248,36 +248,36 @@ class MemoryCarrier:
                 spec.id, spec.topic, spec.msg_type, spec.codec.name, ("memory",), spec.is_latched
             )
             hub.ask(requests.AddPublisher(self.node, record))
-            outlet = MemoryOutlet(self, hub, spec)
-            hub.outlets.setdefault(spec.topic, []).append(outlet)
-            self._outlets = (*self._outlets, outlet)
-        return outlet
+            publisher = MemoryPublisher(self, hub, spec)
+            hub.publishers.setdefault(spec.topic, []).append(publisher)
+            self._publishers = (*self._publishers, publisher)
+        return publisher
 
-    def subscriber(self, spec: SubscriberSpec) -> MemoryInlet:
+    def subscriber(self, spec: SubscriberSpec) -> MemorySubscriber:
         """Register a subscriber, and hand it what is latched."""
         hub = self._join(spec.configuration)
         with hub.lock:
             hub.ask(requests.AddSubscriber(self.node, SubscriberRecord(spec.id, spec.topic, spec.msg_type)))
-            inlet = MemoryInlet(self, hub, spec)
-            for outlet in hub.outlets.get(spec.topic, ()):
-                if outlet.latched is not None:
-                    inlet.put(outlet.latched)
-            hub.inlets[spec.topic] = (*hub.inlets.get(spec.topic, ()), inlet)
-            self._inlets = (*self._inlets, inlet)
+            subscriber = MemorySubscriber(self, hub, spec)
+            for publisher in hub.publishers.get(spec.topic, ()):
+                if publisher.latched is not None:
+                    subscriber.put(publisher.latched)
+            hub.subscribers[spec.topic] = (*hub.subscribers.get(spec.topic, ()), subscriber)
+            self._subscribers = (*self._subscribers, subscriber)
         if spec.sink is not None:
-            self._pour(inlet)
-        return inlet
+            self._pour(subscriber)
+        return subscriber
 
-    def forget(self, closed: MemoryOutlet | MemoryInlet) -> None:
+    def forget(self, closed: MemoryPublisher | MemorySubscriber) -> None:
         """It was closed; called under its hub's lock."""
-        self._outlets = tuple(each for each in self._outlets if each is not closed)
-        self._inlets = tuple(each for each in self._inlets if each is not closed)
+        self._publishers = tuple(each for each in self._publishers if each is not closed)
+        self._subscribers = tuple(each for each in self._subscribers if each is not closed)
         with self.changed:
             self._sinks = [each for each in self._sinks if each is not closed]
 
-    def wait(self, inlets: Sequence[Inlet], timeout_s: float) -> None:
-        """Wait for a message in one of `inlets`, or for `wake`."""
-        mine = [each for each in inlets if isinstance(each, MemoryInlet)]
+    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
+        """Wait for a message in one of `subscribers`, or for `wake`."""
+        mine = [each for each in subscribers if isinstance(each, MemorySubscriber)]
         with self.changed:
             before = self._wakes
             self.changed.wait_for(
@@ -296,8 +296,8 @@ class MemoryCarrier:
 
     def renewal(self, hub: _Hub) -> requests.Renew:
         """This node's statistics on one hub."""
-        outs = [each for each in self._outlets if each.hub is hub and not each.is_closed]
-        ins = [each for each in self._inlets if each.hub is hub and not each.is_closed]
+        outs = [each for each in self._publishers if each.hub is hub and not each.is_closed]
+        ins = [each for each in self._subscribers if each.hub is hub and not each.is_closed]
         return requests.Renew(
             self.node.id,
             hub.graph.epoch,
@@ -315,11 +315,11 @@ class MemoryCarrier:
     def close(self, timeout_s: float) -> None:
         """Unregister all and end the thread."""
         self._closing.set()
-        for inlet in self._inlets:
-            inlet.close()
+        for subscriber in self._subscribers:
+            subscriber.close()
         self._sinks = []
-        for outlet in self._outlets:
-            outlet.close(timeout_s)
+        for publisher in self._publishers:
+            publisher.close(timeout_s)
         for hub in self._hubs:
             hub.forget(self.node.id)
         self.wake()
@@ -329,12 +329,12 @@ class MemoryCarrier:
     def _join(self, configuration: Configuration) -> _Hub:
         hub = _hub(configuration)
         with hub.lock:
-            hub.carriers[self.node.id] = self
+            hub.transports[self.node.id] = self
             self._hubs.add(hub)
         return hub
 
-    def _pour(self, inlet: MemoryInlet) -> None:
-        self._sinks = [*self._sinks, inlet]
+    def _pour(self, subscriber: MemorySubscriber) -> None:
+        self._sinks = [*self._sinks, subscriber]
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name=f"nep-sinks-{self.node.name}", daemon=True)
             self._thread.start()
@@ -342,16 +342,16 @@ class MemoryCarrier:
     def _run(self) -> None:
         while not self._closing.is_set():
             self.wait(self._sinks, 0.1)
-            for inlet in self._sinks:
-                messages = inlet.take_batch()
-                if messages and inlet.spec.sink is not None:
+            for subscriber in self._sinks:
+                messages = subscriber.take_batch()
+                if messages and subscriber.spec.sink is not None:
                     try:
-                        inlet.spec.sink(messages)
+                        subscriber.spec.sink(messages)
                     except (
                         BaseException
                     ):  # also SystemExit, which would end all sinks' thread: it gets the next batch
-                        _logger.exception("the sink of '%s' failed", inlet.spec.topic)
+                        _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
             self._closing.wait(_BATCH_S)
 
 
-BACKEND = Backend("memory", MemoryCarrier)
+BACKEND = Backend("memory", MemoryTransport)

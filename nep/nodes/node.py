@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
 
 from nep.arguments import WrongTypeError, at_least, flag, function, limit, one_of, seconds, text
-from nep.backends.base import Carrier, Inlet, PublisherSpec, Sink, SubscriberSpec
+from nep.backends.base import PublisherSpec, Sink, SubscriberSpec, SubscriberTransport, Transport
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
 from nep.backends.lookup import backend_named
 from nep.errors import ClosedError, DecodeError
@@ -82,7 +82,7 @@ class Node:
         self._wait_s = seconds("wait_s", wait_s)
         self._lock = threading.RLock()
         self._stop_spin = threading.Event()
-        self._callbacks: tuple[tuple[Subscriber, Inlet, Callable[[Any], object]], ...] = ()
+        self._callbacks: tuple[tuple[Subscriber, SubscriberTransport, Callable[[Any], object]], ...] = ()
         self._publishers: set[Publisher] = set()
         self._subscribers: set[Subscriber] = set()
         self._is_closed = False
@@ -97,7 +97,7 @@ class Node:
             since_ns=time.time_ns(),
             key=key,
         )
-        self._carrier: Carrier = self._backend.open(record)
+        self._transport: Transport = self._backend.open(record)
         _alive.add(self)
         _close_with_worker()
         forks.watch(self)
@@ -168,7 +168,7 @@ class Node:
             self._wait_s,
             number,
         )
-        publisher = Publisher(self._open_carrier().publisher(spec), spec, self._publishers.discard)
+        publisher = Publisher(self._open_transport().publisher(spec), spec, self._publishers.discard)
         with self._lock:
             self._publishers.add(publisher)
             if self._is_closed:
@@ -203,7 +203,7 @@ class Node:
             sink=None if sink is None else function("sink", sink),
             number=number,
         )
-        return self._subscribed(self._open_carrier().subscriber(spec), spec)
+        return self._subscribed(self._open_transport().subscriber(spec), spec)
 
     def new_callback(
         self,
@@ -213,7 +213,7 @@ class Node:
         configuration: Configuration | None = None,
     ) -> Subscriber:
         """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`."""
-        carrier = self._open_carrier()
+        transport = self._open_transport()
         function("callback", callback)
         number = next(self._numbers)
         spec = SubscriberSpec(
@@ -224,11 +224,11 @@ class Node:
             self._wait_s,
             number=number,
         )
-        inlet = carrier.subscriber(spec)
-        subscriber = self._subscribed(inlet, spec)
+        incoming = transport.subscriber(spec)
+        subscriber = self._subscribed(incoming, spec)
         with self._lock:
-            if not inlet.is_closed:
-                self._callbacks = (*self._callbacks, (subscriber, inlet, callback))
+            if not incoming.is_closed:
+                self._callbacks = (*self._callbacks, (subscriber, incoming, callback))
         return subscriber
 
     def _configured(self, configuration: object) -> Configuration:
@@ -239,8 +239,8 @@ class Node:
             raise WrongTypeError(f"configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'")
         return configuration
 
-    def _subscribed(self, inlet: Inlet, spec: SubscriberSpec) -> Subscriber:
-        subscriber = Subscriber(inlet, spec, self._forget)
+    def _subscribed(self, transport: SubscriberTransport, spec: SubscriberSpec) -> Subscriber:
+        subscriber = Subscriber(transport, spec, self._forget)
         with self._lock:
             self._subscribers.add(subscriber)
         return subscriber
@@ -267,8 +267,10 @@ class Node:
                 if left <= 0.0:
                     return
                 if not self._run_callbacks():
-                    waited = [inlet for _sub, inlet, _call in self._callbacks if not inlet.is_closed]
-                    self._carrier.wait(waited, left)
+                    waited = [
+                        transport for _sub, transport, _call in self._callbacks if not transport.is_closed
+                    ]
+                    self._transport.wait(waited, left)
             if self._is_forked:
                 raise self._closed_error()
         finally:
@@ -278,16 +280,16 @@ class Node:
         """End `spin`, from any thread or from a callback."""
         if not self._is_forked:
             self._stop_spin.set()
-            self._carrier.wake()
+            self._transport.wake()
 
     def _run_callbacks(self) -> bool:
         """One message for each callback that has one; whether there was any."""
         worked = False
-        for subscriber, inlet, callback in self._callbacks:
+        for subscriber, transport, callback in self._callbacks:
             try:
-                message = inlet.ready.popleft()
+                message = transport.ready.popleft()
             except IndexError:
-                found = None if inlet.is_closed else inlet.poll()
+                found = None if transport.is_closed else transport.poll()
                 if found is None:
                     continue
                 message = found
@@ -318,7 +320,7 @@ class Node:
     def graph(self, timeout_s: float = 2.0) -> GraphView:
         """Who is there now. Raises `MasterUnreachable` when the master does not answer in time."""
         seconds("timeout_s", timeout_s)
-        return self._open_carrier().graph(self.hybrid(), timeout_s)
+        return self._open_transport().graph(self.hybrid(), timeout_s)
 
     def close(self, timeout_s: float = FLUSH_S) -> None:
         """Unregister and end; what was published is delivered first, within `timeout_s`. May be called twice.
@@ -344,7 +346,7 @@ class Node:
         self._stop_spin.set()
         for publisher in publishers:
             publisher.node_closes()
-        self._carrier.begin_close()
+        self._transport.begin_close()
         with self._lock:
             self._publishers.clear()
             self._subscribers.clear()
@@ -353,7 +355,7 @@ class Node:
 
     def _finish_close(self, timeout_s: float) -> None:
         """Deliver what was published, within `timeout_s`, and give everything back."""
-        self._carrier.close(timeout_s)
+        self._transport.close(timeout_s)
 
     def forked(self) -> None:
         """In a child that was forked. See `nep.system.forks`."""
@@ -368,10 +370,10 @@ class Node:
         _alive.discard(self)
         _inherited.append(self)
 
-    def _open_carrier(self) -> Carrier:
+    def _open_transport(self) -> Transport:
         if self._is_closed:
             raise self._closed_error()
-        return self._carrier
+        return self._transport
 
     def _closed_error(self) -> ClosedError:
         return ClosedError(f"node '{self.name}'", is_forked=self._is_forked)

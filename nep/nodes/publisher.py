@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from nep.arguments import limit, seconds
-from nep.backends.base import Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.backends.base import PublisherSpec, PublisherTransport, SubscriberSpec, SubscriberTransport
 from nep.errors import ClosedError, DecodeError, EncodeError, WireError
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded, encoded
@@ -34,17 +34,17 @@ class Publisher:
 
     def __init__(
         self,
-        outlet: Outlet,
+        transport: PublisherTransport,
         spec: PublisherSpec,
         on_close: Callable[[Publisher], object] | None = None,
     ) -> None:
         self._on_close = on_close
         self._is_forked = False
-        self._outlet = outlet
+        self._transport = transport
         self._spec = spec
         self._nulls = NullTeller(spec.topic) if spec.codec.name == "json" else None
         self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
-        self._unsendable = Unsendable(spec.topic, spec.codec.encode, outlet.report)
+        self._unsendable = Unsendable(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched
         self._is_closed = False
 
@@ -66,17 +66,17 @@ class Publisher:
     @property
     def subscribers(self) -> int:
         """How many subscribers are connected now. Costs nothing."""
-        return 0 if self._is_forked else self._outlet.subscribers
+        return 0 if self._is_forked else self._transport.subscribers
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of nodes that subscribe and have not connected: hung, or just being connected."""
-        return () if self._is_forked else self._outlet.missing
+        return () if self._is_forked else self._transport.missing
 
     @property
     def count(self) -> int:
         """Messages published so far, also those that nobody was there to hear."""
-        return self._outlet.count
+        return self._transport.count
 
     @property
     def nulled(self) -> int:
@@ -96,7 +96,7 @@ class Publisher:
         in the graph until one can. So nothing depends on whether somebody listens: with no subscriber a
         payload is encoded only now and then, to see whether it could be sent, unless it is latched.
         """
-        if self._is_closed or not (self._outlet.is_heard or self._is_latched):
+        if self._is_closed or not (self._transport.is_heard or self._is_latched):
             self._skip(payload)
             return
         try:
@@ -108,11 +108,11 @@ class Publisher:
         if made is payload or self._unsendable.problem:
             self._send(made)
         else:
-            self._outlet.send(made)
+            self._transport.send(made)
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send bytes that are encoded already. Raises as `publish` does."""
-        if self._is_closed or not (self._outlet.is_heard or self._is_latched):
+        if self._is_closed or not (self._transport.is_heard or self._is_latched):
             self._skip(Encoded(data, extension))
         else:
             self._send(encoded((data, extension)))
@@ -121,7 +121,7 @@ class Publisher:
         if type(made.data) is not bytes or made.extension is not None:
             self._check(made)
         try:
-            self._outlet.send(made)
+            self._transport.send(made)
         except WireError as error:  # what is in the extension
             self._unsendable.add(made, error)
             return
@@ -145,7 +145,7 @@ class Publisher:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         self._check(payload)
         if self._unsendable.try_out(payload):
-            self._outlet.skip()
+            self._transport.skip()
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
@@ -153,7 +153,7 @@ class Publisher:
         if not self._is_closed:
             self._is_closed = True
             try:
-                self._outlet.close(timeout_s)
+                self._transport.close(timeout_s)
             finally:
                 if self._on_close is not None:
                     self._on_close(self)
@@ -181,15 +181,15 @@ class Subscriber:
 
     def __init__(
         self,
-        inlet: Inlet,
+        transport: SubscriberTransport,
         spec: SubscriberSpec,
         on_close: Callable[[Subscriber], object] | None = None,
     ) -> None:
         self._on_close = on_close
         self._is_forked = False
-        self._inlet = inlet
+        self._transport = transport
         self._spec = spec
-        self._ready = inlet.ready
+        self._ready = transport.ready
         self._empty = codec_for(spec.msg_type).empty
         self._problem = ""
         self._unreadable = 0
@@ -212,22 +212,22 @@ class Subscriber:
     @property
     def received(self) -> int:
         """Messages that arrived."""
-        return self._inlet.received
+        return self._transport.received
 
     @property
     def lost(self) -> int | None:
         """Messages that did not arrive or were dropped here unread; None where nobody can know."""
-        return self._inlet.lost
+        return self._transport.lost
 
     @property
     def refused(self) -> int:
         """What came and was no message at all; why is an alert in the graph."""
-        return self._inlet.refused
+        return self._transport.refused
 
     @property
     def is_closed(self) -> bool:
         """Whether it, or its node, was closed."""
-        return self._inlet.is_closed
+        return self._transport.is_closed
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
         """(True, payload) of the next message, or (False, an empty payload) when there is none.
@@ -279,29 +279,29 @@ class Subscriber:
                 return self._ready.popleft()
             except IndexError:  # another thread took it
                 pass
-        if self._inlet.is_closed or (timeout_s is not None and timeout_s <= 0.0):
+        if self._transport.is_closed or (timeout_s is not None and timeout_s <= 0.0):
             return self._poll()
         wait_s = SLICE_S if timeout_s is None or timeout_s > SLICE_S else timeout_s
-        message = self._inlet.receive(wait_s)
+        message = self._transport.receive(wait_s)
         return message or self._receive_on(None if timeout_s is None else timeout_s - wait_s)
 
     def _receive_on(self, timeout_s: float | None) -> Message | None:
         """After the first slice."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
-            if self._inlet.is_closed:
+            if self._transport.is_closed:
                 raise self._closed()
             left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 return None
-            message = self._inlet.receive(left)
+            message = self._transport.receive(left)
             if message is not None:
                 return message
 
     def _poll(self) -> Message | None:
-        if self._inlet.is_closed:
+        if self._transport.is_closed:
             raise self._closed()
-        return self._inlet.poll()
+        return self._transport.poll()
 
     def _closed(self) -> ClosedError:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
@@ -318,7 +318,7 @@ class Subscriber:
             raise
         if self._problem:
             self._problem = ""
-            self._inlet.report("")
+            self._transport.report("")
         return payload
 
     def _tell(self, error: DecodeError) -> None:
@@ -329,19 +329,19 @@ class Subscriber:
                 "a message on '%s' cannot be read (%d so far): %s", self.topic, self._unreadable, error
             )
         self._problem = str(error)
-        self._inlet.report(self._problem)
+        self._transport.report(self._problem)
 
     def close(self) -> None:
         """Unregister; what was not read is forgotten. May be called twice."""
         if not self._is_forked:
-            self._inlet.close()
+            self._transport.close()
             if self._on_close is not None:
                 self._on_close(self)
 
     def forked(self) -> None:
         """In a child that was forked. See `nep.system.forks`."""
         self._is_forked = True
-        self._inlet.forked()
+        self._transport.forked()
 
     def __iter__(self) -> Iterator[Message]:
         while True:

@@ -177,26 +177,26 @@ def test_one_bad_endpoint_keeps_nobody_from_hearing_the_others(
 ) -> None:
     with nep.node("good", master=master.address) as good, nep.node("victim", master=master.address) as victim:
         pub, sub = good.new_pub("t"), victim.new_sub("t")
-        inlet: Any = sub._inlet
-        socket: SubSocket = inlet._readable
+        transport: Any = sub._transport
+        socket: SubSocket = transport._readable
         bad = [
             RemotePublisher(PublisherRecord(number, "t", "json", "json", (endpoint,)), "bad", "bad")
             for number in (7, 8)
         ]
         (known,) = (source.remote for source in socket.sources.by_id.values())
         assert known is not None
-        inlet.connect((bad[0], known, bad[1]))
-        inlet.connect(bad)  # twice is once
+        transport.connect((bad[0], known, bad[1]))
+        transport.connect(bad)  # twice is once
         pub.publish("heard")
         assert sub.listen(timeout_s=30.0) == (True, "heard")
         assert sub.refused == (2 if endpoint else 0)
         if endpoint:
-            assert "of 'bad' cannot be connected to" in inlet.counts().problem
-            assert "\x1b" not in inlet.counts().problem + caplog.text
+            assert "of 'bad' cannot be connected to" in transport.counts().problem
+            assert "\x1b" not in transport.counts().problem + caplog.text
             for each in bad:
-                inlet.gone(each.publisher.id, 0, is_closed=False)
+                transport.gone(each.publisher.id, 0, is_closed=False)
             socket.refusals = type(socket.refusals)()
-            assert inlet.counts().problem == ""
+            assert transport.counts().problem == ""
 
 
 @pytest.mark.parametrize("endpoint", ["tcp://127.0.0.1:1", "tcp://my-host.local:65535", "ipc://@nep-41234"])
@@ -212,7 +212,7 @@ def test_a_subscriber_whose_making_is_broken_off_is_not_registered(master: Maste
 
     with nep.node("n", master=master.address) as node, nep.node("o", master=master.address) as other:
         other.new_pub("t")
-        carrier: Any = node._carrier
+        transport: Any = node._transport
 
         class Waker:
             def __enter__(self) -> None:
@@ -220,9 +220,9 @@ def test_a_subscriber_whose_making_is_broken_off_is_not_registered(master: Maste
 
             def __exit__(self, *_exc: object) -> None: ...
 
-        usual, carrier._waker = carrier._waker, Waker
+        usual, transport._waker = transport._waker, Waker
         with pytest.raises(BrokenOff):
             node.new_sub("t")
-        carrier._waker = usual
+        transport._waker = usual
         eventually(lambda: not node.graph().topics["t"].subscribers)
-        assert not carrier._inlets
+        assert not transport._subscribers

@@ -127,7 +127,7 @@ def test_a_subscriber_hears_all_that_is_good_between_what_is_not(
         message = sub.receive(30.0)
         assert message is not None
         assert bytes(message.data) == expected
-        assert "a header has 32 bytes, this one has 5" in sub._inlet.counts().problem  # type: ignore[attr-defined]
+        assert "a header has 32 bytes, this one has 5" in sub._transport.counts().problem  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("in_batches", [False, True])
@@ -228,7 +228,7 @@ def test_a_publisher_serves_on_whatever_subscribers_send(
             assert message is not None
             assert bytes(message.data) == b"still here"
 
-        refused = pub._outlet.refusals  # type: ignore[attr-defined]
+        refused = pub._transport.refusals  # type: ignore[attr-defined]
         rogue.send(b"\x01nobody knows that")
         attack()
         assert refused.count >= 1

@@ -34,7 +34,7 @@ def endpoint(node: nep.Node, topic: str) -> str:
 
 def ends(sub: nep.Subscriber) -> list[str]:
     """Where a subscriber is connected."""
-    return [source.endpoint for _id, source in sub._inlet._readable.sources.items()]  # type: ignore[attr-defined]
+    return [source.endpoint for _id, source in sub._transport._readable.sources.items()]  # type: ignore[attr-defined]
 
 
 def is_bound(name: str) -> bool:

@@ -166,9 +166,9 @@ def test_what_was_lost_between_is_said(master, capsys):
         while not pub.subscribers:
             threading.Event().wait(0.01)
         pub.publish(1)
-        outlet = pub._outlet
+        transport = pub._transport
         for _ in range(3):
-            outlet.skip()
+            transport.skip()
         pub.publish(2)
         running.join()
     assert "3 messages of 't' did not arrive here" in capsys.readouterr().err

@@ -226,6 +226,6 @@ def test_connections_to_masters_that_nobody_needs_are_closed(master: Master) -> 
         pub = node.new_pub("topic")
         for port in range(1, 40):
             with pytest.raises(nep.MasterUnreachable):
-                node._carrier.graph(nep.Hybrid(f"127.0.0.1:{port}"), 0.01)
-        assert len(node._carrier._links) <= 8  # type: ignore[attr-defined]
+                node._transport.graph(nep.Hybrid(f"127.0.0.1:{port}"), 0.01)
+        assert len(node._transport._sessions) <= 8  # type: ignore[attr-defined]
         assert node.graph().topics["topic"].publishers[0].id == pub.id

@@ -126,7 +126,7 @@ for line in sys.stdin:
     with running(code) as program, nep.node("peer", wait_s=5.0) as node:
         assert program.line() == "ready"
         first = node.new_sub("wanted")
-        inlets = [node.new_sub("wanted", keep="latest") for _ in range(20)]
+        subscribers = [node.new_sub("wanted", keep="latest") for _ in range(20)]
         program.say("one")
         assert int(program.line()) == 21
         assert first.listen(timeout_s=30.0) == (True, "one")
@@ -134,7 +134,7 @@ for line in sys.stdin:
         with running(more) as crowd:
             assert crowd.line() == "connecting"
             eventually(lambda: _asked(program) > 40)
-        for each in inlets:
+        for each in subscribers:
             each.close()
         eventually(lambda: _asked(program) == 1)
         assert first.listen(timeout_s=30.0)[0]

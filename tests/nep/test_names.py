@@ -11,7 +11,7 @@ import zmq
 
 import nep
 from nep.backends.zeromq.io_thread import SharedContext, shared_context
-from nep.backends.zeromq.master_session import MasterLink, MasterName
+from nep.backends.zeromq.master_session import MasterName, MasterSession
 from nep.masters.master import Master
 from nep.protocol.records import NodeRecord
 from tests.nep.programs import eventually
@@ -91,7 +91,7 @@ def test_a_name_that_nobody_answers_holds_up_nobody(shared: SharedContext, maste
     with nep.node("other") as other:
         socket = shared.socket(zmq.DEALER, "a test")
         record = NodeRecord("1" * 16, "n", "host", 1)
-        link = MasterLink(socket, shared.io, record, f"robot:{port}", book.look_up)
+        link = MasterSession(socket, shared.io, record, f"robot:{port}", book.look_up)
         shared.io.add(link)
         eventually(lambda: book.asked == ["robot"])
         try:

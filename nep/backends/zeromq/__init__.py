@@ -4,8 +4,8 @@ Its publishers, subscribers and sockets, the thread that serves them, and the se
 """
 
 from nep.backends.base import Backend
-from nep.backends.zeromq.transport import ZeromqCarrier
+from nep.backends.zeromq.transport import ZeromqTransport
 
 __all__ = ["BACKEND"]
 
-BACKEND = Backend("zeromq", ZeromqCarrier, aliases=("zmq",))
+BACKEND = Backend("zeromq", ZeromqTransport, aliases=("zmq",))

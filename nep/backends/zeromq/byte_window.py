@@ -26,7 +26,7 @@ _ASK_AGAIN_S = 0.5
 
 
 class Window:
-    """What was sent to one subscriber and is not known to be read. It lives under its outlet's lock."""
+    """What was sent to one subscriber and is not known to be read. It lives under its publisher's lock."""
 
     def __init__(self) -> None:
         self.under_way = 0

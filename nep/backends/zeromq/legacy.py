@@ -30,13 +30,21 @@ from nep.backends.zeromq.sockets import (
     wait_until,
 )
 from nep.backends.zeromq.sub_socket import Into
-from nep.backends.zeromq.subscriber import SocketInlet
+from nep.backends.zeromq.subscriber import SocketSubscriber
 from nep.errors import ClosedError, WireError
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 
-__all__ = ["OriginalInlet", "OriginalOutlet", "OriginalSub", "attach", "from_frame", "has_prefix", "to_frame"]
+__all__ = [
+    "OriginalPublisher",
+    "OriginalSubSocket",
+    "OriginalSubscriber",
+    "attach",
+    "from_frame",
+    "has_prefix",
+    "to_frame",
+]
 
 _ALWAYS = frozenset({"dictionary", "image"})
 _NEVER = frozenset({"bytes", "msgpack", "images"})
@@ -94,7 +102,7 @@ def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
     return bind(socket, address) if binds else connect(socket, address)
 
 
-class OriginalOutlet:
+class OriginalPublisher:
     """Owns `socket`, an XPUB that looks to the originals like their PUB."""
 
     def __init__(
@@ -102,7 +110,7 @@ class OriginalOutlet:
         socket: Socket,
         spec: PublisherSpec,
         direct: Direct,
-        on_close: Callable[[OriginalOutlet, float], None],
+        on_close: Callable[[OriginalPublisher, float], None],
     ) -> None:
         self.spec = spec
         self.count = 0
@@ -225,7 +233,7 @@ class OriginalOutlet:
             self._changed.notify_all()
 
 
-class OriginalSub:
+class OriginalSubSocket:
     """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
@@ -287,4 +295,4 @@ class OriginalSub:
         self._socket.close(0)
 
 
-OriginalInlet = SocketInlet[OriginalSub]
+OriginalSubscriber = SocketSubscriber[OriginalSubSocket]

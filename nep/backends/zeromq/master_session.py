@@ -1,4 +1,4 @@
-"""MasterLink: what a node has registered with one master: renews it when due, hears of publishers.
+"""MasterSession: what a node has registered with one master: renews it when due, hears of publishers.
 
 It keeps everything that is registered, so that a master that was started again learns all of it at once.
 `Pace` tells when to renew, and `MasterName` the address behind a master's name.
@@ -14,10 +14,10 @@ from dataclasses import replace
 
 from nep.backends.zeromq.bindings import in_reach, may_stay
 from nep.backends.zeromq.io_thread import IoThread, Rest
-from nep.backends.zeromq.publisher import NativeOutlet
+from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.rpc import Asking, Calls
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards, is_number, look_up
-from nep.backends.zeromq.subscriber import NativeInlet
+from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
     ClosedError,
@@ -50,7 +50,7 @@ from nep.protocol.requests import (
 from nep.system.addresses import host_of, is_loopback
 from nep.system.cpu import CpuLoad
 
-__all__ = ["MasterLink", "MasterName", "Pace"]
+__all__ = ["MasterName", "MasterSession", "Pace"]
 
 _RENEW_LONGEST_S = 30.0
 """A master cannot make a node wait for longer."""
@@ -93,8 +93,8 @@ class MasterName:
     connect. So a thread of its own asks, and ends; libzmq gets numbers. It asks again only while the master
     is not connected.
 
-    What in `address` is a number already is known at once. `on_change` is told a new `known`, in the thread that
-    asked.
+    What in `address` is a number already is known at once. `on_change` is told a new `known`, in the thread
+    that asked.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class MasterName:
         self._answered.set()
 
 
-class MasterLink:
+class MasterSession:
     """The link of `node` to the master at `address`, over `socket` (a DEALER). `io` serves it.
 
     `look_up` tells the address behind a name.
@@ -173,8 +173,8 @@ class MasterLink:
         self._io = io
         self._calls = Calls(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
-        self._publishers: dict[int, tuple[PublisherRecord, NativeOutlet]] = {}
-        self._subscribers: dict[int, tuple[SubscriberRecord, NativeInlet]] = {}
+        self._publishers: dict[int, tuple[PublisherRecord, NativePublisher]] = {}
+        self._subscribers: dict[int, tuple[SubscriberRecord, NativeSubscriber]] = {}
         self._confirmed: set[int] = set()
         self._epoch, self._revision = 0, 0
         self._join_again_at = 0.0
@@ -209,7 +209,7 @@ class MasterLink:
         """
         return (LOOPBACK, *self._served) if self._is_near else (self._own_host,)
 
-    # ---- for the carrier, in any thread
+    # ---- for the transport, in any thread
 
     @property
     def is_idle(self) -> bool:
@@ -228,10 +228,12 @@ class MasterLink:
             self._own_host = host_towards(known) or self._own_host
         self._calls.lead_to(known)
 
-    def add_publisher(self, record: PublisherRecord, outlet: NativeOutlet, wait_s: float | None) -> Added:
+    def add_publisher(
+        self, record: PublisherRecord, publisher: NativePublisher, wait_s: float | None
+    ) -> Added:
         """Register; the subscribers to expect. Raises as `Calls.ask` does."""
         with self._lock:
-            self._publishers[record.id] = (record, outlet)
+            self._publishers[record.id] = (record, publisher)
         try:
             reply = self._calls.ask(AddPublisher(self._node, record), wait_s)
         except BaseException:
@@ -241,16 +243,18 @@ class MasterLink:
             self._confirmed.add(record.id)
         added = reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
         self._served = added.hosts  # a node's first publisher tells it whom the master serves
-        endpoints = outlet.move(self.hosts)
+        endpoints = publisher.move(self.hosts)
         if endpoints == record.endpoints or not endpoints:
             return added
-        moved = replace(record, endpoints=endpoints, local=outlet.is_local)
-        return self.add_publisher(moved, outlet, wait_s)
+        moved = replace(record, endpoints=endpoints, local=publisher.is_local)
+        return self.add_publisher(moved, publisher, wait_s)
 
-    def add_subscriber(self, record: SubscriberRecord, inlet: NativeInlet, wait_s: float | None) -> Found:
+    def add_subscriber(
+        self, record: SubscriberRecord, subscriber: NativeSubscriber, wait_s: float | None
+    ) -> Found:
         """Register; the publishers to connect to. Raises as `Calls.ask` does."""
         with self._lock:
-            self._subscribers[record.id] = (record, inlet)
+            self._subscribers[record.id] = (record, subscriber)
         try:
             reply = self._calls.ask(AddSubscriber(self._node, record), wait_s)
         except BaseException:
@@ -354,16 +358,16 @@ class MasterLink:
             return
         self._moved_to = self.hosts
         with self._lock:
-            for id, (record, outlet) in self._publishers.items():
+            for id, (record, publisher) in self._publishers.items():
                 if is_cramped:
-                    outlet.leave_local()
+                    publisher.leave_local()
                 try:
-                    moved = replace(record, endpoints=outlet.move(self.hosts), local=outlet.is_local)
+                    moved = replace(record, endpoints=publisher.move(self.hosts), local=publisher.is_local)
                 except (AddressInUseError, TooManyFilesError):
                     self._moved_to = ()  # tried again with the next renewal
                     continue
                 if moved != record and moved.endpoints:
-                    self._publishers[id] = (moved, outlet)
+                    self._publishers[id] = (moved, publisher)
                     if id in self._confirmed:
                         self._calls.tell(AddPublisher(self._node, moved))
 
@@ -376,11 +380,11 @@ class MasterLink:
             self._served = answer.hosts
             self._pace.due_at = now
         if isinstance(answer, PublisherCame):
-            for inlet in self._inlets(answer.publisher.publisher.topic):
-                inlet.connect(self._in_reach((answer.publisher,)))
+            for subscriber in self._subscribers_of(answer.publisher.publisher.topic):
+                subscriber.connect(self._in_reach((answer.publisher,)))
         elif isinstance(answer, PublisherGone):
-            for inlet in self._inlets(answer.topic):
-                inlet.gone(answer.id, answer.last_seq, is_closed=answer.is_closed)
+            for subscriber in self._subscribers_of(answer.topic):
+                subscriber.gone(answer.id, answer.last_seq, is_closed=answer.is_closed)
         elif isinstance(answer, Renewed):
             self._renewed(answer, now)
         elif isinstance(answer, Added | Found) and self._epoch == 0:
@@ -392,14 +396,18 @@ class MasterLink:
         if self._epoch == 0:
             return
         with self._lock:
-            outlets = [outlet for each, (_, outlet) in self._publishers.items() if each in self._confirmed]
-            inlets = [inlet for each, (_, inlet) in self._subscribers.items() if each in self._confirmed]
+            publishers = [
+                publisher for each, (_, publisher) in self._publishers.items() if each in self._confirmed
+            ]
+            subscribers = [
+                subscriber for each, (_, subscriber) in self._subscribers.items() if each in self._confirmed
+            ]
             request = Renew(
                 self._node.id,
                 self._epoch,
                 self._revision,
-                tuple(outlet.counts() for outlet in outlets),
-                tuple(inlet.counts() for inlet in inlets),
+                tuple(publisher.counts() for publisher in publishers),
+                tuple(subscriber.counts() for subscriber in subscribers),
                 self._load.ratio(),
             )
             self._calls.tell(request)
@@ -411,10 +419,10 @@ class MasterLink:
         self._revision = answer.revision
         self._pace.told(answer.next_s, now)
         for topic in answer.topics:
-            for inlet in self._inlets(topic.topic):
-                inlet.reconcile(self._in_reach(topic.publishers))
-        for _record, inlet in self._all_inlets():
-            inlet.tick(now, answer.last_seqs.items())
+            for subscriber in self._subscribers_of(topic.topic):
+                subscriber.reconcile(self._in_reach(topic.publishers))
+        for _record, subscriber in self._all_subscribers():
+            subscriber.tick(now, answer.last_seqs.items())
 
     def _join(self, now: float) -> None:
         """Register everything again, once at a time."""
@@ -439,12 +447,12 @@ class MasterLink:
         by_topic: dict[str, list[RemotePublisher]] = {}
         for remote in self._in_reach(reply.publishers):
             by_topic.setdefault(remote.publisher.topic, []).append(remote)
-        for record, inlet in self._all_inlets():
-            inlet.reconcile(by_topic.get(record.topic, ()))
+        for record, subscriber in self._all_subscribers():
+            subscriber.reconcile(by_topic.get(record.topic, ()))
 
-    def _inlets(self, topic: str) -> list[NativeInlet]:
-        return [inlet for record, inlet in self._all_inlets() if record.topic == topic]
+    def _subscribers_of(self, topic: str) -> list[NativeSubscriber]:
+        return [subscriber for record, subscriber in self._all_subscribers() if record.topic == topic]
 
-    def _all_inlets(self) -> list[tuple[SubscriberRecord, NativeInlet]]:
+    def _all_subscribers(self) -> list[tuple[SubscriberRecord, NativeSubscriber]]:
         with self._lock:
             return list(self._subscribers.values())

@@ -1,4 +1,4 @@
-"""NativeOutlet: a publisher's XPUB socket, and who reads there.
+"""NativePublisher: a publisher's XPUB socket, and who reads there.
 
 Sends happen in the publisher's thread; subscriptions are read by whoever uses the socket next, the publisher
 or the node's thread. A subscriber counts as connected when its hello has been read: see `docs/wire.md`.
@@ -34,7 +34,7 @@ from nep.protocol.wire import (
 )
 from nep.protocol.wire import EXTENSION as EXTENSION_FLAG
 
-__all__ = ["MAX_SUBSCRIBERS", "NativeOutlet", "Subscriptions"]
+__all__ = ["MAX_SUBSCRIBERS", "NativePublisher", "Subscriptions"]
 
 _logger = logging.getLogger("nep")
 MAX_SUBSCRIBERS = 10_000
@@ -59,7 +59,7 @@ class Subscriptions:
 
     Those who said hello to this publisher of `topic`, and the filters of others.
 
-    It lives under its outlet's lock.
+    It lives under its publisher's lock.
     """
 
     def __init__(self, topic: str, publisher: int) -> None:
@@ -140,14 +140,14 @@ class Subscriptions:
             _logger.info("'%s' was sent %s", self._name, self.refusals.told())
 
 
-class NativeOutlet:
+class NativePublisher:
     """Owns `socket`, an XPUB that is bound or connected already."""
 
     def __init__(
         self,
         socket: Socket,
         spec: PublisherSpec,
-        on_close: Callable[[NativeOutlet, float], None],
+        on_close: Callable[[NativePublisher, float], None],
         serve_soon: Callable[[Served], None],
     ) -> None:
         self.spec = spec

@@ -1,4 +1,4 @@
-"""What all native sockets need: bounds, free ports, addresses, waits in slices, a count of what was refused."""
+"""What all native sockets need: marks, free ports, addresses, waits in slices, counts of what was refused."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """SubSocket: a SUB socket with its publishers: reads parts, tells messages from notices, counts losses.
 
-It has no lock: it lives under its inlet's. Nearly every message is just the next one of its publisher: that
-is read on the quick way, and everything else by `_CarefulParser`.
+It has no lock: it lives under its subscriber's. Nearly every message is just the next one of its publisher:
+that is read on the quick way, and everything else by `_CarefulParser`.
 """
 
 from __future__ import annotations

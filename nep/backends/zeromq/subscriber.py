@@ -1,7 +1,7 @@
 """A subscriber's socket with its lock, its inbox and its readers.
 
-`SocketInlet` reads from any `Readable`, a socket that turns parts into messages; `NativeInlet` is the one of
-the native wire, which connects to publishers as they come.
+`SocketSubscriber` reads from any `Readable`, a socket that turns parts into messages; `NativeSubscriber` is
+the one of the native wire, which connects to publishers as they come.
 
 Whoever reads takes a lease on the socket for a moment, and the node's thread leaves it alone as long: a loop
 of `listen` gets its messages straight from the socket, in its own thread. When nobody reads, the node's
@@ -35,7 +35,7 @@ from nep.messages.queue import Inbox
 from nep.protocol.records import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
-__all__ = ["NativeInlet", "Readable", "SocketInlet"]
+__all__ = ["NativeSubscriber", "Readable", "SocketSubscriber"]
 
 _AHEAD_BYTES = 2**18
 _BRISK_S = 10e-6
@@ -58,7 +58,7 @@ _FEW = 50
 
 
 class Readable(Protocol):
-    """A socket that turns what comes into messages. It is used under the inlet's lock only."""
+    """A socket that turns what comes into messages. It is used under the subscriber's lock only."""
 
     fd: int
     refusals: Refusals
@@ -124,7 +124,7 @@ class _ReadAhead:
 R = TypeVar("R", bound=Readable)
 
 
-class SocketInlet(Generic[R]):
+class SocketSubscriber(Generic[R]):
     """Reads from `readable`. `on_close` unregisters; it is called once, without the lock."""
 
     def __init__(
@@ -324,7 +324,7 @@ class SocketInlet(Generic[R]):
                 self._waker = None
 
     def forked(self) -> None:
-        """In a child. See `Inlet.forked`."""
+        """In a child. See `SubscriberTransport.forked`."""
         self.is_closed = True
         self.ready.clear()
 
@@ -392,8 +392,8 @@ class SocketInlet(Generic[R]):
             waker.wake()
 
 
-class NativeInlet(SocketInlet[SubSocket]):
-    """See `SocketInlet`. The methods for publishers are called by the link to the master."""
+class NativeSubscriber(SocketSubscriber[SubSocket]):
+    """See `SocketSubscriber`. The methods for publishers are called by the link to the master."""
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
         """Wait until these publishers have echoed.

@@ -9,15 +9,21 @@ from contextlib import contextmanager
 
 import zmq
 
-from nep.backends.base import HANDSHAKE_S, Inlet, Outlet, PublisherSpec, SubscriberSpec
+from nep.backends.base import (
+    HANDSHAKE_S,
+    PublisherSpec,
+    PublisherTransport,
+    SubscriberSpec,
+    SubscriberTransport,
+)
 from nep.backends.connection import Configuration, Direct
 from nep.backends.zeromq.io_thread import IoThread, SharedContext, shared_context
-from nep.backends.zeromq.legacy import OriginalInlet, OriginalOutlet, OriginalSub, attach
-from nep.backends.zeromq.master_session import MasterLink
-from nep.backends.zeromq.publisher import NativeOutlet
+from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
+from nep.backends.zeromq.master_session import MasterSession
+from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
-from nep.backends.zeromq.subscriber import NativeInlet, SocketInlet
+from nep.backends.zeromq.subscriber import NativeSubscriber, SocketSubscriber
 from nep.errors import ClosedError, NepError
 from nep.protocol.graph_view import GraphView
 from nep.protocol.records import NodeRecord, PublisherRecord, SubscriberRecord
@@ -26,20 +32,20 @@ from nep.system.descriptors import check_room
 from nep.system.forks import give_up, watch
 from nep.system.wakeup import Waker
 
-__all__ = ["ZeromqCarrier"]
+__all__ = ["ZeromqTransport"]
 
 DIRECT_WAIT_S = 0.3
 """Without a master nobody knows whether there is another side: it gets so long to connect."""
 _LEAVE_S = 0.3
 _THREAD_FILES = 4
-_MOST_LINKS = 8
+_MOST_SESSIONS = 8
 """So many masters' connections are kept though nothing is registered with them."""
-_Outlet = NativeOutlet | OriginalOutlet
-_Inlet = NativeInlet | OriginalInlet
+_Publisher = NativePublisher | OriginalPublisher
+_Subscriber = NativeSubscriber | OriginalSubscriber
 
 
-class ZeromqCarrier:
-    """One node's links and sockets, in the context and the thread of its process.
+class ZeromqTransport:
+    """One node's sessions and sockets, in the context and the thread of its process.
 
     Sinks are called in a thread of the node's own, so that they hold up nobody else, and may ask the master
     and make publishers and subscribers.
@@ -51,9 +57,9 @@ class ZeromqCarrier:
         self._io = self._shared.io
         self._sinks: IoThread | None = None
         self._lock = threading.Lock()
-        self._links: dict[str, MasterLink] = {}
-        self._outlets: dict[int, _Outlet] = {}
-        self._inlets: dict[int, _Inlet] = {}
+        self._sessions: dict[str, MasterSession] = {}
+        self._publishers: dict[int, _Publisher] = {}
+        self._subscribers: dict[int, _Subscriber] = {}
         self._busy_wakers: list[Waker] = []
         self._is_closed = False
         self._is_over = False
@@ -63,19 +69,19 @@ class ZeromqCarrier:
 
     # ---- publishers
 
-    def publisher(self, spec: PublisherSpec) -> Outlet:
-        """A new publisher. See `Carrier.publisher`."""
+    def publisher(self, spec: PublisherSpec) -> PublisherTransport:
+        """A new publisher. See `Transport.publisher`."""
         if isinstance(spec.configuration, Direct):
             return self._direct_publisher(spec, spec.configuration)
-        link = self._link(spec.configuration.master)
-        link.wait_for_name(spec.wait_s)
+        session = self._session(spec.configuration.master)
+        session.wait_for_name(spec.wait_s)
         socket = self._xpub(spec)
         # Made before the socket is bound: what it sets applies to connections of later binds only.
-        closer = self._outlet_closer(lambda: link.remove_publisher(spec.id, outlet.count))
-        outlet = NativeOutlet(socket, spec, closer, self._io.serve_soon)
-        with _closed_on_error(outlet.release):
-            endpoints = outlet.move(link.hosts)
-            self._hold(outlet)
+        closer = self._publisher_closer(lambda: session.remove_publisher(spec.id, publisher.count))
+        publisher = NativePublisher(socket, spec, closer, self._io.serve_soon)
+        with _closed_on_error(publisher.release):
+            endpoints = publisher.move(session.hosts)
+            self._hold(publisher)
         record = PublisherRecord(
             spec.id,
             spec.topic,
@@ -83,38 +89,38 @@ class ZeromqCarrier:
             spec.codec.name,
             endpoints,
             spec.is_latched,
-            outlet.is_local,
+            publisher.is_local,
             spec.number,
         )
         try:
-            reply = link.add_publisher(record, outlet, spec.wait_s)
-            outlet.expect((*reply.expected, *reply.hung))
-            absent = outlet.wait_for(reply.expected, HANDSHAKE_S)
+            reply = session.add_publisher(record, publisher, spec.wait_s)
+            publisher.expect((*reply.expected, *reply.hung))
+            absent = publisher.wait_for(reply.expected, HANDSHAKE_S)
             if absent:
-                link.report_missing(spec.id, absent)
+                session.report_missing(spec.id, absent)
         except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
-            outlet.close(0.0)
+            publisher.close(0.0)
             raise
-        return outlet
+        return publisher
 
-    def _direct_publisher(self, spec: PublisherSpec, direct: Direct) -> Outlet:
-        closer = self._outlet_closer(lambda: None)
-        outlet: _Outlet
+    def _direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
+        closer = self._publisher_closer(lambda: None)
+        publisher: _Publisher
         if direct.wire == "native":
             socket = self._xpub(spec)
-            outlet = NativeOutlet(socket, spec, closer, self._io.serve_soon)
+            publisher = NativePublisher(socket, spec, closer, self._io.serve_soon)
         else:
             socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
-            outlet = OriginalOutlet(socket, spec, direct, closer)
-        with _closed_on_error(outlet.release):
+            publisher = OriginalPublisher(socket, spec, direct, closer)
+        with _closed_on_error(publisher.release):
             self._attached[spec.id] = attach(socket, direct, is_publisher=True)
-            self._hold(outlet)
+            self._hold(publisher)
         try:
-            outlet.wait_for_any(DIRECT_WAIT_S)
+            publisher.wait_for_any(DIRECT_WAIT_S)
         except BaseException:
-            outlet.close(0.0)
+            publisher.close(0.0)
             raise
-        return outlet
+        return publisher
 
     def _xpub(self, spec: PublisherSpec) -> Socket:
         socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
@@ -122,76 +128,76 @@ class ZeromqCarrier:
         socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # of what it receives
         return socket
 
-    def _hold(self, outlet: _Outlet) -> None:
+    def _hold(self, publisher: _Publisher) -> None:
         with self._lock:
             self._check_open()
-            self._outlets[outlet.spec.id] = outlet
-        self._io.add(outlet)
+            self._publishers[publisher.spec.id] = publisher
+        self._io.add(publisher)
 
-    def _outlet_closer(self, unregister: Callable[[], None]) -> Callable[[_Outlet, float], None]:
-        def close(outlet: _Outlet, timeout_s: float) -> None:
+    def _publisher_closer(self, unregister: Callable[[], None]) -> Callable[[_Publisher, float], None]:
+        def close(publisher: _Publisher, timeout_s: float) -> None:
             with self._lock:
-                self._outlets.pop(outlet.spec.id, None)
-                self._attached.pop(outlet.spec.id, None)
+                self._publishers.pop(publisher.spec.id, None)
+                self._attached.pop(publisher.spec.id, None)
             unregister()
-            outlet.say_bye()
-            outlet.finish(time.monotonic() + timeout_s)
-            self._io.remove(outlet)
-            outlet.release()
+            publisher.say_bye()
+            publisher.finish(time.monotonic() + timeout_s)
+            self._io.remove(publisher)
+            publisher.release()
 
         return close
 
     # ---- subscribers
 
-    def subscriber(self, spec: SubscriberSpec) -> Inlet:
-        """A new subscriber. See `Carrier.subscriber`."""
+    def subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
+        """A new subscriber. See `Transport.subscriber`."""
         if isinstance(spec.configuration, Direct):
             return self._direct_subscriber(spec, spec.configuration)
-        link = self._link(spec.configuration.master)
-        link.wait_for_name(spec.wait_s)
+        session = self._session(spec.configuration.master)
+        session.wait_for_name(spec.wait_s)
 
         def forget(subscriber: int) -> None:
-            self._forget_inlet(subscriber)
-            link.remove_subscriber(subscriber)
+            self._forget_subscriber(subscriber)
+            session.remove_subscriber(subscriber)
 
         io = self._io_for(spec)
         socket = self._sub(spec)
-        inlet = NativeInlet(SubSocket(socket, spec), io, spec, forget)
+        subscriber = NativeSubscriber(SubSocket(socket, spec), io, spec, forget)
         with _closed_on_error(socket.close):
-            self._keep(inlet)
+            self._keep(subscriber)
         try:
-            reply = link.add_subscriber(
-                SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number), inlet, spec.wait_s
+            reply = session.add_subscriber(
+                SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number), subscriber, spec.wait_s
             )
-            inlet.connect(reply.publishers)
-            io.add(inlet)
+            subscriber.connect(reply.publishers)
+            io.add(subscriber)
             with self._waker() as waker:
-                inlet.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)
+                subscriber.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)
         except BaseException:
-            inlet.close()
+            subscriber.close()
             raise
-        return inlet
+        return subscriber
 
-    def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> Inlet:
+    def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
         io = self._io_for(spec)
         socket = self._sub(spec)
-        inlet: _Inlet
+        subscriber: _Subscriber
         if direct.wire == "native":
-            inlet = NativeInlet(SubSocket(socket, spec), io, spec, self._forget_inlet)
+            subscriber = NativeSubscriber(SubSocket(socket, spec), io, spec, self._forget_subscriber)
         else:
-            inlet = SocketInlet(OriginalSub(socket, spec), io, spec, self._forget_inlet)
+            subscriber = SocketSubscriber(OriginalSubSocket(socket, spec), io, spec, self._forget_subscriber)
         with _closed_on_error(socket.close):
             self._attached[spec.id] = attach(socket, direct, is_publisher=False)
-            self._keep(inlet)
-        io.add(inlet)
+            self._keep(subscriber)
+        io.add(subscriber)
         try:
-            if isinstance(inlet, NativeInlet):
+            if isinstance(subscriber, NativeSubscriber):
                 with self._waker() as waker:
-                    inlet.wait_for_any(DIRECT_WAIT_S, waker)
+                    subscriber.wait_for_any(DIRECT_WAIT_S, waker)
         except BaseException:
-            inlet.close()
+            subscriber.close()
             raise
-        return inlet
+        return subscriber
 
     def _io_for(self, spec: SubscriberSpec) -> IoThread:
         """The thread that serves a subscriber."""
@@ -205,10 +211,10 @@ class ZeromqCarrier:
                 self._sinks.start()
             return self._sinks
 
-    def _keep(self, inlet: _Inlet) -> None:
+    def _keep(self, subscriber: _Subscriber) -> None:
         with self._lock:
             self._check_open()
-            self._inlets[inlet.spec.id] = inlet
+            self._subscribers[subscriber.spec.id] = subscriber
 
     def _check_open(self) -> None:
         """With the lock held. Raises `ClosedError`."""
@@ -221,28 +227,28 @@ class ZeromqCarrier:
         socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
         return socket
 
-    def _forget_inlet(self, subscriber: int) -> None:
+    def _forget_subscriber(self, subscriber: int) -> None:
         with self._lock:
-            self._inlets.pop(subscriber, None)
+            self._subscribers.pop(subscriber, None)
             self._attached.pop(subscriber, None)
 
     # ---- waiting
 
-    def wait(self, inlets: Sequence[Inlet], timeout_s: float) -> None:
-        """Wait for a message in one of `inlets`, or for `wake`."""
-        mine = [each for each in inlets if isinstance(each, SocketInlet)]
+    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
+        """Wait for a message in one of `subscribers`, or for `wake`."""
+        mine = [each for each in subscribers if isinstance(each, SocketSubscriber)]
         with self._waker() as waker:
-            entered: list[_Inlet] = []
+            entered: list[_Subscriber] = []
             try:
-                for inlet in mine:
-                    if not inlet.enter_wait(waker):
+                for subscriber in mine:
+                    if not subscriber.enter_wait(waker):
                         return
-                    entered.append(inlet)
-                polled = [(inlet.fd, zmq.POLLIN) for inlet in entered]
+                    entered.append(subscriber)
+                polled = [(subscriber.fd, zmq.POLLIN) for subscriber in entered]
                 zmq.zmq_poll([*polled, (waker.fd, zmq.POLLIN)], int(timeout_s * 1000) + 1)
             finally:
-                for inlet in entered:
-                    inlet.leave_wait(waker)
+                for subscriber in entered:
+                    subscriber.leave_wait(waker)
 
     def wake(self) -> None:
         """End all waits."""
@@ -266,85 +272,86 @@ class ZeromqCarrier:
     # ---- the master, and the end
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Who is there. See `Carrier.graph`."""
+        """Who is there. See `Transport.graph`."""
         if isinstance(configuration, Direct):
             raise NepError("a direct connection has no master; ask with a hybrid one")
-        return self._link(configuration.master).look(timeout_s)
+        return self._session(configuration.master).look(timeout_s)
 
     def begin_close(self) -> None:
-        """Say that all ends here, and wait for nothing. See `Carrier.begin_close`."""
+        """Say that all ends here, and wait for nothing. See `Transport.begin_close`."""
         with self._lock:
             if self._is_closed:
                 return
             self._is_closed = True
-            links = list(self._links.values())
-            outlets = list(self._outlets.values())
-        for link in links:
-            link.begin_leave()
-        for outlet in outlets:
-            outlet.say_bye()
+            sessions = list(self._sessions.values())
+            publishers = list(self._publishers.values())
+        for session in sessions:
+            session.begin_leave()
+        for publisher in publishers:
+            publisher.say_bye()
 
     def close(self, timeout_s: float) -> None:
-        """Close all. See `Carrier.close`."""
+        """Close all. See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         with self._lock:
             if self._is_over:
                 return
             self._is_over = True
-            links = list(self._links.values())
-            outlets = list(self._outlets.values())
-            inlets = list(self._inlets.values())
+            sessions = list(self._sessions.values())
+            publishers = list(self._publishers.values())
+            subscribers = list(self._subscribers.values())
             sinks = self._sinks
-        for outlet in outlets:
-            if isinstance(outlet, OriginalOutlet):  # they flush while the others wait for their subscribers
-                self._io.remove(outlet)
-                outlet.flush(deadline)
-        for link in links:
-            link.leave(min(_LEAVE_S, timeout_s))
-        for inlet in inlets:
-            inlet.close()
-        for outlet in outlets:
-            outlet.finish(deadline)
-            self._io.remove(outlet)
-            outlet.release()
-        for link in links:
-            link.close()
+        for publisher in publishers:
+            if isinstance(publisher, OriginalPublisher):
+                # They flush while the others wait for their subscribers.
+                self._io.remove(publisher)
+                publisher.flush(deadline)
+        for session in sessions:
+            session.leave(min(_LEAVE_S, timeout_s))
+        for subscriber in subscribers:
+            subscriber.close()
+        for publisher in publishers:
+            publisher.finish(deadline)
+            self._io.remove(publisher)
+            publisher.release()
+        for session in sessions:
+            session.close()
         if sinks is not None:
             sinks.close(max(_LEAVE_S, deadline - time.monotonic()))
         self._shared.leave()
 
-    def _forget_links(self) -> None:
+    def _forget_sessions(self) -> None:
         """With the lock held: close what leads to masters that nobody needs any more, when there are many."""
-        for address, link in list(self._links.items()):
-            if len(self._links) < _MOST_LINKS:
+        for address, session in list(self._sessions.items()):
+            if len(self._sessions) < _MOST_SESSIONS:
                 return
-            if link.is_idle:
-                del self._links[address]
-                link.begin_leave()
-                link.close()
+            if session.is_idle:
+                del self._sessions[address]
+                session.begin_leave()
+                session.close()
 
     def forked(self) -> None:
         """In a child: its ports and connections are the parent's. See `nep.system.forks`."""
         give_up(*self._attached.values())
-        for link in self._links.values():
-            give_up(link.endpoint)
-        for each in (*self._outlets.values(), *self._inlets.values()):
-            if isinstance(each, NativeOutlet | NativeInlet):
+        for session in self._sessions.values():
+            give_up(session.endpoint)
+        for each in (*self._publishers.values(), *self._subscribers.values()):
+            if isinstance(each, NativePublisher | NativeSubscriber):
                 give_up(*each.endpoints)
 
-    def _link(self, address: str) -> MasterLink:
+    def _session(self, address: str) -> MasterSession:
         with self._lock:
             self._check_open()
-            link = self._links.get(address)
-            if link is None:
-                self._forget_links()
+            session = self._sessions.get(address)
+            if session is None:
+                self._forget_sessions()
                 socket = self._shared.socket(zmq.DEALER, f"a connection to the master at '{address}'")
                 with _closed_on_error(socket.close):
-                    link = MasterLink(socket, self._io, self._node, address)
-                self._links[address] = link
-                self._io.add(link)
-            return link
+                    session = MasterSession(socket, self._io, self._node, address)
+                self._sessions[address] = session
+                self._io.add(session)
+            return session
 
 
 @contextmanager
