@@ -20,8 +20,8 @@ import nep
 from app.blocks import Program, compile_behaviour
 from app.blocks.model.workspace import Workspace, parse_workspace
 from app.blocks.runtime.find_robots import Found, find_robots
+from app.blocks.runtime.interrupts import without_interrupts
 from app.blocks.runtime.publishing import guarded
-from app.blocks.runtime.uninterrupted import undisturbed
 from app.core.documents.document import read
 from app.core.robots.motion_permission import risky, wanted_by
 from app.core.robots.own_processes import Processes
@@ -224,7 +224,7 @@ def _run(program: Program, found: Found, reach: _Reach, say: _Lines, interrupted
         was_interrupted = interrupted.is_set()
     except KeyboardInterrupt:
         was_interrupted = True
-    with undisturbed():
+    with without_interrupts():
         # at once; and again when the program is gone and can't move them any more
         stopper.send_stop(ends=runner.program_key)
         runner.close()

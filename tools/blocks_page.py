@@ -14,7 +14,7 @@ sys.path.insert(0, str(ROOT))
 
 from app.blocks.model.block import Block  # noqa: E402
 from app.blocks.toolbox.catalogue import categories  # noqa: E402
-from app.blocks.toolbox.examples import EXAMPLES  # noqa: E402
+from app.blocks.toolbox.help import EXAMPLES  # noqa: E402
 
 PAGE = ROOT / "docs" / "blocks.md"
 BEGIN, END = "<!-- blocks: made by tools/blocks_page.py -->", "<!-- end of blocks -->"

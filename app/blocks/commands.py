@@ -10,9 +10,9 @@ import sys
 
 from app.blocks.runtime import calls, lists, values
 from app.blocks.runtime.find_robots import find_robots
+from app.blocks.runtime.interrupts import without_interrupts
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.runtime import Runtime
-from app.blocks.runtime.uninterrupted import undisturbed
 from nep import node as new_node
 from nep.system.streams import prepare_streams
 
@@ -85,7 +85,7 @@ def run(name: str) -> None:
         except KeyboardInterrupt:
             pass
         finally:
-            with undisturbed():
+            with without_interrupts():
                 _runtime.scheduler.stop()
                 moving = network.stop_robots(STOP_ANSWER_S)
                 wrong = [network.stop_words(robot) for robot in moving]

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import ast
+import keyword
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from app.blocks.compiler.fragments import COMMANDS as COMMANDS
-from app.blocks.compiler.fragments import RESERVED, ending, imports, keywords, template
 from app.blocks.compiler.problems import Notes
 from app.blocks.compiler.render import instrumented, readable
 from app.blocks.compiler.shaping import END, Function, Shaping
-from app.blocks.compiler.uses import Uses, saved_value
 from app.blocks.model.block import Block
 from app.blocks.model.block_text import reading
-from app.blocks.model.fields import Field, FieldError, StatementInput, TopicField, ValueInput, VariableField
+from app.blocks.model.fields import (
+    ChoiceField,
+    Field,
+    FieldError,
+    StatementInput,
+    TopicField,
+    ValueInput,
+    VariableField,
+)
 from app.blocks.model.growing import InputField
 from app.blocks.model.names import Names
 from app.blocks.model.program import Program
@@ -23,6 +29,60 @@ from app.blocks.model.workspace import Placed, Workspace, parse_workspace
 from app.blocks.runtime.publishing import moved_by
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Robot
+
+COMMANDS = frozenset(
+    {
+        "add_item", "contains", "each", "fail", "insert_item", "is_known", "item", "join", "join_items",
+        "length", "new_list", "newest", "on_message", "on_start", "on_true", "part", "position", "publish",
+        "random_number", "remove_item", "repeat", "robot", "rounded", "rounded_down", "rounded_up", "run",
+        "set_item", "split_text", "stop_program", "stop_script", "wait", "wait_until", "write",
+    }
+)  # fmt: skip
+"""What a program may call (`app.blocks.commands`); no variable gets one of these names."""
+
+RESERVED = COMMANDS | {"step", "value", "number", "called", "message", "_"}
+
+
+class _Uses:
+    """What a program needs before its first block: robots, their sensors and events, topics.
+
+    Collects what blocks name, each thing once and in the order of the blocks (dicts keep it).
+    """
+
+    def __init__(self) -> None:
+        self.robots: dict[str, None] = {}
+        self.sensors: dict[tuple[str, str], None] = {}
+        self.events: dict[tuple[str, str], None] = {}
+        self.publishes: dict[str, None] = {}
+        self.listens: dict[str, None] = {}
+        self.moves: dict[str, None] = {}
+
+    def remember(self, placed: Placed, block: Block) -> None:
+        """Add what this block names; its fields are sound."""
+        use = block.robot
+        if use is not None:
+            robot = placed.field_id("ROBOT") or _first_robot(block)
+            self.robots[robot] = None
+            name = use.name or str(saved_value(block, placed, "SENSOR"))
+            if use.kind == "sensor":
+                self.sensors[robot, name] = None
+            elif use.kind == "event":
+                self.events[robot, name] = None
+        for argument in block.arguments:
+            if isinstance(argument, TopicField):
+                topics = self.publishes if block.publishes else self.listens
+                topics[str(saved_value(block, placed, argument.name))] = None
+
+
+def saved_value(block: Block, placed: Placed, name: str) -> object:
+    """What a file says in a field of a block; FieldError if the block can't use it, None for no field."""
+    argument = block.argument(name)
+    return argument.read(placed.fields.get(name)) if isinstance(argument, Field) else None
+
+
+def _first_robot(block: Block) -> str:
+    field = block.argument("ROBOT")
+    return str(field.read(None)) if isinstance(field, ChoiceField) else ""
 
 
 class _Skip(Exception):  # noqa: N818 (no error: the block is left out, and its problem is noted)
@@ -60,7 +120,7 @@ class _Compiler:
         self._notes = Notes(catalogue, workspace)
         self._readings: dict[str, str] = {}
         self._labels: dict[str, str] = {}
-        self._uses = Uses()
+        self._uses = _Uses()
         self._in_message = False
         self._numbers: set[str] = set()  # the blocks that must give a number
 
@@ -309,3 +369,44 @@ class _Compiler:
         block = self._catalogue.blocks.get(placed.type)
         self._labels[placed.id] = self._notes.label(placed, block)
         return words
+
+
+def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, list[ast.keyword]]:
+    """Arguments by name; a name that Python could not write goes in as ``**{"a-b": …}``."""
+    made: dict[str, list[ast.keyword]] = {}
+    for hole, pairs in block.keywords.items():
+        plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_plain(name)]
+        odd = [(literal(name), expressions[at]) for at, name in pairs if not _is_plain(name)]
+        if odd:
+            table = ast.Dict([key for key, _ in odd], [value for _, value in odd])
+            plain.append(ast.keyword(None, table))
+        made[hole] = plain
+    return made
+
+
+def template(block: Block, placed: Placed, *, in_function: bool) -> str:
+    """The Python template of a block as it was placed."""
+    if in_function and block.python_in_function:
+        return block.python_in_function
+    if isinstance(block.python, str):
+        return block.python
+    chosen = saved_value(block, placed, block.variant or "")
+    return block.python[str(chosen)]
+
+
+def _is_plain(name: str) -> bool:
+    """Whether Python can write this name before an equals sign."""
+    return name.isidentifier() and name.isascii() and not keyword.iskeyword(name)
+
+
+def imports(body: Sequence[ast.stmt]) -> list[ast.stmt]:
+    """What a program file begins with."""
+    names = {
+        node.id for statement in body for node in ast.walk(statement) if isinstance(node, ast.Name)
+    } & COMMANDS
+    return statements(f"from app.blocks.commands import {', '.join(sorted({*names, 'run'}))}", {})
+
+
+def ending(name: str) -> list[ast.stmt]:
+    """What a program file ends with."""
+    return statements("run(%NAME)", {"NAME": literal(name)})

@@ -23,7 +23,7 @@ class _Motion:
     script: int  # the thread of the script that asked for it
 
 
-class Going:
+class Motions:
     """Remembers motions that were begun; `rest` and `go_on` come from another thread than the answers."""
 
     def __init__(

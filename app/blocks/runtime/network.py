@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import threading
 import time
+import uuid
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
+from typing import Protocol
 
 from app.blocks.runtime.link import LAST_STATES, STATES, Call
-from app.blocks.runtime.motions import Going
+from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
-from app.blocks.runtime.wire import Node, Publisher, new_id, payload_of, value_of
 from app.robots import rize
 from app.robots.description.description import Robot
 from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
@@ -25,6 +26,52 @@ LOOK_S = 0.2
 MOST_UNKNOWN = 256
 
 Told = Callable[[object], None]
+
+
+class Publisher(Protocol):
+    """What is needed of NEP's publisher."""
+
+    def publish(self, payload: object) -> None:
+        """Send one message."""
+        ...
+
+
+class Node(Protocol):
+    """What is needed of NEP's node."""
+
+    def new_pub(self, topic: str, msg_type: str = "json") -> Publisher:
+        """A publisher."""
+        ...
+
+    def new_sub(
+        self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
+    ) -> object:
+        """A subscriber whose messages go to `sink`, in the node's thread."""
+        ...
+
+    def graph(self, timeout_s: float = 2.0) -> GraphView:
+        """Who is there."""
+        ...
+
+
+def payload_of(message: Message) -> object:
+    """What a message says; None for one that can't be decoded, which is as good as none."""
+    try:
+        return message.payload
+    except NepError:
+        return None
+
+
+def value_of(payload: object) -> object:
+    """The value in a property's ``{"value": …}``, else all of it."""
+    if isinstance(payload, Mapping) and set(payload) == {"value"}:
+        return payload["value"]
+    return payload
+
+
+def new_id(kind: str) -> str:
+    """An id that nobody else has, with its kind in front."""
+    return f"{kind}-{uuid.uuid4().hex[:12]}"
 
 
 class Network:
@@ -77,7 +124,7 @@ class Network:
         self._arrived = threading.Condition()
         self._closed = threading.Event()
         self._ending = False
-        self._going = Going(self._rest, self._stand, self.invoke)
+        self._motions = Motions(self._rest, self._stand, self.invoke)
         for robot in robots:
             self._meet(robot)
         for name, sensor in (*sensors, *events):
@@ -125,7 +172,7 @@ class Network:
         call = Call(new_id("cmd"), robot, action)
         with self._lock:
             self._calls[call.id] = call
-        self._going.asked(call, described, input)
+        self._motions.asked(call, described, input)
         if described.dialect == "rize":
             self._send(described, rize.to_command(described, action, input, call.id))
         else:
@@ -174,20 +221,20 @@ class Network:
 
     def rest(self) -> None:
         """The program is paused: robots that it left in motion (a speed) stand still until `go_on`."""
-        self._going.rest()
+        self._motions.rest()
 
     def go_on(self) -> None:
         """The pause is over: what was in motion is asked for again."""
-        self._going.go_on()
+        self._motions.go_on()
 
     def slow(self) -> AbstractContextManager[None]:
         """While the calling script stays at a block in slow motion: what it left in motion stands still."""
-        return self._going.slow()
+        return self._motions.slow()
 
     def _stand(self, robot: Robot) -> None:
         """Stop a robot that drives; not while it does something else, which a stop would end as well."""
         busy = [call for call in list(self._calls.values()) if call.robot == robot.name]
-        if all(self._going.is_motion(call) for call in busy):
+        if all(self._motions.is_motion(call) for call in busy):
             self._tell_stop(robot)
 
     def _rest(self, robot: Robot) -> None:
@@ -367,7 +414,7 @@ class Network:
         call.state = state
         if call.state in LAST_STATES:
             self._calls.pop(call.id, None)
-            self._going.ended(call)
+            self._motions.ended(call)
 
     def _is_own(self, robot: Robot, topic: str, node: str) -> bool:
         """Whether it is this robot that speaks; robots of RIZE can't be told apart."""

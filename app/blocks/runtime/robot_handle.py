@@ -1,7 +1,11 @@
-"""A robot as a program sees it: do an action and wait for it, read a sensor, begin a script at an event."""
+"""A robot as a program sees it: do an action and wait for it, read a sensor, begin a script at an event.
+
+A pause takes an action back; what is left of it is done when the program goes on.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from collections.abc import Callable, Mapping
@@ -9,10 +13,9 @@ from typing import Protocol
 
 from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError
-from app.blocks.runtime.held_action import is_unknown, rest_of
 from app.blocks.runtime.link import Call, Link
 from app.blocks.runtime.scheduler import Scheduler
-from app.blocks.runtime.status_text import Saying
+from app.blocks.runtime.status_text import StatusText
 from app.robots.description.description import Action, Parameter, Robot
 from app.robots.description.inputs import from_words
 
@@ -25,18 +28,19 @@ LOOK_S = 0.25
 BEATS_MISSED, SHORTEST_SILENCE_S = 4, 2.0
 HOLD_S = 3.0
 """How long a robot may take to end what a pause takes back; its own kit answers within about a second."""
-
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 
-
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
+
+LEFT = "to_go"
+"""The feedback with which an action says how much is left, in the unit of one of its parameters."""
 
 
 class Stage(Protocol):
     """What a robot's handle needs of the program that runs."""
 
     scheduler: Scheduler
-    saying: Saying
+    saying: StatusText
 
     def described(self, name: str) -> Robot:
         """The description of a robot that is there."""
@@ -242,3 +246,49 @@ def _check(robot: Robot) -> str:
     if robot.virtual:
         return "Start the virtual robot again."
     return "Check that it is on and in the same Wi-Fi."
+
+
+def rest_of(action: Action, input: Mapping[str, object], call: Call) -> dict[str, object] | None:
+    """The input for what is left of a call that was taken back; None when nothing is to be done any more.
+
+    An action that tells what is left does the rest, another one begins again. One that moves the robot to
+    another place and does not tell what is left would go too far: the rest is left out.
+    """
+    if not call.began:
+        return dict(input)
+    if is_unknown(action, input, call):
+        return None
+    name = measured_by(action, input)
+    if name is None:
+        return dict(input)
+    left, whole = _number(call.feedback.get(LEFT)), _number(input[name])
+    if abs(left) <= abs(whole) / 1000:
+        return None
+    return {**input, name: math.copysign(min(abs(left), abs(whole)), whole)}
+
+
+def is_unknown(action: Action, input: Mapping[str, object], call: Call) -> bool:
+    """Whether the robot was on its way to another place, and does not tell how much of it is left."""
+    name = measured_by(action, input)
+    if not call.began or name is None:
+        return call.began and action.risk == "locomotes"
+    return not _is_number(call.feedback.get(LEFT))
+
+
+def measured_by(action: Action, input: Mapping[str, object]) -> str | None:
+    """The parameter of which the action tells what is left: the only number in the same unit."""
+    unit = next((field.unit for field in action.feedback if field.name == LEFT), None)
+    same = [
+        parameter.name
+        for parameter in action.parameters
+        if unit is not None and parameter.unit == unit and _is_number(input.get(parameter.name))
+    ]
+    return same[0] if len(same) == 1 else None
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, (int, float)) else 0.0

@@ -11,16 +11,27 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 
-from app.blocks.runtime import values
-from app.blocks.runtime.calls import Calls, EndScript
+from app.blocks.runtime import lists, values
+from app.blocks.runtime.calls import Calls, EndScript, stop_script
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.link import Link
-from app.blocks.runtime.namespace import namespace
 from app.blocks.runtime.robot_handle import RobotHandle
 from app.blocks.runtime.scheduler import Scheduler, Stopped
-from app.blocks.runtime.status_text import Saying
+from app.blocks.runtime.status_text import StatusText
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
 from app.robots.description.description import Robot
+
+_OWN = (
+    "called", "fail", "newest", "number", "on_message", "on_start", "on_true", "publish", "robot", "step",
+    "stop_program", "value", "wait", "wait_until", "write",
+)  # fmt: skip
+_PURE = (
+    "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
+)  # fmt: skip
+_LISTS = (
+    "add_item", "contains", "each", "insert_item", "item", "join_items", "new_list", "position",
+    "remove_item", "set_item", "split_text",
+)  # fmt: skip
 
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
@@ -53,14 +64,19 @@ class Runtime:
         self._count_lock = threading.Lock()
         self._running = 0
         self.scheduler = Scheduler()
-        self.saying = Saying(self.scheduler.block, readings or {})
+        self.saying = StatusText(self.scheduler.block, readings or {})
         self._calls = Calls(self.scheduler)
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
 
     def namespace(self) -> dict[str, object]:
-        """The names of a program."""
-        return namespace(self)
+        """The names that its program may use: methods of this runtime, and pure functions."""
+        return (
+            {name: getattr(self, name) for name in _OWN}
+            | {name: getattr(values, name) for name in _PURE}
+            | {name: getattr(lists, name) for name in _LISTS}
+            | {"stop_script": stop_script}
+        )
 
     # ---- beginning and end
 

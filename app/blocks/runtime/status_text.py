@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 
-class Saying:
+class StatusText:
     """Sentences for the run bar. Scripts tell, another thread reads."""
 
     def __init__(self, block: Callable[[], str | None], readings: Mapping[str, str]) -> None:

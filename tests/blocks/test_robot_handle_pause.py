@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.runtime.held_action import is_unknown, measured_by, rest_of
 from app.blocks.runtime.link import Call
+from app.blocks.runtime.robot_handle import is_unknown, measured_by, rest_of
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
 from tests.blocks.fakes import FakeLink, Play, until

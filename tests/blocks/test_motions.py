@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import pytest
 
 from app.blocks.runtime.link import Call
-from app.blocks.runtime.motions import Going
+from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.scheduler import Stopped
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
@@ -23,7 +23,7 @@ class Bench:
         self.stopped: list[str] = []
         self.stood: list[str] = []
         self.invoked: list[tuple[str, str, Mapping[str, object]]] = []
-        self.going = Going(
+        self.going = Motions(
             lambda robot: self.stopped.append(robot.name),
             lambda robot: self.stood.append(robot.name),
             self.invoke,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.blocks.toolbox.catalogue import Catalogue, categories
-from app.blocks.toolbox.examples import EXAMPLES
-from app.blocks.toolbox.help import help_of
+from app.blocks.toolbox.help import EXAMPLES, help_of
 from tests.blocks.samples import robot
 
 CATALOGUE = Catalogue([robot()])

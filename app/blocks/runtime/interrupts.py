@@ -7,11 +7,11 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["undisturbed"]
+__all__ = ["without_interrupts"]
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def without_interrupts() -> Iterator[None]:
     """Ctrl+C does nothing meanwhile; what is done here must end by itself."""
     if threading.current_thread() is not threading.main_thread():
         yield  # no signal is handled in this thread
