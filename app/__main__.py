@@ -9,9 +9,12 @@ from __future__ import annotations
 import argparse
 import gc
 import importlib
+import logging
 import os
 import runpy
 import sys
+import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,6 +25,11 @@ from nep.system.streams import close_streams, prepare_streams, words_given
 from nep.version import __version__
 
 PROCESSES = ("app.blocks.runtime.child", "app.robots.simulated", "app.robots.turtle", "nep")
+
+GRACE_S = 5.0
+"""How long threads that are no daemons may take to end, when the window is closed and all of ours has."""
+
+_log = logging.getLogger("studio")
 
 
 def window_parser() -> argparse.ArgumentParser:
@@ -91,7 +99,6 @@ def _main(given: Sequence[str]) -> int:
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
     allow_many()
-    from app.core.process_end import end_process  # noqa: PLC0415  for a window only
     from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
     code = run(
@@ -121,6 +128,34 @@ def hand_over(module: str, arguments: Sequence[str]) -> int:
     sys.argv = [module, *arguments]
     runpy.run_module(module, run_name="__main__", alter_sys=True)
     return 0
+
+
+def still_running(within_s: float) -> tuple[str, ...]:
+    """The names of the threads for which Python would wait, and which do not end within that time."""
+    until = time.monotonic() + within_s
+    others = [
+        each
+        for each in threading.enumerate()
+        if not each.daemon and each is not threading.current_thread() and each is not threading.main_thread()
+    ]
+    for each in others:
+        each.join(max(0.0, until - time.monotonic()))
+    return tuple(each.name for each in others if each.is_alive())
+
+
+def end_process(code: int, within_s: float = GRACE_S) -> int:
+    """``code`` when all threads have ended; else the log says which has not, and the process ends here.
+
+    Python waits for every thread that is no daemon: one of a plug-in that never ends, or one that writes to a
+    disk which does not answer, would leave a process without a window for ever.
+    """
+    left = still_running(within_s)
+    if not left:
+        return code
+    _log.error("Studio ends without %s, which goes on", ", ".join(f"'{name}'" for name in left))
+    logging.shutdown()
+    close_streams()
+    os._exit(code)
 
 
 if __name__ == "__main__":

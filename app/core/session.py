@@ -18,13 +18,13 @@ from app.core.documents.document import Document
 from app.core.documents.journal import Journal
 from app.core.documents.open_documents import Documents
 from app.core.documents.saved_tabs import KeptTabs
-from app.core.faults import survived
+from app.core.faults import OwnFaults, survived
 from app.core.messages.image_streams import Images
 from app.core.network.decode_checks import Checks
 from app.core.network.doctor import doctor_of
 from app.core.network.graph_changes import arrivals
 from app.core.network.mailbox import Batch, Drained, Mailbox
-from app.core.network.master_state import Learning, MasterState
+from app.core.network.master import Learning, MasterState
 from app.core.network.nodes import Nodes
 from app.core.network.remote_access import Reach, ReachChanged
 from app.core.network.source import (
@@ -39,13 +39,11 @@ from app.core.network.source import (
 from app.core.network.topics import Topics
 from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
-from app.core.own_faults import OwnFaults
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
-from app.core.robots.own_processes import Processes
 from app.core.robots.stop import RobotStopper, StopTarget
-from app.core.robots.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
-from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, CompanionFailed, Companions
+from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, CompanionFailed, Companions, Processes
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.core.storage.settings import Settings

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from app.core.documents import file_format
-from app.core.documents.background_compile import Beside
-from app.core.documents.compiled import Compiled
+from app.core.documents.background_compile import BackgroundWorker, Compiled
 from app.core.documents.document import Document, read
 from app.core.documents.journal import Journal, left_behind
 from app.core.storage.atomic_file import LARGEST_BYTES
@@ -281,7 +280,7 @@ def _many(count: int) -> dict[str, object]:
 
 
 def test_a_long_behaviour_is_compiled_beside_the_window(document: Document) -> None:
-    beside: Beside[Compiled] = Beside("test compiler")
+    beside: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
     document.beside = beside
     document.edited(_many(800))
     assert document.newest() is None, "nothing waits for it"
@@ -296,7 +295,7 @@ def test_a_long_behaviour_is_compiled_beside_the_window(document: Document) -> N
 
 
 def test_a_short_behaviour_is_compiled_at_once(document: Document) -> None:
-    beside: Beside[Compiled] = Beside("test compiler")
+    beside: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
     document.beside = beside
     document.edited(STARTED)
     assert document.newest() is document.program()
@@ -309,7 +308,7 @@ def test_a_long_file_opened_in_an_untouched_tab_does_not_hold_the_window_up(
     other = Document(lambda: Journal(tmp_path / "other"))
     other.edited(_many(800))
     other.save(tmp_path / "long.nepb")
-    beside: Beside[Compiled] = Beside("test compiler")
+    beside: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
     document.beside = beside
     assert document.newest() is not None, "an empty one is compiled at once"
     document.open(tmp_path / "long.nepb")

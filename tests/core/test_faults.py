@@ -13,10 +13,9 @@ import pytest
 
 import nep
 from app.core import faults
-from app.core.faults import LogFile, SaidOnce, words_of
+from app.core.faults import LogFile, OwnFaults, SaidOnce, words_of
 from app.core.network.source import GraphSeen, JobFailed, LiveSource, MasterFound
-from app.core.own_faults import OwnFaults
-from app.core.robots.stop_events import StopDone, StopReport
+from app.core.robots.stop_report import StopDone, StopReport
 from app.core.run.runner import RunnerEvent
 from app.core.session import Session
 from app.core.storage.settings import Settings

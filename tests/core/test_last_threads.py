@@ -6,11 +6,11 @@ import subprocess
 import sys
 import threading
 
-from app.core.process_end import still_running
+from app.__main__ import still_running
 
 PROGRAM = """
 import logging, sys, threading
-from app.core.process_end import end_process
+from app.__main__ import end_process
 logging.basicConfig()
 wait = threading.Event().wait
 threading.Thread(target=wait, name="{name}", daemon={daemon}).start()

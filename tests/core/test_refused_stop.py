@@ -13,7 +13,7 @@ import pytest
 import nep
 from app.core.robots.health_facts import facts_of
 from app.core.robots.robot_link import RobotLink
-from app.core.run.runner_event import RunnerEvent
+from app.core.run.runner import RunnerEvent
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Failed, Kind, Link, action, safe_stop
 from app.run import FAILED, run_file

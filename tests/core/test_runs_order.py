@@ -9,8 +9,7 @@ from typing import cast
 import pytest
 
 from app.core.robots.stop import RobotStopper
-from app.core.robots.stop_events import OneStopped, StopDone
-from app.core.robots.stop_report import StopReport
+from app.core.robots.stop_report import OneStopped, StopDone, StopReport
 from app.core.run.runner import Runner
 from app.core.session import Session
 from app.core.storage.settings import Settings

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import ValuesView
 from dataclasses import replace
 
-from app.core.network.losses import WINDOW_S
 from app.core.network.mailbox import Batch
 from app.core.network.topics import AT_ONCE, Topics
-from app.core.network.traffic import Traffic
+from app.core.network.traffic import WINDOW_S, RecentLosses, Traffic
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 
@@ -89,3 +88,19 @@ def test_very_many_topics_are_summed_up_twice_a_second_and_the_last_figures_are_
     traffic.add({}, 2.0)
     assert traffic.messages_per_s == 2.0 * (AT_ONCE + 1)
     assert traffic.lost_30s == 19 * (AT_ONCE + 1)
+
+
+def test_only_what_was_lost_lately_counts() -> None:
+    losses = RecentLosses()
+    assert losses.count(100, 0.0) == 0  # lost before we looked
+    assert losses.count(103, 1.0) == 3
+    assert losses.count(105, 20.0) == 5
+    assert losses.count(105, 1.5 + WINDOW_S) == 2
+    assert losses.count(105, 21.0 + WINDOW_S) == 0
+
+
+def test_a_topic_that_vanished_takes_its_total_along() -> None:
+    losses = RecentLosses()
+    losses.count(10, 0.0)
+    assert losses.count(0, 1.0) == 0
+    assert losses.count(2, 2.0) == 2

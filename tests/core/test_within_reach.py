@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import nep
-from app.core.network.master_state import LEARNING_S
+from app.core.network.master import LEARNING_S
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
 from tests.core.waiting import tick_until

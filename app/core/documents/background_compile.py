@@ -1,18 +1,25 @@
-"""Work that would hold the window up, done in a thread beside it; for each owner only the newest counts."""
+"""Compiling beside the window: a thread in which, for each owner, only the newest work counts."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from app.blocks import Program
 from app.core.storage.deep_json import start_deep
 
 T = TypeVar("T")
 END_S = 2.0
 
+QUICK_S = 0.02
+"""A behaviour that compiles faster than this is compiled at once, in the window's thread."""
+LONG_CHARACTERS = 20_000
+Key = tuple[int, int, int]
 
-class Beside(Generic[T]):
+
+class BackgroundWorker(Generic[T]):
     """One thread, made when there is something to do; `close` ends it. The other methods never wait."""
 
     def __init__(self, name: str) -> None:
@@ -77,3 +84,28 @@ class Beside(Generic[T]):
                 continue
             with self._changed:
                 self._done[owner] = made
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A program, what it was made of, and how long that took."""
+
+    key: Key
+    program: Program
+    seconds: float
+
+
+def compiled(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> Compiled:
+    """Compile, and take the time."""
+    began = timer()
+    return Compiled(key, compiling(), timer() - began)
+
+
+def is_long(workspace: Mapping[str, object]) -> bool:
+    """Whether a behaviour that was never compiled is worth a thread."""
+    inner = workspace.get("blocks")
+    tops = inner.get("blocks") if isinstance(inner, Mapping) else None
+    try:
+        return tops is not None and len(repr(tops)) > LONG_CHARACTERS
+    except RecursionError:
+        return True

@@ -13,8 +13,7 @@ from pathlib import Path
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.fixes.fixes import mend
 from app.blocks.fixes.replace_robot import blocks_of, use_robot
-from app.core.documents.background_compile import Beside
-from app.core.documents.compiled import QUICK_S, Compiled, Key, compiled, is_long
+from app.core.documents.background_compile import QUICK_S, BackgroundWorker, Compiled, Key, compiled, is_long
 from app.core.documents.file_format import (
     TOO_DEEP,
     BehaviourFile,
@@ -67,7 +66,7 @@ class Document:
         self._compiled: tuple[Key, Program] | None = None
         self._compile_s: float | None = None
         self._asked: Key | None = None
-        self.beside: Beside[Compiled] | None = None
+        self.beside: BackgroundWorker[Compiled] | None = None
         self._definitions: tuple[int, Mapping[str, object]] | None = None
         self.journal_error: str | None = None
 

@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from app.blocks import editor_definitions
-from app.core.documents.background_compile import Beside
-from app.core.documents.compiled import Compiled
+from app.core.documents.background_compile import BackgroundWorker, Compiled
 from app.core.documents.document import UNNAMED, Document
 from app.core.documents.journal import Unsaved
 from app.errors import DocumentError
@@ -28,7 +27,7 @@ class Documents:
         self._robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
         self._closed: list[Path] = []
-        self._beside: Beside[Compiled] = Beside("studio-compiler")
+        self._beside: BackgroundWorker[Compiled] = BackgroundWorker("studio-compiler")
         self.revision = 0
         self.current = self._made()
         self._open = [self.current]

@@ -1,18 +1,20 @@
 """Who says that it is a robot: one program for each name, the one that announced it first.
 
 What others say under the same name changes nothing and is told as a claim. A robot's program is replaced only
-when the master does not list its announcement any more.
+when the master does not list its announcement any more. Robots of RIZE say nothing about themselves: who
+listens to ``robot_action`` is taken for one.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.errors import DescriptionError
+from app.robots import rize
 from app.robots.description.description import Robot, announced
 from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
 from nep.errors import NepError
@@ -27,6 +29,9 @@ READING_SHARE = 0.2
 """So much of the window's time may go into reading descriptions in the long run, whoever sends how many."""
 READING_S = 1.0
 """So much may be read at once after a rest: all robots of a room that come together."""
+
+NATIVE = frozenset({"native", "gateway"})
+SUFFIXES = ("_driver", "_robot", "_node")
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,3 +236,42 @@ class Announcements:
         known.robot = robot if wrong is None else None
         if wrong is not None:
             known.wrong = Claim(f"{wrong}.", "Find out what this program is and close it.")
+
+
+class RizeNames:
+    """Which robots of RIZE are there, and their names.
+
+    As they said when they were ready, else their node's.
+    """
+
+    def __init__(self) -> None:
+        """Nobody has said a name."""
+        self._told: list[str] = []
+
+    def tell(self, name: str) -> None:
+        """A robot said on ``rize_event`` that it is ready under this name."""
+        if name not in self._told:
+            self._told.append(name)
+
+    def present(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
+        """The names of the robots of RIZE in this graph.
+
+        ``native`` are robots with a description: they say on ``rize_event`` that they are ready, too.
+        """
+        told = [name for name in self._told if name not in native]
+        info = view.topics.get(rize.COMMANDS)
+        ids = {subscriber.node_id for subscriber in info.subscribers} if info is not None else set()
+        nodes = [
+            view.nodes[id].name for id in ids if id in view.nodes and view.nodes[id].generation not in NATIVE
+        ]
+        if len(nodes) == 1 and len(told) == 1:
+            return {told[0]}
+        return {_name(node, told) for node in nodes}
+
+
+def _name(node: str, told: Collection[str]) -> str:
+    stem = node
+    for suffix in SUFFIXES:
+        stem = stem.removesuffix(suffix)
+    same = {stem.lower(), node.lower()}
+    return next((name for name in told if name.lower() in same), stem or node)

@@ -13,11 +13,10 @@ from typing import Protocol
 
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
-from app.core.robots.announcements import Announcements, Claim
+from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.heartbeat import Heartbeat
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_permission import MayNotMoveError, Moving
-from app.core.robots.rize_names import RizeNames
 from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.robots.stop import MOST_TOPICS
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S

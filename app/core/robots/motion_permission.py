@@ -1,6 +1,6 @@
 """Which real robots may move: a person is asked once for each robot, before it moves for the first time.
 
-A virtual robot may always, if Studio knows the program that it is (`app.core.robots.own_processes`).
+A virtual robot may always, if Studio knows the program that it is (`app.core.robots.virtual_processes`).
 Everything that makes a robot act comes through here: the forms, the palette, keys and programs, also those
 that publish on a robot's topics. Stop does not. A yes counts for the program that the robot is now, *always*
 for its name, model, program and computer.

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 BY_HAND = "Switch it off by hand."
 
+STOPPING_SHOWN_AFTER_S = 0.1
+
 
 @dataclass(frozen=True)
 class RobotStop:
@@ -113,4 +115,35 @@ def not_reached(name: str, why: str = "") -> RobotStop:
     return RobotStop(name, False, None, error=f"{name} was not told to stop{f': {why}' if why else ''}")
 
 
-STOPPING_SHOWN_AFTER_S = 0.1
+@dataclass(frozen=True, slots=True)
+class StopDone:
+    """Every robot was told to stop, and answered or not."""
+
+    number: int
+    report: StopReport
+
+
+@dataclass(frozen=True, slots=True)
+class RobotAnswered:
+    """One robot answered while others are waited for."""
+
+    number: int
+    robot: RobotStop
+
+
+@dataclass(frozen=True, slots=True)
+class OneStopped:
+    """One robot was told to stop while nothing ran."""
+
+    report: StopReport
+
+
+@dataclass(frozen=True, slots=True)
+class LateAnswer:
+    """A robot answered when it was not waited for any more, or stands still after it had said no.
+
+    ``number`` is that of the stop; None for one robot's.
+    """
+
+    number: int | None
+    robot: RobotStop

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
+from typing import Protocol
 
 from app.blocks.runtime.publishing import guarded
 from app.core.alerts import Alerts
@@ -17,9 +18,7 @@ from app.core.robots.fleet import Fleet
 from app.core.robots.motion_permission import wanted_by
 from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.robots.stop import RobotStopper
-from app.core.robots.stop_events import LateAnswer, OneStopped, RobotAnswered, StopDone
-from app.core.robots.stop_report import RobotStop, StopReport
-from app.core.run.run_needs import Behaviours, Network
+from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.run.view import (
     RunState,
@@ -41,14 +40,30 @@ NO_NETWORK = "there is no connection to the network yet"
 _log = logging.getLogger("studio")
 
 
+class RunNetwork(Protocol):
+    """What a run needs of the network."""
+
+    address: str
+    stopper: RobotStopper | None
+
+
+class OpenBehaviours(Protocol):
+    """What a run needs of the behaviours that are open."""
+
+    @property
+    def current(self) -> Document:
+        """The one that shows; Run runs it."""
+        ...
+
+
 class Runs:
     """The behaviour's runs. One thread uses it (the window's); the stop itself happens beside it."""
 
     def __init__(
         self,
-        documents: Behaviours,
+        documents: OpenBehaviours,
         fleet: Fleet,
-        network: Network,
+        network: RunNetwork,
         *,
         alerts: Alerts,
         console: Console,

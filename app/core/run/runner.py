@@ -10,15 +10,17 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from app.blocks.model.program import Program
 from app.core.run.child_output import Gate, Output, text_of, texts
 from app.core.run.child_process import MOST_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command
-from app.core.run.runner_event import RunnerEvent as RunnerEvent
 from app.errors import RunnerError
 from app.robots.identity import program_of
+
+Kind = Literal["ready", "running", "paused", "error", "print", "ended"]
 
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
@@ -37,6 +39,27 @@ LONGEST_ERROR = 100_000
 ERRORS_KEPT = 40
 
 _runs = itertools.count(1)
+
+
+@dataclass(frozen=True)
+class RunnerEvent:
+    """What a program's process said.
+
+    ``run`` is the number of the runner's program. ``blocks`` run now (kind running), are held (paused; the
+    first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
+    in words); ``text`` a printed line, what a person should know (paused), an error's sentence, or at the end
+    why it did not end well. ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the
+    program's own stop at its end.
+    """
+
+    kind: Kind
+    run: int
+    blocks: tuple[str, ...] = ()
+    says: str = ""
+    text: str = ""
+    ok: bool = True
+    elapsed_s: float | None = None
+    silent: tuple[str, ...] = ()
 
 
 class Runner:

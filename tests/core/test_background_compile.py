@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.core.documents.background_compile import Beside
+from app.core.documents.background_compile import BackgroundWorker
 from tests.blocks.fakes import until
 
 
 @pytest.fixture
-def beside() -> Iterator[Beside[str]]:
-    made: Beside[str] = Beside("test beside")
+def beside() -> Iterator[BackgroundWorker[str]]:
+    made: BackgroundWorker[str] = BackgroundWorker("test beside")
     yield made
     made.close()
 
@@ -65,7 +65,7 @@ def test_closing_ends_the_thread_and_drops_what_waits(beside) -> None:
 
 
 def test_nothing_asked_makes_no_thread() -> None:
-    beside: Beside[str] = Beside("never")
+    beside: BackgroundWorker[str] = BackgroundWorker("never")
     beside.forget("a")
     beside.close()
     assert beside._thread is None

@@ -9,7 +9,8 @@ import psutil
 import pytest
 
 import nep
-from app.core.network.master_start import AGAIN_AT_MOST_S, MasterStart
+from app.core.network.master import AGAIN_AT_MOST_S, LEARNING_S, Learning, MasterStart
+from nep.protocol.graph_view import GraphView
 from tests.nep.programs import eventually
 
 
@@ -72,3 +73,26 @@ def test_one_is_started_when_nobody_is_there(monkeypatch) -> None:
     assert start._process is not None
     start._process.terminate()
     start._process.wait(10)
+
+
+def view(epoch: int) -> GraphView:
+    return GraphView(epoch, 1, {}, {})
+
+
+def test_the_first_master_and_the_same_one_are_believed_at_once() -> None:
+    learning = Learning()
+    assert not learning.still(None, view(1), 0.0)
+    assert not learning.still(view(1), view(1), 1.0)
+
+
+def test_another_master_is_believed_when_it_had_time_to_learn() -> None:
+    learning = Learning()
+    assert learning.still(view(1), view(2), 10.0)
+    assert learning.still(view(1), view(2), 10.0 + LEARNING_S - 0.1)
+    assert not learning.still(view(1), view(2), 10.0 + LEARNING_S)
+
+
+def test_a_third_one_begins_to_learn_anew() -> None:
+    learning = Learning()
+    learning.still(view(1), view(2), 10.0)
+    assert learning.still(view(1), view(3), 10.0 + LEARNING_S)

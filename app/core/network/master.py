@@ -1,4 +1,4 @@
-"""Starting a master beside the window when there is none, and not over and over when it can't be started."""
+"""The master beside the window: is one there, does it know everybody yet; and starting one when none is."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nep.errors import NepError
 from nep.masters.master import is_running, start_process
+from nep.protocol.graph_view import GraphView
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
@@ -18,9 +20,36 @@ if TYPE_CHECKING:
 else:
     doctor = later("nep.doctor")
 
+LEARNING_S = 1.5
+"""How long a master that has just started may not know everybody yet (it learns for one second)."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """After how long a master that could not be started is tried again: twice as long each time."""
 END_WAIT_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class MasterState:
+    """Whether a master is there: ``searching``, ``connected`` or ``none``, its address, and a sentence."""
+
+    kind: str
+    address: str
+    sentence: str = ""
+
+
+class Learning:
+    """Notices that another master has come. One thread uses it (the window's)."""
+
+    def __init__(self) -> None:
+        """Have seen no other master yet."""
+        self._new_epoch = (0, 0.0)
+
+    def still(self, known: GraphView | None, view: GraphView, now: float) -> bool:
+        """Whether ``view`` is of another master than ``known`` and may lack people: they have not gone."""
+        if known is None or view.epoch == known.epoch:
+            return False
+        if self._new_epoch[0] != view.epoch:
+            self._new_epoch = (view.epoch, now)
+        return now - self._new_epoch[1] < LEARNING_S
 
 
 class MasterStart:
