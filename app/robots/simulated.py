@@ -13,12 +13,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Literal, TypeAlias
 
+from app.robots.description.json_access import number_of
 from app.robots.driver.call import Call, Canceled, Failed
 from app.robots.driver.common_actions import drives, moves
 from app.robots.driver.declare import Kind, action, safe_stop
 from app.robots.driver.process import main as drive
 from app.robots.driver.schema import Colour, Range, Suggested, Text, Title, Words
-from app.robots.virtual import from_rize
 from app.robots.virtual.acting import FEEDBACK_S, Acting
 from app.robots.virtual.body import START_PITCH
 from app.robots.virtual.room import Room
@@ -33,6 +33,26 @@ Target: TypeAlias = Annotated[
     Literal["ahead", "left", "right", "up", "down", "face", "ball"],
     Words({"face": "the face", "ball": "the ball", "left": "the left", "right": "the right"}),
 ]
+
+
+def _rize_turn(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
+    """RIZE says ``left`` or ``right`` and the option ``degrees``."""
+    degrees = number_of(options.get("degrees"))
+    return {"direction": given} | ({} if degrees is None else {"angle": degrees})
+
+
+def _rize_walk(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
+    """RIZE says ``forwards`` or ``backwards`` and the option ``meters``."""
+    metres = number_of(options.get("meters"))
+    sign = {"forwards": 1.0, "backwards": -1.0}[given]
+    return {"distance": sign * (0.5 if metres is None else metres)}
+
+
+def _rize_light(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
+    """RIZE says ``eyes`` or ``all`` and the options ``R``, ``G``, ``B``, 0 to 255."""
+    parts = [number_of(options.get(name)) for name in "RGB"]
+    colour = "".join(f"{min(255, max(0, int(part or 0))):02x}" for part in parts)
+    return {"where": "eyes" if given == "eyes" else "both", "colour": f"#{colour}"}
 
 
 class VirtualPepper(Acting):
@@ -81,7 +101,7 @@ class VirtualPepper(Acting):
         "turns %direction by %angle °",
         unit="deg",
         rize="turn",
-        from_rize=from_rize.turn,
+        from_rize=_rize_turn,
     )
     def turn(
         self,
@@ -100,7 +120,7 @@ class VirtualPepper(Acting):
         "walks %distance m",
         unit="m",
         rize="walk",
-        from_rize=from_rize.walk,
+        from_rize=_rize_walk,
     )
     def walk(
         self,
@@ -187,7 +207,7 @@ class VirtualPepper(Acting):
         uses=("lights",),
         cancellable=False,
         rize="leds",
-        from_rize=from_rize.light,
+        from_rize=_rize_light,
     )
     def light(
         self,

@@ -16,10 +16,9 @@ from app.robots.diffdrive import DIFFDRIVE, DiffDrive
 from app.robots.driver.call import Clock, Link, MonotonicClock
 from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
-from app.robots.virtual.colours import colours_in
-from app.robots.virtual.drawing import surroundings
 from app.robots.virtual.lens import Lens
-from app.robots.virtual.life import Beat
+from app.robots.virtual.life import Beat, surroundings
+from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import RADIUS, WheelBody
 
 BODY_HZ, CAMERA_HZ = 60.0, 15.0

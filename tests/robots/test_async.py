@@ -9,8 +9,7 @@ import threading
 import pytest
 
 import nep
-from app.robots.driver.driver import Driver
-from app.robots.driver.event_loop import EventLoop
+from app.robots.driver.driver import Driver, EventLoop
 from app.robots.driver.tasks import STOP_ANSWER_S
 from app.robots.kit import Call, Failed, Kind, Link, action, safe_stop
 from tests.robots.conftest import Ears, FakeClock, eventually

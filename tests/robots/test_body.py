@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.robots.virtual.body import RADIUS, Body
-from app.robots.virtual.drawing import drawable
+from app.robots.virtual.life import drawable
 from app.robots.virtual.motion import Joint, Motion
 from app.robots.virtual.room import Room
 

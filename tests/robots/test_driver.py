@@ -11,8 +11,7 @@ import nep
 from app.core.run.control import STOP_TIMEOUT_S
 from app.robots.driver.driver import Driver
 from app.robots.driver.task import Program, Task
-from app.robots.driver.tasks import STOP_ANSWER_S
-from app.robots.driver.watchdog import Watchdog
+from app.robots.driver.tasks import STOP_ANSWER_S, Watchdog
 from app.robots.identity import program_of
 from app.robots.kit import Failed
 from tests.robots.conftest import TURTLE, Ears, eventually

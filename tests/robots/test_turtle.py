@@ -16,9 +16,9 @@ from app.robots.diffdrive import DIFFDRIVE
 from app.robots.driver.driver import Driver
 from app.robots.turtle import ROBOT
 from app.robots.virtual.camera import Camera
-from app.robots.virtual.colours import colours_in
 from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Room
+from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import BRAKING, RADIUS, START, WheelBody
 from tests.robots.conftest import Ears, eventually
 

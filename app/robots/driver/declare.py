@@ -7,9 +7,11 @@ class attributes; exactly one method is marked with :func:`safe_stop`.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+import textwrap
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias, TypeVar
@@ -26,7 +28,6 @@ from app.robots.driver.schema import (
     schema_of,
 )
 from app.robots.driver.schema_values import check_sendable, plain, told, told_fields
-from app.robots.driver.source_lines import Line, line_of, lines_of
 from app.robots.driver.tasks import BEAT_S
 
 Function = TypeVar("Function", bound=Callable[..., object])
@@ -370,3 +371,57 @@ def _with_line(problem: str, lines: Mapping[str, list[Line]]) -> str:
     path = problem.replace(":", ".").split(" ")[0].split(".")
     found = lines.get(path[1]) if len(path) > 1 and path[0] in {"actions", "properties", "events"} else None
     return f"{found[-1]}: {problem}" if found else problem
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a file, as people look it up: ``table.py, line 12``."""
+
+    file: str
+    number: int
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"{self.file}, line {self.number}"
+
+
+def line_of(function: object) -> Line | None:
+    """Where a function begins; None for what was not written in Python."""
+    code = getattr(inspect.unwrap(function), "__code__", None) if callable(function) else None
+    return None if code is None else Line(Path(code.co_filename).name, code.co_firstlineno)
+
+
+def lines_of(body: type) -> dict[str, list[Line]]:
+    """The lines at which a class gives each of its names something; empty where its source can't be read.
+
+    What a property's setter or an overload gives again is no second name.
+    """
+    try:
+        lines, first = inspect.getsourcelines(body)
+        file = Path(inspect.getsourcefile(body) or "").name
+        tree = ast.parse(textwrap.dedent("".join(lines)))
+    except (OSError, TypeError, SyntaxError, ValueError):
+        return {}
+    found: dict[str, list[Line]] = {}
+    (declared,) = tree.body
+    for statement in declared.body if isinstance(declared, ast.ClassDef) else ():
+        for name in _names_given(statement):
+            found.setdefault(name, []).append(Line(file, first + statement.lineno - 1))
+    return found
+
+
+def _names_given(statement: ast.stmt) -> Iterator[str]:
+    if isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef)):
+        again = (_decorator_name(each) for each in statement.decorator_list)
+        if not {"setter", "getter", "deleter", "overload"} & set(again):
+            yield statement.name
+    elif isinstance(statement, ast.Assign):
+        yield from (each.id for each in statement.targets if isinstance(each, ast.Name))
+    elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name) and statement.value:
+        yield statement.target.id
+
+
+def _decorator_name(decorator: ast.expr) -> str:
+    if isinstance(decorator, ast.Attribute):
+        return decorator.attr
+    return decorator.id if isinstance(decorator, ast.Name) else ""

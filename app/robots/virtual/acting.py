@@ -1,23 +1,90 @@
-"""How the virtual robot does things: start a movement, wait for its end, brake when it is canceled."""
+"""What the virtual robot senses, and how it does things: a movement begins, ends, or brakes at a cancel."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from app.robots.driver.call import Call, Canceled, Failed, Link, MonotonicClock
+from app.robots.driver.common_actions import battery_sensor, distance_sensor, position_sensor
+from app.robots.driver.declare import detections, event, picture, sensor
+from app.robots.driver.schema import Suggested
 from app.robots.virtual.body import START_PITCH, Body
 from app.robots.virtual.camera import lens_of
 from app.robots.virtual.life import Life
 from app.robots.virtual.motion import Motion
 from app.robots.virtual.room import Room
-from app.robots.virtual.senses import Senses
 from app.robots.virtual.vision import angles_to
 
 _HEAD = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
 _HEAD |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
 FEEDBACK_S = 0.2
 """Seconds between two messages of feedback."""
+
+Place: TypeAlias = Literal["head", "left_hand", "right_hand"]
+
+
+class Senses:
+    """Its sensors and events; what fills them is :class:`~app.robots.virtual.life.Life`."""
+
+    battery = battery_sensor()
+    distance = distance_sensor(most_m=5)
+    head_touched = sensor(bool, title="head touch", text="head is touched", icon="hand")
+    sees_face = sensor(bool, title="sees a face", text="sees a face", icon="scan-face", rate_hz=5)
+    sees_ball = sensor(bool, title="sees a ball", text="sees a ball", icon="scan", rate_hz=5)
+    heard_word = sensor(str, title="last word heard", text="last word heard", icon="ear")
+    pose = position_sensor(rate_hz=10)
+    camera = picture(title="camera", width=320, height=240, rate_hz=15, hfov_deg=56.3)
+    faces = detections(title="faces", camera="camera", icon="scan-face", rate_hz=5)
+    balls = detections(title="balls", camera="camera", icon="scan", rate_hz=5)
+    markers = detections(title="markers", camera="camera", icon="scan-line", rate_hz=5)
+
+    touched = event(
+        "when %robot %place is touched",
+        title="touched",
+        icon="hand",
+        fields={"place": Place},
+        choose=("place",),
+        rize=lambda data: ("touched", {str(data["place"]): 1}),
+    )
+    released = event(
+        "when %robot %place is released",
+        title="released",
+        icon="hand",
+        fields={"place": Place},
+        choose=("place",),
+        rize=lambda data: ("touched", {str(data["place"]): 0}),
+    )
+    face_seen = event(
+        "when %robot sees a face",
+        title="face seen",
+        icon="scan-face",
+        fields={"name": str},
+        rize=lambda _: ("human_detected", {"yes": 1}),
+    )
+    face_lost = event(
+        "when %robot loses the face",
+        title="face lost",
+        icon="scan-face",
+        fields={"name": str},
+        rize=lambda _: ("human_detected", {"no": 1}),
+    )
+    heard = event(
+        "when %robot hears %word",
+        title="heard",
+        icon="ear",
+        fields={"word": Annotated[str, Suggested("hello")]},
+        choose=("word",),
+        rize=lambda data: ("word", {str(data["word"]): 1}),
+    )
+    bumped = event(
+        "when %robot bumps with its %side",
+        title="bumped",
+        icon="octagon-alert",
+        fields={"side": Literal["front", "back"]},
+        choose=("side",),
+        rize=lambda data: ("bumpers", {str(data["side"]): 1}),
+    )
 
 
 class Acting(Senses):

@@ -7,7 +7,7 @@ import math
 import cv2
 import numpy as np
 
-from app.robots.virtual import figures, scenery
+from app.robots.virtual import scenery
 from app.robots.virtual.body import EYE_HEIGHT, Body
 from app.robots.virtual.canvas import Canvas, Picture
 from app.robots.virtual.lens import Lens, Matrix
@@ -34,8 +34,8 @@ class Camera:
         self._walls = {side: scenery.wall(room, side) for side in WALLS}
         self._shadow = scenery.shadow()
         self._marker = scenery.marker(room.marker.id)
-        self._person = figures.person()
-        self._ball = figures.ball(room.ball.colour)
+        self._person = scenery.person()
+        self._ball = scenery.ball(room.ball.colour)
         self._light = _vignette(320, 240)
 
     def picture(self, room: Room, lens: Lens) -> Picture:
@@ -81,7 +81,7 @@ class Camera:
     def _stand(self, canvas: Canvas, person: Person) -> None:
         """The person's picture, turned to the camera."""
         across = looking_across(canvas.lens, person.x, person.y)
-        wide = person.height * figures.FIGURE_WIDTH
+        wide = person.height * scenery.FIGURE_WIDTH
         corner = np.array([person.x, person.y, person.height]) - across * wide / 2
         canvas.put(self._person, corner.tolist(), (across * wide).tolist(), (0, 0, -person.height))
 

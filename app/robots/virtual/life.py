@@ -1,4 +1,4 @@
-"""What keeps the virtual robot going: one thread that moves it 30 times a second, one that looks 15 times."""
+"""What keeps the virtual robot going: a thread that moves it and tells its state, and one that looks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import cv2
 from app.robots.driver.call import Clock, Link
 from app.robots.virtual.body import Body, Happening
 from app.robots.virtual.camera import Camera, lens_of
-from app.robots.virtual.drawing import drawable
+from app.robots.virtual.room import Room
 from app.robots.virtual.vision import Detection, Eyes, message
 
 BODY_HZ = 30.0
@@ -183,3 +183,48 @@ class Beat:
         now = self._clock.now()
         self._next = max(self._next + self._period_s, now)
         return now
+
+
+def drawable(body: Body) -> dict[str, object]:
+    """Metres and degrees; head pitch positive is down, arms 0 hang and 180 point up."""
+    return {
+        "x": round(body.x, 3),
+        "y": round(body.y, 3),
+        "theta_deg": round(body.theta_deg, 1),
+        "head_yaw_deg": round(body.head_yaw.angle, 1),
+        "head_pitch_deg": round(body.head_pitch.angle, 1),
+        "speech": body.speech,
+        "eyes": body.eyes,
+        "shoulders": body.shoulders,
+        "emotion": body.emotion,
+        **{f"arm_{side}_deg": round(joint.angle, 1) for side, joint in body.arms.items()},
+        **{f"elbow_{side}_deg": round(joint.angle, 1) for side, joint in body.elbows.items()},
+        "moving": not body.still,
+        "touched": sorted(body.touched),
+        **surroundings(body.room),
+    }
+
+
+def surroundings(room: Room) -> dict[str, object]:
+    """The room and what is in it."""
+    return {
+        "objects": _objects(room),
+        "room": {
+            "x_min": room.x_min,
+            "x_max": room.x_max,
+            "y_min": room.y_min,
+            "y_max": room.y_max,
+            "height": room.height,
+            "openings": [vars(opening) for opening in room.openings],
+        },
+    }
+
+
+def _objects(room: Room) -> list[dict[str, object]]:
+    ball, person, card = room.ball, room.person, room.marker
+    return [
+        {"kind": "ball", "z": ball.z, **vars(ball)},
+        {"kind": "person", "face_z": person.face_z, **vars(person)},
+        {"kind": "marker", "name": card.name, **vars(card)},
+        *({**vars(box), "name": box.kind} for box in room.boxes),
+    ]
