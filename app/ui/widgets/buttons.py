@@ -58,8 +58,69 @@ def name_command(widget: QWidget, command: str, tip: str, key: str = "") -> None
     widget.setToolTip(plain.tip(tip_with_key(tip, key)))
 
 
-class Button(QAbstractButton):
+class PaintedButton(QAbstractButton):
+    """The base of every button that paints itself; `paint_button` does it.
+
+    It takes the keyboard (the focus ring follows its corners), is painted anew when the mouse comes, presses
+    or goes, grows with the theme's text, and a screen reader says its words until it is given another name.
+    """
+
+    shortens = False
+    """Whether narrow places shorten its words; its tooltip then has the whole."""
+
+    def __init__(
+        self,
+        theme: Theme,
+        text: str = "",
+        *,
+        radius: str = "small",
+        checkable: bool = False,
+        parent: QWidget | None = None,
+    ) -> None:
+        """``radius`` names its corners."""
+        super().__init__(parent)
+        self._theme = theme
+        self.say(text)
+        self.setCheckable(checkable)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setProperty("focusRadius", theme.radius(radius))
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        theme.changed.connect(self.updateGeometry)
+
+    def say(self, text: str, name: str = "") -> None:
+        """Show these words; a screen reader says them too, or ``name`` where there is one."""
+        self.setText(text)
+        self.setAccessibleName(name or text)
+
+    @property
+    def is_hovered(self) -> bool:
+        """Whether the mouse is on it, and a press would do something."""
+        return self.underMouse() and self.isEnabled()
+
+    @property
+    def is_highlighted(self) -> bool:
+        """Whether the mouse is on it or it is held down."""
+        return self.is_hovered or self.isDown()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self.shortens:
+            paint.tell_whole(self, self.text())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        self.paint_button(painter, QRectF(self.rect()))
+        painter.end()
+
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        """Paint it as it is now; ``rect`` is the whole widget."""
+
+
+class Button(PaintedButton):
     """A button with a word and perhaps an icon; filled kinds are for the one thing most people want next."""
+
+    shortens = True
 
     def __init__(
         self,
@@ -71,28 +132,19 @@ class Button(QAbstractButton):
         size: Size = "normal",
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
-        self._theme = theme
-        self.kind: Kind = kind
         self.measure = _MEASURES[size]
+        super().__init__(theme, text, radius=self.measure.radius, parent=parent)
+        self.kind: Kind = kind
         self.icon_name = icon
         self.fill_icon = False
         self._least: int | None = None
-        self.setText(text)
-        self.setAccessibleName(text)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.ArrowCursor)
-        self.setProperty("focusRadius", theme.radius(self.measure.radius))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        theme.changed.connect(self.updateGeometry)
 
     def set_word(self, text: str, icon: str | None = None) -> None:
         """Another word, and another icon when one is given; the place stays."""
         if text == self.text() and icon in {None, self.icon_name}:
             return
-        self.setText(text)
-        self.setAccessibleName(text)
+        self.say(text)
         self.icon_name = icon if icon is not None else self.icon_name
         self.updateGeometry()
         self.update()
@@ -120,10 +172,6 @@ class Button(QAbstractButton):
         self._least = least
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        paint.tell_whole(self, self.text())
-
     def icon_side(self) -> int:
         """How large the icon is: it grows with the text."""
         return round(self._theme.scaled(self.measure.icon))
@@ -132,23 +180,17 @@ class Button(QAbstractButton):
         """The word that is painted."""
         return self.text()
 
-    def frame(self) -> QRectF:
-        """Where the button's body is painted."""
-        return QRectF(self.rect())
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         fill, border, ink = self._look()
-        paint.box(painter, self.frame(), self._theme.radius(self.measure.radius), fill, border)
+        paint.box(painter, rect, self._theme.radius(self.measure.radius), fill, border)
         self.paint_content(painter, ink)
-        painter.end()
 
     def paint_content(self, painter: QPainter, ink: QColor) -> None:
         """The icon and the word, centred together."""
         font = self._theme.font(self.measure.font)
         if self.measure.font == "body":
             font.setWeight(font.Weight.Medium)
-        frame = self.frame()
+        frame = QRectF(self.rect())
         word = self.shown_word()
         text_width = paint.width_of(font, word)
         icon = self.icon_side() if self.icon_name is not None else 0
@@ -177,7 +219,7 @@ class Button(QAbstractButton):
         )
 
 
-class IconButton(QAbstractButton):
+class IconButton(PaintedButton):
     """A button with only an icon; its name and shortcut are its tooltip and what a screen reader says."""
 
     def __init__(
@@ -191,17 +233,10 @@ class IconButton(QAbstractButton):
         size: int = 28,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
-        self._theme = theme
+        super().__init__(theme, checkable=checkable, parent=parent)
         self._icon = icon
         self._side = size
-        self.setCheckable(checkable)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setProperty("focusRadius", theme.radius("small"))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self.set_name(name, shortcut)
-        theme.changed.connect(self.updateGeometry)
 
     def set_name(self, name: str, shortcut: str = "") -> None:
         """What the button does, and its key."""
@@ -224,16 +259,14 @@ class IconButton(QAbstractButton):
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
         fill, ink = None, "textSecondary"
         if self.isChecked():
             fill, ink = "accentTint", "accentText"
         elif self.isDown():
             fill, ink = "pressed", "text"
-        elif self.underMouse() and self.isEnabled():
+        elif self.is_hovered:
             fill, ink = "hover", "text"
         if fill is not None:
             paint.box(painter, rect, theme.radius("small"), theme.colour(fill))
@@ -241,27 +274,22 @@ class IconButton(QAbstractButton):
         square = QRectF(0, 0, side, side)
         square.moveCenter(rect.center())
         paint_icon(painter, square, self._icon, theme.colour(ink if self.isEnabled() else "textDisabled"))
-        painter.end()
 
 
-class LinkButton(QAbstractButton):
+class LinkButton(PaintedButton):
     """Words in the accent that lead somewhere, perhaps with an arrow."""
 
+    shortens = True
+
     def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
-        super().__init__()
-        self._theme, self._icon = theme, icon
-        self.setText(text)
-        self.setAccessibleName(text)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        super().__init__(theme, text)
+        self._icon = icon
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def set_word(self, text: str, icon: str | None) -> None:
         """Other words, and another arrow or none."""
         self._icon = icon
-        self.setText(text)
-        self.setAccessibleName(text)
+        self.say(text)
         self.updateGeometry()
         self.update()
 
@@ -273,21 +301,14 @@ class LinkButton(QAbstractButton):
     def minimumSizeHint(self) -> QSize:
         return QSize(80, self.sizeHint().height())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        paint.tell_whole(self, self.text())
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        font = self._theme.font("title")
-        font.setUnderline(self.underMouse())
-        rect, ink = QRectF(self.rect()), self._theme.colour("accentText")
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        font, ink = self._theme.font("title"), self._theme.colour("accentText")
+        font.setUnderline(self.is_hovered)
         if self._icon is not None:
             square = QRectF(rect.right() - ARROW, rect.center().y() - ARROW / 2, ARROW, ARROW)
             paint_icon(painter, square, self._icon, ink)
             rect.adjust(0, 0, -ARROW - 6, 0)
         paint.words(painter, rect, self.text(), font, ink)
-        painter.end()
 
 
 class RunButton(Button):
@@ -332,40 +353,29 @@ class RunButton(Button):
         return QSize(max(RUN_WIDTH, round(inner) + 28), height)
 
 
-class StopButton(QAbstractButton):
+class StopButton(PaintedButton):
     """Stop: always enabled; its ring says that answers are awaited.
 
     A margin of 4 px around it is for that ring.
     """
 
     def __init__(self, theme: Theme, place: Place = "runBar", parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._theme = theme
+        self._corners = "large" if place == "runBar" else "control"
+        super().__init__(theme, "Stop", radius=self._corners, parent=parent)
         self._place: Place = place
         self._ring = False
         self.filled = True
-        self.setText("Stop")
-        self.setAccessibleName("Stop")
         name_command(self, "run.stop", "Stops the program and every robot", "F12")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        self.setProperty("focusRadius", self._radius())
         self.setProperty("focusInset", RING)
-        theme.changed.connect(self.updateGeometry)
 
     def show_state(self, word: str, *, ring: bool = False, filled: bool = True) -> None:
         """Show "Stop", "Stopping" (with the ring) or "Stop again"; outlined only while nothing can move."""
         if (word, ring, filled) == (self.text(), self._ring, self.filled):
             return
-        self.setText(word)
-        self.setAccessibleName(word)
+        self.say(word)
         self._ring = ring
         self.filled = filled
         self.update()
-
-    def _radius(self) -> int:
-        return self._theme.radius("large" if self._place == "runBar" else "control")
 
     def sizeHint(self) -> QSize:
         wanted = self._theme.pair("stop", self._place)
@@ -390,23 +400,19 @@ class StopButton(QAbstractButton):
     def _side(self) -> int:
         return 16 if self._place == "runBar" else 12
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme = self._theme
-        painter = QPainter(self)
-        frame = QRectF(self.rect()).adjusted(RING, RING, -RING, -RING)
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme, radius = self._theme, self._theme.radius(self._corners)
+        frame = rect.adjusted(RING, RING, -RING, -RING)
         if self._ring:
-            ring = frame.adjusted(-RING, -RING, RING, RING)
-            paint.box(painter, ring, self._radius() + RING, None, theme.colour("stop"), 2)
+            paint.box(painter, rect, radius + RING, None, theme.colour("stop"), 2)
         if self.filled:
-            role = "stopHover" if self.isDown() or self.underMouse() else "stop"
-            paint.box(painter, frame, self._radius(), theme.colour(role))
+            paint.box(painter, frame, radius, theme.colour("stopHover" if self.is_highlighted else "stop"))
             ink = theme.colour("onStop")
         else:
-            fill = theme.colour("errorTint" if self.underMouse() or self.isDown() else "panel")
-            paint.box(painter, frame, self._radius(), fill, theme.colour("stop"))
+            fill = theme.colour("errorTint" if self.is_highlighted else "panel")
+            paint.box(painter, frame, radius, fill, theme.colour("stop"))
             ink = theme.colour("error")
         self._paint_words(painter, frame, ink)
-        painter.end()
 
     def _paint_words(self, painter: QPainter, frame: QRectF, ink: QColor) -> None:
         font, key_font = self._fonts()

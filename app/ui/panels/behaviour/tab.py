@@ -11,14 +11,14 @@ from PySide6.QtGui import (
     QKeyEvent,
     QMouseEvent,
     QPainter,
-    QPaintEvent,
 )
-from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
 
 LONGEST_NAME = 220
 PADDING = 12
@@ -37,7 +37,7 @@ class TabFacts:
     tip: str = ""
 
 
-class BehaviourTab(QAbstractButton):
+class BehaviourTab(PaintedButton):
     """One open behaviour. Amber dot in place of the icon: its program runs; small dot: not saved."""
 
     chosen = Signal()
@@ -46,15 +46,11 @@ class BehaviourTab(QAbstractButton):
     stepped = Signal(int)
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
-        super().__init__(parent)
-        self._theme = theme
+        super().__init__(theme, checkable=True, parent=parent)
         self.facts = TabFacts("", "")
         self._from: QPointF | None = None
         self._over_close = self._close_down = False
-        self.setCheckable(True)
         self.setMouseTracking(True)
-        self.setProperty("focusRadius", theme.radius("small"))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
 
     def show_facts(self, facts: TabFacts, current: bool) -> bool:
         """Show these; whether the width changed."""
@@ -65,8 +61,7 @@ class BehaviourTab(QAbstractButton):
         self.setChecked(current)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
         states = [word for word, so in (("not saved", facts.dirty), ("runs", facts.runs)) if so]
-        self.setText(facts.name)
-        self.setAccessibleName(", ".join([facts.name, *states]))
+        self.say(facts.name, ", ".join([facts.name, *states]))
         self.setAccessibleDescription("The behaviour that shows" if current else "Another open behaviour")
         self.setToolTip(plain.tip(facts.tip or self.accessibleName()))
         self.update()
@@ -95,10 +90,9 @@ class BehaviourTab(QAbstractButton):
         rect = QRectF(self.rect())
         return QRectF(rect.right() - SLOT - 1, rect.center().y() - 8, 16, 16)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect = QRectF(self.rect())
-        current, over = self.isChecked(), self.underMouse() or self._from is not None
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme = self._theme
+        current, over = self.isChecked(), self.is_hovered or self._from is not None
         if current or over:
             role = "selected" if current else "hover"
             paint.box(painter, rect, theme.radius("small"), theme.colour(role))
@@ -111,7 +105,6 @@ class BehaviourTab(QAbstractButton):
         words = rect.adjusted(left, 0, -SLOT - 2, 0)
         paint.words(painter, words, self.facts.name, self._font(current=current), ink)
         self._paint_slot(painter, over or self.hasFocus())
-        painter.end()
 
     def _paint_mark(self, painter: QPainter, square: QRectF) -> None:
         theme = self._theme

@@ -8,14 +8,15 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtGui import QContextMenuEvent, QPainter
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.text import plain
 from app.ui.text.dates import when_words
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, label, paint
+from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.indicators import ROBOT_STATUS, Chip
 from app.ui.widgets.menus import Menu
 
@@ -35,23 +36,18 @@ def seen_words(seen_s: float, now: dt.datetime | None = None) -> str:
     return f"seen {words[:1].lower()}{words[1:]}"
 
 
-class RobotItem(QAbstractButton):
+class RobotItem(PaintedButton):
     """One robot in the list at the left; `menu_wanted` tells where on the screen its menu is wanted."""
 
     menu_wanted = Signal(QPoint)
 
     def __init__(self, theme: Theme, name: str) -> None:
-        super().__init__()
-        self._theme = theme
+        super().__init__(theme, radius="panel", checkable=True)
         self.name = name
         self.where = ""
         self._away = self.may_be_forgotten = False
-        self.setCheckable(True)
         self.setAutoExclusive(True)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setProperty("focusRadius", theme.radius("panel"))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self.chip = Chip(theme)
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 0, 12, 0)
@@ -86,10 +82,9 @@ class RobotItem(QAbstractButton):
         self.menu_wanted.emit(event.globalPos() if by_mouse else self.mapToGlobal(self.rect().center()))
         event.accept()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect = QRectF(self.rect())
-        if self.isChecked() or self.underMouse():
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme = self._theme
+        if self.isChecked() or self.is_hovered:
             fill = "selected" if self.isChecked() else "hover"
             paint.box(painter, rect, theme.radius("panel"), theme.colour(fill))
         quiet = self._away and not self.isChecked()
@@ -105,7 +100,6 @@ class RobotItem(QAbstractButton):
         paint.words(painter, words, self.name, bold, ink)
         where = theme.colour("textTertiary" if quiet else "textSecondary")
         paint.words(painter, words.translated(0, high), self.where, theme.font("small"), where)
-        painter.end()
 
 
 class RobotList(QWidget):

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, QSize, Signal
+from PySide6.QtGui import QPainter
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description.description import Action, Field
 from app.ui.panels.robots.input_text import input_words
@@ -18,6 +18,7 @@ from app.ui.text.sensor_values import number_words
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation
@@ -138,12 +139,12 @@ def _within(share: float) -> float:
     return min(1.0, max(0.0, share))
 
 
-class TryRow(QAbstractButton):
+class TryRow(PaintedButton):
     """One try that has ended."""
 
     def __init__(self, theme: Theme, action: Action, made: Invocation) -> None:
-        super().__init__()
-        self._theme, self.made = theme, made
+        super().__init__(theme)
+        self.made = made
         said, status, sentence = end_words(made)
         self.when = time.strftime("%H:%M:%S", time.localtime(made.at_s))
         self.given = input_words(action, made.given)
@@ -151,19 +152,15 @@ class TryRow(QAbstractButton):
         self.result = f"{said}, {told}" if told else sentence.rstrip(".") or said
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setProperty("focusRadius", theme.radius("small"))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self.setAccessibleName(f"{self.when}, {self.given}, {self.result}; take these values")
         self.setToolTip(plain.tip(f"{self.result}. Press to take these values"))
 
     def sizeHint(self) -> QSize:
         return QSize(200, round(self._theme.scaled(ROW)))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect = QRectF(self.rect())
-        if self.underMouse() or self.isDown():
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme = self._theme
+        if self.is_highlighted:
             paint.box(painter, rect, theme.radius("small"), theme.colour("hover"))
         font = theme.font("body")
         quiet = theme.colour("textSecondary")
@@ -185,7 +182,6 @@ class TryRow(QAbstractButton):
         paint.words(painter, right, self.result, font, quiet)
         middle = QRectF(left, rect.top(), mark.left() - left - 8, rect.height())
         paint.words(painter, middle, self.given, font, theme.colour("text"))
-        painter.end()
 
 
 class TryList(QWidget):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractButton, QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
 from app.core.session import Session
 from app.ui.shell.docking.layouts import Layout
@@ -16,6 +16,7 @@ from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, Segments, StopButton, paint
+from app.ui.widgets.buttons import PaintedButton
 
 FIELD_WORDS = "Find a command or panel"
 WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
@@ -101,23 +102,17 @@ class AppBar(QWidget):
         painter.end()
 
 
-class PaletteField(QAbstractButton):
+class PaletteField(PaintedButton):
     """Opens the command palette; it looks like a field, with its key at the right.
 
     In narrow windows only icon and key are left.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._theme, self._key = theme, ""
-        self.setText(FIELD_WORDS)
-        self.setAccessibleName(FIELD_WORDS)
+        super().__init__(theme, FIELD_WORDS, radius="control", parent=parent)
+        self._key = ""
         self.setProperty("command", "palette.open")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self.setProperty("focusRadius", theme.radius("control"))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        theme.changed.connect(self.updateGeometry)
 
     def show_key(self, key: str) -> None:
         """The key that opens the palette now; "" for none."""
@@ -141,11 +136,9 @@ class PaletteField(QAbstractButton):
         least = LEFT + self._side() + GAP + (self._key_room() or LEFT)
         return QSize(round(least), self.sizeHint().height())
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect, middle = QRectF(self.rect()), self.height() / 2
-        over = self.underMouse() or self.isDown()
-        fill = theme.colour("hover" if over else "panel")
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme, middle = self._theme, rect.height() / 2
+        fill = theme.colour("hover" if self.is_highlighted else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("borderStrong"))
         side = self._side()
         square = QRectF(LEFT, middle - side / 2, side, side)
@@ -158,7 +151,6 @@ class PaletteField(QAbstractButton):
             paint.words(painter, area, self.text(), font, theme.colour("textSecondary"))
         if self._key:
             paint.key_cap(painter, theme, rect.right() - 6, middle, self._key)
-        painter.end()
 
 
 def robots_chip(session: Session) -> tuple[str, str]:

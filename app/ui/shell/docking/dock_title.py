@@ -5,27 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.panels.base import Density, PanelWidget
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Elided, IconButton, paint, set_role
+from app.ui.widgets.buttons import PaintedButton
 
 
-class TitleTab(QAbstractButton):
+class TitleTab(PaintedButton):
     """The name of a panel that shares its place with others; a press brings it to the front."""
 
+    shortens = True
+
     def __init__(self, theme: Theme, text: str, chosen: bool) -> None:
-        super().__init__()
-        self._theme = theme
-        self.setText(text)
-        self.setAccessibleName(text)
-        self.setCheckable(True)
+        super().__init__(theme, text, checkable=True)
         self.setChecked(chosen)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setProperty("focusRadius", theme.radius("small"))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("title")
@@ -34,19 +31,12 @@ class TitleTab(QAbstractButton):
     def minimumSizeHint(self) -> QSize:
         return QSize(48, self.sizeHint().height())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        paint.tell_whole(self, self.text())
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
-        if self.isChecked() or self.underMouse():
+        if self.isChecked() or self.is_hovered:
             paint.box(painter, rect, theme.radius("small"), theme.colour("hover"))
         ink = theme.colour("text" if self.isChecked() else "textSecondary")
         paint.words(painter, rect, self.text(), theme.font("title"), ink, paint.CENTRE)
-        painter.end()
 
 
 class DockTitle(QWidget):

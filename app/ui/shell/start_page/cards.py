@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import Art, upper_corners
@@ -17,7 +17,7 @@ from app.ui.text.dates import day_words
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, Chip, Elided, label, paint
-from app.ui.widgets.buttons import LinkButton
+from app.ui.widgets.buttons import LinkButton, PaintedButton
 
 EXAMPLE_ART = 112
 RECENT_HEIGHT = 48
@@ -71,20 +71,15 @@ class BigCard(Card):
         column.addLayout(body, 1)
 
 
-class ExampleCard(QAbstractButton):
+class ExampleCard(PaintedButton):
     """An example: its blocks from afar, its name, and what it does. The whole card is the button."""
 
     def __init__(self, theme: Theme, path: Path, name: str, text: str, rows: tuple[Row, ...]) -> None:
-        super().__init__()
-        self._theme, self._text, self._rows = theme, text, rows
+        super().__init__(theme, radius="card")
+        self._text, self._rows = text, rows
         self.path = path
-        self.setText(name)
-        self.setAccessibleName(f"Open the example {name}. {text}")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.say(name, f"Open the example {name}. {text}")
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        self.setProperty("focusRadius", theme.radius("card"))
-        theme.changed.connect(self.updateGeometry)
 
     def _fonts(self) -> tuple[float, float]:
         title, text = self._theme.font("button"), self._theme.font("body")
@@ -94,11 +89,9 @@ class ExampleCard(QAbstractButton):
         title, text = self._fonts()
         return QSize(240, EXAMPLE_ART + round(title + text) + 33)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
-        edge = "borderStrong" if self.underMouse() or self.isDown() else "border"
+        edge = "borderStrong" if self.is_highlighted else "border"
         paint.box(painter, rect, theme.radius("card"), theme.colour("panel"), theme.colour(edge))
         art = QRectF(1, 1, rect.width() - 2, EXAMPLE_ART)
         painter.save()
@@ -112,34 +105,26 @@ class ExampleCard(QAbstractButton):
         paint.words(painter, line, self.text(), theme.font("button"), theme.colour("text"))
         line = QRectF(17, line.bottom() + 2, line.width(), text)
         paint.words(painter, line, self._text, theme.font("body"), theme.colour("textSecondary"))
-        painter.end()
 
 
-class RecentRow(QAbstractButton):
+class RecentRow(PaintedButton):
     """A file opened lately: its tile, its name, and when."""
 
     def __init__(self, theme: Theme, recent: RecentFile, now: dt.datetime) -> None:
-        super().__init__()
-        self._theme = theme
+        super().__init__(theme, radius="panel")
         self.path = recent.path
         then = dt.datetime.fromtimestamp(recent.opened_s, tz=now.tzinfo)
         self._when = day_words(then, now)
-        self.setText(recent.name)
-        self.setAccessibleName(f"Open {recent.name}, {self._when}")
+        self.say(recent.name, f"Open {recent.name}, {self._when}")
         self.setToolTip(plain.tip(str(recent.path)))
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        self.setProperty("focusRadius", theme.radius("panel"))
 
     def sizeHint(self) -> QSize:
         return QSize(240, max(RECENT_HEIGHT, round(paint.height_of(self._theme.font("label"))) + 20))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
-        if self.underMouse() or self.isDown():
+        if self.is_highlighted:
             paint.box(painter, rect, theme.radius("panel"), theme.colour("hover"))
         tile = QRectF(12, rect.center().y() - TILE / 2, TILE, TILE)
         paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
@@ -151,7 +136,6 @@ class RecentRow(QAbstractButton):
         paint.words(painter, area, self.text(), theme.font("label"), theme.colour("text"))
         area = rect.adjusted(54, 0, -12, 0)
         paint.words(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
-        painter.end()
 
 
 class _Key(QWidget):

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import (
-    QAbstractButton,
     QComboBox,
     QLineEdit,
     QSizePolicy,
@@ -19,7 +18,7 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.buttons import Button
+from app.ui.widgets.buttons import Button, PaintedButton
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.labels import label
 from app.ui.widgets.menus import EditMenu, cut, make_round
@@ -98,28 +97,23 @@ class Choice(QComboBox):
         painter.end()
 
 
-class _Swatch(QAbstractButton):
+class _Swatch(PaintedButton):
     def __init__(self, theme: Theme, colour: str, name: str) -> None:
-        super().__init__()
-        self._theme, self.colour = theme, colour
-        self.setCheckable(True)
+        super().__init__(theme, radius="control", checkable=True)
+        self.colour = colour
         self.setAutoExclusive(True)
         self.setAccessibleName(name)
         self.setToolTip(plain.tip(name))
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setFixedSize(SWATCH + 8, SWATCH + 8)
         self.setProperty("focusInset", 4)
-        self.setProperty("focusRadius", theme.radius("control"))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect()).adjusted(4, 4, -4, -4)
+        rect = rect.adjusted(4, 4, -4, -4)
         radius = theme.radius("control")
         if self.isChecked():
             paint.box(painter, rect.adjusted(-4, -4, 4, 4), radius + 4, None, theme.colour("accent"), 2)
         paint.box(painter, rect, radius, QColor(self.colour), theme.colour("controlBorder"))
-        painter.end()
 
 
 class ColourSwatches(QWidget):

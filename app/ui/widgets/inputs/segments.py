@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QFont, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtCore import QRectF, QSize, Signal
+from PySide6.QtGui import QFont, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
 
 _HEIGHTS: dict[str, tuple[int, int, str]] = {
@@ -22,20 +23,14 @@ _HEIGHTS: dict[str, tuple[int, int, str]] = {
 GAP = 8
 
 
-class _Segment(QAbstractButton):
+class _Segment(PaintedButton):
+    shortens = True
+
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
-        super().__init__()
-        self._theme, self._icon, self._check = theme, icon, check
+        self._icon, self._check = icon, check
         self._height, self._padding, self._kind = _HEIGHTS[size]
-        self.setText(label)
-        self.setAccessibleName(label)
-        self.setCheckable(True)
+        super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        self.setProperty("focusRadius", theme.radius("small"))
-        theme.changed.connect(self.updateGeometry)
 
     def _font(self) -> QFont:
         font = self._theme.font(self._kind)
@@ -55,19 +50,13 @@ class _Segment(QAbstractButton):
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        paint.tell_whole(self, self.text())
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
         chosen = self.isChecked()
         if chosen:
             fill = theme.colour("pressed" if theme.dark else "panel")
             paint.box(painter, rect, theme.radius("small"), fill, theme.colour("border"))
-        elif self.underMouse() and self.isEnabled():
+        elif self.is_hovered:
             paint.box(painter, rect, theme.radius("small"), theme.colour("pressed"))
         ink = theme.colour("text" if chosen else "textSecondary" if self.isEnabled() else "textDisabled")
         shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
@@ -78,7 +67,6 @@ class _Segment(QAbstractButton):
             paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, ink)
             left += side + GAP
         paint.words(painter, rect.adjusted(left, 0, 2, 0), self.text(), self._font(), ink)
-        painter.end()
 
 
 class Segments(QWidget):

@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractButton, QSizePolicy
+from PySide6.QtCore import QPointF, QRectF, QSize
+from PySide6.QtGui import QPainter
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
 
 
-class Switch(QAbstractButton):
+class Switch(PaintedButton):
     """Yes or no: a switch with the word beside it."""
 
     TRACK = QSize(36, 20)
 
     def __init__(self, theme: Theme, text: str, on: bool = False) -> None:
-        super().__init__()
-        self._theme = theme
-        self.setCheckable(True)
+        super().__init__(theme, text, checkable=True)
         self.setChecked(on)
-        self.setText(text)
-        self.setAccessibleName(text)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self.setProperty("focusRadius", 10)
-        theme.changed.connect(self.updateGeometry)
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("bodyLarge")
@@ -34,10 +26,8 @@ class Switch(QAbstractButton):
         width = self.TRACK.width() + gap + paint.width_of(font, self.text())
         return QSize(round(width) + 2, max(24, round(paint.height_of(font))))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
         track = QRectF(0, rect.center().y() - 10, self.TRACK.width(), self.TRACK.height())
         on = self.isChecked()
         if on and self.isEnabled():
@@ -49,4 +39,3 @@ class Switch(QAbstractButton):
         paint.box(painter, knob, 7, theme.colour("onAccent" if on else "controlBorder"))
         ink = theme.colour("text" if self.isEnabled() else "textDisabled")
         paint.words(painter, rect.adjusted(46, 0, 0, 0), self.text(), theme.font("bodyLarge"), ink)
-        painter.end()
