@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from nep.errors import NepError
+from nep.i18n import begin
 from nep.system.addresses import MASTER_VARIABLE, master_address
 from nep.system.descriptors import allow_many
 from nep.system.streams import close_streams, prepare_streams, words_given
@@ -86,6 +87,9 @@ def _main(given: Sequence[str]) -> int:
         return hand_over("app.blocks.runtime.child", given[1:])
     if given[:1] == ["--module"] and len(given) > 1:
         return hand_over(given[1], given[2:])
+    from app.core.storage.settings import Settings  # noqa: PLC0415  the processes of a frozen build need none
+
+    begin(Settings().get("language", ""))
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
     parser = window_parser()

@@ -14,7 +14,7 @@ import pytest
 
 import nep
 from app.blocks import compile_behaviour, editor_definitions
-from app.blocks.toolbox.catalogue import categories
+from app.blocks.toolbox.catalogue import english_categories
 from app.robots.description.description import parse, td_for
 from app.robots.kit import Driver
 from nep.masters.master import Master
@@ -33,7 +33,7 @@ def write(tmp_path: Path) -> Iterator[Write]:
         home = importlib.import_module(package)
         home.__path__.append(str(tmp_path))
         added.append((home, f"{package}.{name}"))
-        categories.cache_clear()
+        english_categories.cache_clear()
         return importlib.import_module(f"{package}.{name}")
 
     yield write_one
@@ -41,7 +41,7 @@ def write(tmp_path: Path) -> Iterator[Write]:
         home.__path__.remove(str(tmp_path))
         sys.modules.pop(module, None)
         delattr(home, module.rpartition(".")[2])
-    categories.cache_clear()
+    english_categories.cache_clear()
 
 
 def test_a_back_end(write: Write) -> None:

@@ -24,10 +24,12 @@ def main() -> None:
 
 def _run() -> int:
     from nep.cli import interrupts  # noqa: PLC0415 - see `main`
+    from nep.i18n import begin  # noqa: PLC0415
     from nep.system.streams import buffer_output, close_streams, prepare_streams  # noqa: PLC0415
 
     prepare_streams()
     buffer_output()
+    begin()  # before the modules whose help texts are made when they are imported
     try:
         from nep.cli.app import run  # noqa: PLC0415 - typer and ZeroMQ are heavy
 

@@ -12,6 +12,7 @@ from app.blocks.model.category import Category, Entry, Group
 from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
 from app.blocks.model.robot_text import TextParts, about, field_of, input_of, type_of
 from app.robots.description.description import Action, Event, Robot, Sensor
+from nep.i18n import _, pgettext
 
 _ICONS = {
     "Speech": "message-circle",
@@ -19,7 +20,8 @@ _ICONS = {
     "Face and lights": "smile",
     "Sensors": "eye",
 }
-_ORDER = tuple(_ICONS)
+GROUPS = tuple(_ICONS)
+"""The titles of groups, in their order; a description may have more."""
 _TITLES = {
     "": "Movement",
     "actions": "Movement",
@@ -43,7 +45,7 @@ def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
 def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
     """The categories under a robot's heading, its sensors and events last."""
     titles = {action.name: _group_title(action) for action in robot.actions}
-    groups: dict[str, list[Entry]] = {title: [] for title in _ORDER}
+    groups: dict[str, list[Entry]] = {title: [] for title in GROUPS}
     for block in robot_blocks(robot, known):
         use = block.robot
         if use is None:
@@ -96,8 +98,9 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
 
 def _tooltip(robot: Robot, action: Action) -> str:
     document = _member(robot, "actions", action.name).get("description")
-    told = str(document) if isinstance(document, str) else f"{robot.title}: {action.title}."
-    return f"{told} The next block waits until it is done."
+    if not isinstance(document, str):
+        document = f"{robot.title}: {action.title}."
+    return _("{what_it_does} The next block waits until it is done.").format(what_it_does=document)
 
 
 def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
@@ -111,7 +114,7 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
             shape="value",
             style="sensors",
             icon=sensor.icon or "eye",
-            tooltip=f"What the robot tells: {sensor.title}.",
+            tooltip=_("What the robot tells: {sensor}.").format(sensor=sensor.title),
             python="robot(%ROBOT).get(%X_NAME, %FIELD)",
             arguments=(robots, ChoiceField("FIELD", fields), LiveField("LIVE")),
             constants={"X_NAME": sensor.name},
@@ -124,7 +127,7 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
         shape="boolean" if boolean else "value",
         style="sensors",
         icon=sensor.icon or "eye",
-        tooltip=f"What the robot tells: {sensor.title}.",
+        tooltip=_("What the robot tells: {sensor}.").format(sensor=sensor.title),
         python="robot(%ROBOT).get(%X_NAME)",
         arguments=(robots,) if boolean else (robots, LiveField("LIVE")),
         check="Boolean" if boolean else "Number" if sensor.kind in _NUMBERS else "String",
@@ -147,7 +150,7 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
         shape="hat",
         style="events",
         icon=event.icon or "zap",
-        tooltip=f"The blocks below run each time the robot tells: {event.title}.",
+        tooltip=_("The blocks below run each time the robot tells: {event}.").format(event=event.title),
         python="robot(%ROBOT).on(%X_NAME, **%X_INPUT)",
         arguments=(robot_field(robot.model, alike), *(argument for _, argument in filters)),
         constants={"X_NAME": event.name},
@@ -165,11 +168,11 @@ def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
         hats.append(
             Block(
                 type=type_of(robot.model, "when", "changes", plain=True),
-                text="when %ROBOT %SENSOR changes",
+                text=pgettext("block", "when %ROBOT %SENSOR changes"),
                 shape="hat",
                 style="events",
                 icon="activity",
-                tooltip="The blocks below run each time this sensor tells another value.",
+                tooltip=_("The blocks below run each time this sensor tells another value."),
                 python="robot(%ROBOT).on_change(%SENSOR)",
                 arguments=(robot_field(robot.model, alike), _sensor_field(told)),
                 robot=RobotUse("sensor", "", "changes", robot.model),
@@ -179,16 +182,19 @@ def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
         hats.append(
             Block(
                 type=type_of(robot.model, "when", "passes", plain=True),
-                text="when %ROBOT %SENSOR goes %SIDE %LIMIT",
+                text=pgettext("block", "when %ROBOT %SENSOR goes %SIDE %LIMIT"),
                 shape="hat",
                 style="events",
                 icon="activity",
-                tooltip="The blocks below run each time this sensor passes the limit.",
+                tooltip=_("The blocks below run each time this sensor passes the limit."),
                 python="robot(%ROBOT).on_pass(%SENSOR, %SIDE, %LIMIT)",
                 arguments=(
                     robot_field(robot.model, alike),
                     _sensor_field(numbers),
-                    ChoiceField("SIDE", (("below", "below"), ("above", "above"))),
+                    ChoiceField(
+                        "SIDE",
+                        ((pgettext("choice", "below"), "below"), (pgettext("choice", "above"), "above")),
+                    ),
                     NumberField("LIMIT", 20),
                 ),
                 robot=RobotUse("sensor", "", "passes", robot.model),

@@ -5,10 +5,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from app.blocks.model.fields import Argument, StatementInput, ValueInput
+from app.blocks.model.fields import Argument, Say, StatementInput, ValueInput
 from app.blocks.model.template import holes
 
 Shape = Literal["hat", "definition", "statement", "cap", "value", "boolean"]
@@ -94,6 +94,20 @@ class Block:
             if argument.name not in used and not argument.silent and self.shape != "definition"
         ]
         return tuple(found)
+
+    def translated(self, say: Say) -> Block:
+        """The same block with the words that `say` gives for its English ones; type and Python stay.
+
+        `say` is called for every word that a person reads: ``tools/words.py`` collects them by it.
+        """
+        return replace(
+            self,
+            text=say("block", self.text),
+            tooltip=say(None, self.tooltip),
+            help=say(None, self.help),
+            arguments=tuple(argument.translated(say) for argument in self.arguments),
+            words=(*self.words, say("words to find a block by", " ".join(self.words))),
+        )
 
     def to_blockly(self) -> dict[str, object]:
         """Blockly's JSON definition; statement inputs stand on lines of their own."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from app.blocks.model.block import Block
+from app.blocks.model.fields import Say
 from app.robots.description.description import Robot
 
 
@@ -46,3 +47,13 @@ class Category:
     make: Callable[[Robot, Sequence[Robot]], tuple[Block, ...]] | None = None
     dynamic: str = ""  # the editor adds what people made themselves: "functions"
     groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
+
+    def translated(self, say: Say) -> Category:
+        """The same with the words that `say` gives for the English ones, see `Block.translated`."""
+        button = None if self.button is None else (say(None, self.button[0]), self.button[1])
+        return replace(
+            self,
+            title=say("category", self.title),
+            button=button,
+            blocks=tuple(block.translated(say) for block in self.blocks),
+        )

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
+Say = Callable[[str | None, str], str]
+"""(context, English) -> what a person reads, see `app.blocks.model.block.Block.translated`."""
 Check = Literal["Number", "String", "Boolean", "List"]
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -41,6 +43,10 @@ class Argument:
         """What is in its gaps when the block comes out of the toolbox, by the gaps' names."""
         return {}
 
+    def translated(self, say: Say) -> Argument:  # noqa: ARG002 (most have no words)
+        """The same in a person's language: its words and what it holds at first; names and values stay."""
+        return self
+
 
 @dataclass(frozen=True)
 class ValueInput(Argument):
@@ -68,6 +74,12 @@ class ValueInput(Argument):
     def is_there(self, fields: Mapping[str, object]) -> bool:
         """Whether the gap is there, with these saved fields."""
         return self.only is None or str(fields.get(self.only[0], self.only[1])) == self.only[1]
+
+    def translated(self, say: Say) -> Argument:
+        """What is in the gap at first."""
+        variable = None if self.variable is None else say("variable", self.variable)
+        default = say("example", self.default) if isinstance(self.default, str) else self.default
+        return replace(self, variable=variable, default=default)
 
     def fillings(self) -> dict[str, object]:
         """A variable, or a shadow block."""
@@ -141,6 +153,10 @@ class TextField(Field):
         """Blockly's text field."""
         return {"type": "field_input", "name": self.name, "text": self.value}
 
+    def translated(self, say: Say) -> Argument:
+        """The text that it holds at first."""
+        return replace(self, value=say("example", self.value))
+
     def read(self, saved: object) -> object:
         """Any text."""
         return self.value if saved is None else str(saved)
@@ -177,6 +193,12 @@ class ChoiceField(Field):
         if self.source is not None:
             return "" if saved is None else str(saved)
         raise FieldError(f"has no choice “{saved}”")
+
+    def translated(self, say: Say) -> Argument:
+        """What people choose from, unless these are names of robots."""
+        if self.source is not None:
+            return self
+        return replace(self, options=tuple((say("choice", words), value) for words, value in self.options))
 
     def words(self, value: object) -> str:
         """What people read for a value."""
@@ -248,6 +270,10 @@ class VariableField(Field):
     def to_blockly(self) -> dict[str, object]:
         """Blockly's own variable field."""
         return {"type": "field_variable", "name": self.name, "variable": self.value}
+
+    def translated(self, say: Say) -> Argument:
+        """The variable's name at first."""
+        return replace(self, value=say("variable", self.value))
 
     def read(self, saved: object) -> object:
         """The variable's id; Blockly saves ``{"id": …}``, older files a name."""

@@ -6,9 +6,9 @@ What there is stands in the block's ``extraState``, which the editor writes: a f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from app.blocks.model.fields import Argument, ValueInput, VariableField
+from app.blocks.model.fields import Argument, Say, ValueInput, VariableField
 from app.blocks.model.workspace import Placed
 
 MOST_ITEMS = 50
@@ -29,6 +29,10 @@ class Items(Argument):
             f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": words}}}
             for number, words in enumerate(self.texts)
         }
+
+    def translated(self, say: Say) -> Argument:
+        """What the gaps hold at first."""
+        return replace(self, texts=tuple(say("example", words) for words in self.texts))
 
     def to_blockly(self) -> dict[str, object]:
         """A place: the editor's mutator puts the gaps there."""

@@ -16,6 +16,7 @@ from app.blocks.model.fields import (
 )
 from app.robots.description.description import Parameter
 from app.robots.description.inputs import pretty_number, pretty_unit, to_words
+from nep.i18n import _, pgettext
 
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 _RESERVED = ("ROBOT", "LIVE", "FIELD", "SENSOR", "SIDE", "LIMIT", "X_NAME", "X_INPUT", "X_FIELD", "ICON")
@@ -102,18 +103,18 @@ def about(parameter: Parameter) -> str:
     low = None if parameter.minimum is None else pretty_number(parameter.minimum)
     high = None if parameter.maximum is None else pretty_number(parameter.maximum)
     if low is not None and high is not None:
-        return f"from {low} to {high}{unit}"
+        return _("from {low} to {high_and_unit}").format(low=low, high_and_unit=f"{high}{unit}")
     if low is not None:
-        return f"at least {low}{unit}"
+        return _("at least {number_and_unit}").format(number_and_unit=f"{low}{unit}")
     if high is not None:
-        return f"at most {high}{unit}"
-    return f"in{unit}" if unit else ""
+        return _("at most {number_and_unit}").format(number_and_unit=f"{high}{unit}")
+    return pgettext("of a number", "in {unit}").format(unit=unit.strip()) if unit else ""
 
 
 def _yes_no(title: str) -> tuple[str, str]:
     if title.startswith("with "):
         return title, f"without {title[5:]}"
-    return f"{title}: yes", f"{title}: no"
+    return _("{what}: yes").format(what=title), _("{what}: no").format(what=title)
 
 
 def _argument_name(name: str, taken: set[str]) -> str:

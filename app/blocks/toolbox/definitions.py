@@ -8,6 +8,7 @@ from app.blocks.model.category import Category, Entry, Group
 from app.blocks.toolbox.catalogue import Catalogue, categories
 from app.blocks.toolbox.help import help_of
 from app.robots.description.description import Robot
+from nep.i18n import _, translate
 
 STYLES = ("events", "control", "values", "variables", "functions", "messages", "robot", "sensors")
 
@@ -37,7 +38,7 @@ def editor_definitions(
 
 
 def _toolbox(catalogue: Catalogue) -> dict[str, object]:
-    contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": "Blocks"}]
+    contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": _("Blocks")}]
     contents += [_category(category) for category in categories() if category.blocks]
     known = (*catalogue.connected.values(), *catalogue.absent.values())
     for robot in catalogue.connected.values():
@@ -65,7 +66,8 @@ def _category(category: Category) -> dict[str, object]:
 
 def _group(robot: Robot, group: Group) -> dict[str, object]:
     contents = [_block(entry) for entry in group.entries]
-    made = _entry(f"{robot.name}: {group.title}", group.title, group.style, group.icon, contents)
+    title = translate("category", group.title)
+    made = _entry(f"{robot.name}: {group.title}", title, group.style, group.icon, contents)
     return made | {"robot": robot.name}
 
 

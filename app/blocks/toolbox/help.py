@@ -22,6 +22,7 @@ from app.blocks.model.fields import (
 )
 from app.blocks.model.growing import Inputs, Items
 from app.blocks.model.workspace import parse_workspace
+from nep.i18n import _, lazy, listed, translate
 
 EXAMPLES: Mapping[str, str] = {
     "events_started": "For example: when started, Pepper says “Hello”.",
@@ -89,11 +90,12 @@ _NAMES = {
     "VAR": "variable",
 }
 _TAKES = {
-    "Number": "a number",
-    "String": "a text",
-    "Boolean": "yes or no, such as a comparison",
-    "List": "a list",
+    "Number": lazy("a number"),
+    "String": lazy("a text"),
+    "Boolean": lazy("yes or no, such as a comparison"),
+    "List": lazy("a list"),
 }
+_ANY = lazy("any value")
 _MOST_CHOICES = 6
 
 
@@ -109,9 +111,14 @@ def help_of(block: Block) -> dict[str, object]:
         "does": block.tooltip,
         "more": block.help,
         "gaps": gaps,
-        "example": EXAMPLES.get(block.type) or f"For example: {_filled(block)}.",
+        "example": _example(block),
         "words": " ".join(block.words),
     }
+
+
+def _example(block: Block) -> str:
+    told = EXAMPLES.get(block.type)
+    return _(told) if told else _("For example: {block}.").format(block=_filled(block))
 
 
 def title(block: Block) -> str:
@@ -131,6 +138,11 @@ def name_of_gap(block: Block, argument: Argument) -> str:
     told = block.about.get(argument.name)
     if told:
         return told[0]
+    return translate("gap", english_name_of_gap(argument))
+
+
+def english_name_of_gap(argument: Argument) -> str:
+    """What a gap is called in English when its block says nothing of it."""
     return _NAMES.get(argument.name, argument.name.lower().replace("_", " "))
 
 
@@ -138,58 +150,62 @@ def _takes(block: Block, argument: Argument) -> str:
     """What goes into it; "" for what needs no words."""
     words = _kind(argument)
     told = block.about.get(argument.name)
-    return f"{words}, {told[1]}" if words and told and told[1] else words
+    if words and told and told[1]:
+        return _("{kind}, {more}").format(kind=words, more=told[1])
+    return words
 
 
 def _kind(argument: Argument) -> str:
     if argument.name == "ROBOT":
-        return "which robot"
+        return _("which robot")
     if isinstance(argument, ValueInput):
         return _value(argument)
     if isinstance(argument, ChoiceField):
         return _choice(argument)
     if isinstance(argument, NumberField):
-        return f"a number{_limits(argument)}"
+        return _number(argument)
     for kind, words in _PLAIN.items():
         if isinstance(argument, kind):
-            return words
+            return _(words)
     return ""
 
 
 _PLAIN: Mapping[type[Argument], str] = {
-    StatementInput: "blocks",
-    TextField: "a text, typed into the block",
-    TopicField: "the name of a topic; choose one or type it",
-    PathField: "the name of a field in the topic's messages",
-    ColourField: "a colour; click on it to choose",
-    VariableField: "one of the behaviour's variables",
-    Items: "as many gaps as you like",
-    Inputs: "what the function is given",
+    StatementInput: lazy("blocks"),
+    TextField: lazy("a text, typed into the block"),
+    TopicField: lazy("the name of a topic; choose one or type it"),
+    PathField: lazy("the name of a field in the topic's messages"),
+    ColourField: lazy("a colour; click on it to choose"),
+    VariableField: lazy("one of the behaviour's variables"),
+    Items: lazy("as many gaps as you like"),
+    Inputs: lazy("what the function is given"),
 }
 
 
 def _value(gap: ValueInput) -> str:
-    words = _TAKES.get(gap.check or "", "any value")
+    words = _(_TAKES.get(gap.check or "", _ANY))
     if isinstance(gap.default, (int, float)) and not isinstance(gap.default, bool):
-        words += f"; {gap.default:g} unless you change it"
-    return words if gap.only is None else f"{words}; it is there for an item by its number"
+        words = _("{kind}; {value} unless you change it").format(kind=words, value=f"{gap.default:g}")
+    if gap.only is None:
+        return words
+    return _("{kind}; it is there for an item by its number").format(kind=words)
 
 
 def _choice(field: ChoiceField) -> str:
-    names = [f"“{words}”" for words, _ in field.options]
+    names = [f"“{words}”" for words, _value in field.options]
     if len(names) > _MOST_CHOICES:
-        return f"one of {len(names)} choices: {', '.join(names[: _MOST_CHOICES - 1])} and others"
-    if len(names) < 2:
-        return "choose one"
-    return f"{', '.join(names[:-1])} or {names[-1]}"
+        few = ", ".join(names[: _MOST_CHOICES - 1])
+        return _("one of {count} choices: {few} and others").format(count=len(names), few=few)
+    return listed(names, "or") if len(names) > 1 else _("choose one")
 
 
-def _limits(field: NumberField) -> str:
-    if field.minimum is not None and field.maximum is not None:
-        return f" from {field.minimum:g} to {field.maximum:g}"
-    if field.minimum is not None:
-        return f" of at least {field.minimum:g}"
-    return "" if field.maximum is None else f" of at most {field.maximum:g}"
+def _number(field: NumberField) -> str:
+    low, high = (None if each is None else f"{each:g}" for each in (field.minimum, field.maximum))
+    if low is not None and high is not None:
+        return _("a number from {low} to {high}").format(low=low, high=high)
+    if low is not None:
+        return _("a number of at least {low}").format(low=low)
+    return _("a number") if high is None else _("a number of at most {high}").format(high=high)
 
 
 def _filled(block: Block) -> str:

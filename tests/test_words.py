@@ -1,0 +1,257 @@
+"""Every word can be translated, and no translation can break anything."""
+
+from __future__ import annotations
+
+import logging
+import subprocess
+import sys
+from collections.abc import Iterator
+from types import ModuleType
+
+import pytest
+
+from app.blocks.toolbox.catalogue import Catalogue, categories, has_words
+from app.blocks.toolbox.definitions import editor_definitions
+from app.blocks.toolbox.help import help_of
+from nep import i18n
+from nep.i18n import _, install, lazy, listed, ngettext, number, pgettext
+from tests.blocks.samples import robot
+
+PO = r"""
+msgid ""
+msgstr ""
+"Language: es\n"
+"MIME-Version: 1.0\n"
+"Content-Type: text/plain; charset=utf-8\n"
+"Plural-Forms: nplurals=2; plural=(n != 1);\n"
+
+msgid "wait for {robot}"
+msgstr "esperar a {robot}"
+
+msgid "one hole is missing: {robot}"
+msgstr "falta uno"
+
+msgid "one is wrong: {robot}"
+msgstr "{robto} está mal"
+
+msgid "one has braces: {robot}"
+msgstr "{robot} {"
+
+msgid "{count} message from {who}"
+msgid_plural "{count} messages from {who}"
+msgstr[0] "un mensaje de {who}"
+msgstr[1] "{count} mensajes de {who}"
+
+msgid "a message"
+msgid_plural "{count} messages"
+msgstr[0] "un mensaje"
+msgstr[1] "{count} mensajes"
+
+msgctxt "block"
+msgid "wait %SECONDS s"
+msgstr "esperar %SEGUNDOS s"
+
+msgctxt "verb"
+msgid "record"
+msgstr "grabar"
+
+msgctxt "noun"
+msgid "record"
+msgstr "récord"
+"""
+
+
+@pytest.fixture
+def words() -> ModuleType:
+    """The tool; it needs Babel, which only developers have."""
+    from tools import words as tool
+
+    return tool
+
+
+@pytest.fixture(autouse=True)
+def _english_again() -> Iterator[None]:
+    yield
+    install("en")
+
+
+@pytest.fixture
+def spanish(words, tmp_path) -> None:
+    """A folder with Spanish as a hasty translator wrote it."""
+    file = words.po_file(tmp_path, "es")
+    file.parent.mkdir(parents=True)
+    file.write_text(PO, encoding="utf-8")
+    words.write(words.Catalog(), words.pot_file(tmp_path))
+    words.compile_all(tmp_path)
+    install("es_MX.UTF-8", tmp_path)
+
+
+@pytest.fixture
+def pseudo(words, tmp_path) -> None:
+    """The pseudo-language, made from the sources of now."""
+    words.extract(tmp_path)
+    words.compile_all(tmp_path)
+    install("qps", tmp_path)
+
+
+def is_pseudo(text: str) -> bool:
+    return not has_words(text) or (text.strip().startswith("[") and text.strip().endswith("]"))
+
+
+def test_the_words_of_the_sources_are_those_of_the_translators(words) -> None:
+    """In short: run ``python tools/words.py update`` after a sentence changed."""
+    assert words.check() == []
+
+
+def test_a_stale_list_is_told(words, tmp_path) -> None:
+    made = words.template()
+    made.delete("A number.")
+    made.add("A word that was taken out again.")
+    words.write(made, words.pot_file(tmp_path))
+    told = words.check(tmp_path)
+    assert any("'A number.' is not in nep-studio.pot" in sentence for sentence in told)
+    assert any("'A word that was taken out again.' is in nep-studio.pot" in sentence for sentence in told)
+
+
+def test_the_check_refuses_what_a_hasty_translator_wrote(words, spanish, tmp_path) -> None:
+    told = "\n".join(words.check(tmp_path))
+    for wrong in ("falta uno", "{robto} está mal", "{robot} {", "un mensaje de {who}", "esperar %SEGUNDOS s"):
+        assert f"es: '{wrong}' has not the holes of" in told
+    assert "'un mensaje'" not in told
+
+
+def test_a_wrong_translation_is_english_and_told_once(spanish, caplog) -> None:
+    assert _("wait for {robot}").format(robot="Pepper") == "esperar a Pepper"
+    for english in ("one hole is missing: {robot}", "one is wrong: {robot}", "one has braces: {robot}"):
+        with caplog.at_level(logging.WARNING):
+            caplog.clear()
+            assert _(english).format(robot="Pepper") == english.format(robot="Pepper")
+            assert _(english) == english
+        assert len(caplog.records) == 1
+    assert pgettext("block", "wait %SECONDS s") == "wait %SECONDS s"
+
+
+def test_plural_forms_and_contexts(spanish) -> None:
+    said = [ngettext("a message", "{count} messages", count).format(count=count) for count in (0, 1, 2)]
+    assert said == ["0 mensajes", "un mensaje", "2 mensajes"]
+    many = ngettext("{count} message from {who}", "{count} messages from {who}", 2)
+    assert many.format(count=2, who="a") == "2 mensajes de a"
+    assert pgettext("verb", "record") == "grabar"
+    assert pgettext("noun", "record") == "récord"
+    assert pgettext("neither", "record") == "record"
+
+
+def test_a_constant_follows_the_language_that_is_chosen_later(words, tmp_path, spanish) -> None:
+    constant = lazy("wait for {robot}")
+    assert _(constant) == "esperar a {robot}"
+    install("en", tmp_path)
+    assert _(constant) == "wait for {robot}"
+
+
+def test_lists_numbers_and_days(spanish) -> None:
+    assert listed(["a", "b", "c", "d"]) == "a, b, c y d"
+    assert listed(["a", "b"], "or") == "a o b"
+    assert number(1234.5, ",.1f") == "1,234.5"  # as in most of Latin America
+    assert i18n.day_text(3, 11) == "3 de noviembre"
+    assert i18n.day_text(3, 11, 2026) == "3 de noviembre de 2026"
+    install("en")
+    assert [listed(list(names)) for names in ("", "a", "ab", "abcd")] == ["", "a", "a and b", "a, b, c and d"]
+    assert i18n.day_text(3, 11, 2026) == "3 November 2026"
+
+
+def test_numbers_with_the_signs_of_another_language(monkeypatch, tmp_path, words) -> None:
+    monkeypatch.setattr(words, "FORMATS", {"es": "es_ES"})
+    words.po_file(tmp_path, "es").parent.mkdir(parents=True)
+    words.po_file(tmp_path, "es").write_text(PO, encoding="utf-8")
+    words.write(words.Catalog(), words.pot_file(tmp_path))
+    words.compile_all(tmp_path)
+    install("es", tmp_path)
+    assert number(1234.5, ",.1f") == "1.234,5"
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\xde\x12\x04\x95", b"\xde\x12\x04\x95" + b"\xff" * 40, b"words" * 20]
+)
+def test_a_damaged_catalogue_is_english(data, spanish, tmp_path, caplog) -> None:
+    (tmp_path / "es" / "LC_MESSAGES" / "nep-studio.mo").write_bytes(data)
+    install("es", tmp_path)
+    assert i18n.language() == "en"
+    assert _("wait for {robot}") == "wait for {robot}"
+    assert "can't be read" in caplog.text
+
+
+def test_which_language() -> None:
+    assert i18n.system_language({"LANG": "es_MX.UTF-8"}) == "es_MX.UTF-8"
+    assert i18n.system_language({"LANGUAGE": "es:en", "LANG": "C.UTF-8"}) == "es"
+    assert i18n.system_language({"LC_ALL": "C.UTF-8", "LANG": "es_MX"}) == "en"
+    assert i18n.system_language({}, "linux") == "en"
+    assert [i18n.best_match(name) for name in ("es-419", "ES", "xx_YY", "", "qps")] == [
+        "es",
+        "es",
+        "en",
+        "en",
+        "qps",
+    ]
+
+
+def test_nep_lang_comes_before_what_was_chosen(monkeypatch) -> None:
+    monkeypatch.setenv("NEP_LANG", "en")
+    i18n.begin("es")
+    assert i18n.language() == "en"
+
+
+def test_the_pseudo_language_is_offered_only_while_it_is_used() -> None:
+    install("en")
+    assert "qps" not in dict(i18n.offered())
+    assert dict(i18n.offered())["en"] == "English"
+    install("qps")
+    assert "qps" in dict(i18n.offered())
+
+
+def test_pseudo_words_are_longer_and_keep_what_is_no_word(words) -> None:
+    made = words.pseudo("Run {robot} with `nep master`, %SECONDS s")
+    assert made.startswith("[Řúñ {robot} ŵíťĥ `nep master`, %SECONDS š ~")
+    assert made.endswith("~]")
+    assert len(made) > 1.3 * len("Run {robot} with `nep master`, %SECONDS s")
+    assert words.pseudo("{robot} waits")[:3] == "[~{"
+
+
+def test_every_word_of_the_toolbox_is_translated(pseudo) -> None:
+    for category in categories():
+        assert is_pseudo(category.title)
+        for described in category.blocks:
+            for text in (described.text, described.tooltip, described.help):
+                assert not text or is_pseudo(text), (described.type, text)
+    told = editor_definitions([robot()])
+    contents = told["toolbox"]["contents"]  # type: ignore[index]
+    assert all(is_pseudo(each["name"]) for each in contents if each["kind"] != "robotHeading")
+
+
+def test_every_help_of_a_block_is_translated(pseudo) -> None:
+    for described in Catalogue([]).blocks.values():
+        told = help_of(described)
+        for text in (told["does"], told["more"], told["example"], *(words for _name, words in told["gaps"])):
+            assert not text or is_pseudo(text) or "[" in text, (described.type, text)
+        for name, _words in told["gaps"]:
+            assert is_pseudo(name), (described.type, name)
+
+
+def test_a_translated_block_is_found_by_its_english_words_too(pseudo) -> None:
+    found = {described.type: described for category in categories() for described in category.blocks}
+    assert "array" in found["lists_empty"].words
+    assert found["lists_empty"].words[-1].startswith("[")
+
+
+def test_types_and_python_stay(pseudo) -> None:
+    translated = {described.type: described.python for each in categories() for described in each.blocks}
+    install("en")
+    assert translated == {
+        described.type: described.python for each in categories() for described in each.blocks
+    }
+
+
+def test_the_library_does_not_ask_for_words_it_does_not_need() -> None:
+    """In English neither gettext's file nor the list of languages is read."""
+    code = "import sys, nep, nep.errors; from nep.i18n import _; _('x'); print('gettext' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

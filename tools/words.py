@@ -1,0 +1,379 @@
+"""The words of Studio and of `nep` in every language: nep/locale (docs/translate.md tells the way).
+
+    python tools/words.py update     after a sentence changed: .pot, .po and .mo follow the sources
+    python tools/words.py extract    only the list of all sentences, nep/locale/nep-studio.pot
+    python tools/words.py compile    only what programs read: .mo, languages.json, and the pseudo-language
+    python tools/words.py add fr     begin a language
+    python tools/words.py check      0 when all of it fits together, else 1 and a sentence for each thing
+
+Update keeps every translation whose English is still there. Only this and translators write into nep/locale.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime as dt
+import io
+import json
+import math
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from babel import Locale
+from babel.messages import Catalog
+from babel.messages.extract import extract_from_file
+from babel.messages.mofile import read_mo, write_mo
+from babel.messages.pofile import read_po, write_po
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from app.blocks.categories.robot import GROUPS  # noqa: E402 - this file is started by its path
+from app.blocks.toolbox.catalogue import english_categories, has_words  # noqa: E402
+from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap  # noqa: E402
+from nep.i18n import DOMAIN, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402
+
+KEYWORDS = {
+    "_": None,
+    "gettext": None,
+    "lazy": None,
+    "t": None,
+    "ngettext": (1, 2),
+    "pgettext": ((1, "c"), 2),
+}
+SOURCES = (
+    ("nep", "*.py", "python"),
+    ("app", "*.py", "python"),
+    ("app/blocks/editor/src", "*.ts", "javascript"),
+)
+FOREIGN = (
+    "Aborted!", "Aborted.", "Arguments", "Commands", "Error", "Missing command.",
+    "No such command {name!r}.", "Options", "Show this message and exit.",
+    "Try [blue]'{command_path} {help_option}'[/] for help.", "[default: {}]", "[required]",
+    "options", "positional arguments", "show this help message and exit", "usage: ",
+)  # fmt: skip
+"""What typer and argparse say themselves, by gettext too."""
+FORMATS = {"es": "es_419"}
+"""Languages whose numbers are written as in another place than the language's own name says."""
+_MADE = dt.datetime(2026, 11, 22, tzinfo=dt.timezone.utc)
+"""In every header: a real date would make a new file of the same words."""
+_HEADER = "# All sentences of NEP Studio; made by tools/words.py (docs/translate.md)."
+_MARKUP = re.compile(r"\[/?[a-z][a-z ]*\]|</?[a-z]+>|`[^`]*`")
+_KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Z][A-Z0-9_]*|%(?:\(\w+\))?[sdr]|{_MARKUP.pattern}")
+_ACCENTS = str.maketrans(
+    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
+    "áƀçđéƒğĥíĵķłḿñóþǫřšťúṽŵẋýžÁƁÇĐÉƑĞĤÍĴĶŁḾÑÓÞǪŘŠŤÚṼŴẊÝŽ",
+)
+
+
+class Key(NamedTuple):
+    """What a translator's entry is known by."""
+
+    context: str | None
+    ids: tuple[str, ...]
+
+
+# ---- the sentences in the sources -----------------------------------------------------------------
+
+
+def template(root: Path = ROOT) -> Catalog:
+    """All sentences that the sources have."""
+    made = Catalog(project="NEP Studio", creation_date=_MADE, header_comment=_HEADER, fuzzy=False)
+    for folder, pattern, method in SOURCES:
+        for path in sorted((root / folder).rglob(pattern)):
+            if "node_modules" in path.parts or path == root / "nep" / "i18n.py":
+                continue
+            for _line, found, comments, context in extract_from_file(
+                method, path, keywords=KEYWORDS, comment_tags=("Translators:",), strip_comment_tags=True
+            ):
+                ids = tuple(found) if isinstance(found, (list, tuple)) else (found,)
+                place = path.relative_to(root).as_posix()
+                made.add(_id(ids), locations=[(place, 0)], auto_comments=comments, context=context)
+    for english in FOREIGN:
+        made.add(english, locations=[("typer", 0)])
+    for context, english, place in sentences_of_blocks():
+        made.add(english, locations=[(place, 0)], context=context)
+    return made
+
+
+def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
+    """(context, English, its file) of what stands in the descriptions of blocks, not in calls of `_`."""
+    found: dict[tuple[str | None, str], str] = {}
+    for category in english_categories():
+        place = f"app/blocks/categories/{category.name}.py"
+
+        def say(context: str | None, english: str, place: str = place) -> str:
+            if has_words(english):
+                found.setdefault((context, english), place)
+            return english
+
+        category.translated(say)
+        for block in category.blocks:
+            for argument in block.arguments:
+                say("gap", english_name_of_gap(argument))
+    for title in GROUPS:
+        found.setdefault(("category", title), "app/blocks/categories/robot.py")
+    for example in EXAMPLES.values():
+        found.setdefault((None, example), "app/blocks/toolbox/help.py")
+    for (context, english), place in found.items():
+        yield context, english, place
+
+
+def keys(catalog: Catalog) -> set[Key]:
+    """The entries of a catalogue, without its header."""
+    return {Key(each.context or None, _ids(each.id)) for each in catalog if each.id}
+
+
+def _id(ids: Sequence[str]) -> str | tuple[str, ...]:
+    return ids[0] if len(ids) == 1 else tuple(ids)
+
+
+def _ids(id: str | Sequence[str] | None) -> tuple[str, ...]:
+    return (id or "",) if id is None or isinstance(id, str) else tuple(id)
+
+
+# ---- files ----------------------------------------------------------------------------------------
+
+
+def pot_file(folder: Path) -> Path:
+    """The list of all sentences."""
+    return folder / f"{DOMAIN}.pot"
+
+
+def po_file(folder: Path, language: str) -> Path:
+    """The translations into a language."""
+    return folder / language / "LC_MESSAGES" / f"{DOMAIN}.po"
+
+
+def languages(folder: Path) -> list[str]:
+    """The languages that somebody translates into."""
+    return sorted(path.parents[1].name for path in folder.glob(f"*/LC_MESSAGES/{DOMAIN}.po"))
+
+
+def read(path: Path, language: str | None = None) -> Catalog:
+    """A .po or .pot file."""
+    with path.open("rb") as stream:
+        found: Catalog = read_po(stream, locale=language, domain=DOMAIN)
+    return found
+
+
+def write(catalog: Catalog, path: Path) -> None:
+    """A .po or .pot file, in the order of the English: a change of one sentence is a change of one place."""
+    catalog.creation_date = _MADE
+    for entry in catalog:
+        entry.flags.discard("python-format")  # Babel takes "%A is known" for one
+    held = io.BytesIO()
+    write_po(held, catalog, width=100, sort_output=True, ignore_obsolete=True, include_lineno=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(held.getvalue())
+
+
+def extract(folder: Path = LOCALE) -> Catalog:
+    """Write the list of all sentences."""
+    made = template()
+    write(made, pot_file(folder))
+    return made
+
+
+def update(folder: Path = LOCALE) -> None:
+    """Make everything follow the sources."""
+    made = extract(folder)
+    for language in languages(folder):
+        catalog = read(po_file(folder, language), language)
+        catalog.update(made, no_fuzzy_matching=True)
+        write(catalog, po_file(folder, language))
+    compile_all(folder)
+
+
+def add(language: str, folder: Path = LOCALE) -> None:
+    """Begin a language: all sentences, none translated."""
+    about = f"# NEP Studio in '{language}'; docs/translate.md tells the way."
+    catalog = Catalog(
+        locale=language, header_comment=about, project="NEP Studio", creation_date=_MADE, fuzzy=False
+    )
+    catalog.update(read(pot_file(folder)))
+    write(catalog, po_file(folder, language))
+
+
+def compile_all(folder: Path = LOCALE) -> None:
+    """Write what programs read: each language, the pseudo-language, and what is known of them."""
+    known: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
+    pot = read(pot_file(folder))
+    for language in languages(folder):
+        catalog = read(po_file(folder, language), language)
+        known[language] = facts(language, catalog)
+        _write_mo(catalog, po_file(folder, language).with_suffix(".mo"))
+    _write_mo(pseudo_catalog(pot), po_file(folder, PSEUDO).with_suffix(".mo"))
+    (folder / "languages.json").write_text(
+        json.dumps(known, ensure_ascii=False, indent=1, sort_keys=True) + "\n", encoding="utf-8"
+    )
+
+
+def _write_mo(catalog: Catalog, path: Path) -> None:
+    catalog.creation_date = _MADE
+    held = io.BytesIO()
+    write_mo(held, catalog)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(held.getvalue())
+
+
+def facts(language: str, catalog: Catalog) -> dict[str, object]:
+    """What a language needs beside its sentences, from Unicode's CLDR: it is asked here, not by programs."""
+    locale = Locale.parse(FORMATS.get(language, language))
+    entries = [each for each in catalog if each.id]
+    signs = locale.number_symbols["latn"]
+    day, with_year = (locale.datetime_skeletons[name].pattern for name in ("MMMMd", "yMMMMd"))
+    return {
+        "name": (locale.get_language_name() or language).capitalize(),
+        "share": round(sum(is_done(each.string) for each in entries) / max(1, len(entries)), 3),
+        "decimal": signs["decimal"],
+        "group": signs["group"],
+        "and": _pattern(locale, "standard"),
+        "or": _pattern(locale, "or"),
+        "months": [locale.months["format"]["wide"][number] for number in range(1, 13)],
+        "day": _date(day),
+        "day_of_year": _date(with_year),
+    }
+
+
+def _pattern(locale: Locale, kind: str) -> dict[str, str]:
+    return {name: locale.list_patterns[kind][name] for name in ("2", "start", "middle", "end")}
+
+
+def _date(pattern: str) -> str:
+    """`d 'de' MMMM` as "{day} de {month}"."""
+    return re.sub(r"'([^']*)'|(y+)|(M+)|(d+)", _date_part, pattern)
+
+
+def _date_part(found: re.Match[str]) -> str:
+    if found[1] is not None:
+        return str(found[1])
+    return "{year}" if found[2] else "{month}" if found[3] else "{day}"
+
+
+def is_done(string: str | Sequence[str] | None) -> bool:
+    """Whether every form is there."""
+    return all(_ids(string)) and bool(string)
+
+
+# ---- the pseudo-language --------------------------------------------------------------------------
+
+
+def pseudo_catalog(pot: Catalog) -> Catalog:
+    """Every sentence in the pseudo-language."""
+    made = Catalog(project="NEP Studio", creation_date=_MADE, fuzzy=False)
+    for entry in pot:
+        if entry.id:
+            forms = tuple(pseudo(each) for each in _ids(entry.id))
+            made.add(entry.id, _id(forms), context=entry.context)
+    return made
+
+
+def pseudo(english: str) -> str:
+    """`[Ŕúñ ~~]`: a third longer, in brackets, its letters with accents; holes and markup as they were."""
+    pieces, at = [], 0
+    for found in _KEPT.finditer(english):
+        pieces += [english[at : found.start()].translate(_ACCENTS), found.group()]
+        at = found.end()
+    pieces.append(english[at:].translate(_ACCENTS))
+    text = "".join(pieces)
+    # "[" before a hole or a command would be markup for what prints it, once the hole is filled.
+    begin = "[" if text[:1] and text[0] not in "{%[`<" else "[~"
+    return f"{begin}{text} {'~' * max(1, math.ceil(0.35 * len(english)))}]"
+
+
+# ---- the check ------------------------------------------------------------------------------------
+
+
+def check(folder: Path = LOCALE) -> list[str]:
+    """A sentence for each thing that does not fit together."""
+    made, pot = template(), read(pot_file(folder))
+    wrong = [
+        f"'{_shown(key)}' is {place}; run 'python tools/words.py update'"
+        for place, found in (
+            (f"not in {DOMAIN}.pot", keys(made) - keys(pot)),
+            (f"in {DOMAIN}.pot, but no longer in the sources", keys(pot) - keys(made)),
+        )
+        for key in sorted(found, key=str)
+    ]
+    known = _read_json(folder / "languages.json")
+    for language in languages(folder):
+        path = po_file(folder, language)
+        catalog = read(path, language)
+        wrong += [f"{language}: {sentence}" for sentence in _wrong_entries(catalog)]
+        if keys(catalog) != keys(pot):
+            wrong.append(f"{language}: its sentences are not those of the .pot; run 'tools/words.py update'")
+        if _told(catalog) != _compiled(path.with_suffix(".mo")) or known.get(language) != facts(
+            language, catalog
+        ):
+            wrong.append(f"{language}: compiled from other words; run 'python tools/words.py compile'")
+    return wrong
+
+
+def _wrong_entries(catalog: Catalog) -> Iterator[str]:
+    for entry in catalog:
+        if not entry.id:
+            continue
+        key = Key(entry.context, _ids(entry.id))
+        if entry.fuzzy:
+            yield f"'{_shown(key)}' is marked as fuzzy"
+        for form in filter(None, _ids(entry.string)):
+            if holes(form) not in [holes(each) for each in key.ids]:
+                yield f"'{form}' has not the holes of '{_shown(key)}'"
+            if sorted(_MARKUP.findall(form)) not in [sorted(_MARKUP.findall(each)) for each in key.ids]:
+                yield f"'{form}' has not the markup of '{_shown(key)}'"
+
+
+def _told(catalog: Catalog) -> dict[Key, tuple[str, ...]]:
+    return {
+        Key(each.context or None, _ids(each.id)): _ids(each.string)
+        for each in catalog
+        if each.id and is_done(each.string)
+    }
+
+
+def _compiled(path: Path) -> dict[Key, tuple[str, ...]]:
+    if not path.is_file():
+        return {}
+    with path.open("rb") as stream:
+        return _told(read_mo(stream))
+
+
+def _read_json(path: Path) -> Mapping[str, object]:
+    found: Mapping[str, object] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return found
+
+
+def _shown(key: Key) -> str:
+    return key.ids[0] if len(key.ids[0]) <= 60 else f"{key.ids[0][:60]}…"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Do it; 1 when a check found something."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("command", choices=["update", "extract", "compile", "add", "check"])
+    parser.add_argument("language", nargs="?", help="for add: such as fr or pt_BR")
+    options = parser.parse_args(arguments)
+    if options.command == "add":
+        if not options.language:
+            parser.error("add needs a language")
+        add(options.language)
+    found = check() if options.command == "check" else []
+    if options.command in {"update", "add"}:
+        update()
+    elif options.command == "extract":
+        extract()
+    elif options.command == "compile":
+        compile_all()
+    for sentence in found:
+        print(f"words: {sentence}", file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
