@@ -12,7 +12,7 @@ from PySide6.QtCore import QCoreApplication, QEventLoop, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from app.ui.blockly.scheme import register_scheme
-from app.ui.panels import alerts, camera, health, problems, robot, sensors
+from app.ui.panels import alerts, camera, doctor, health, problems, robot, sensors
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour import panel as behaviour
 from app.ui.panels.console import panel as console
@@ -33,6 +33,7 @@ SIZES: dict[str, tuple[Panel, int, int, str]] = {
     "console": (console.PANEL, 446, 222, "compact"),
     "nodes": (nodes.PANEL, 446, 260, "compact"),
     "alerts": (alerts.PANEL, 446, 222, "compact"),
+    "doctor": (doctor.PANEL, 446, 400, "compact"),
     "robot": (robot.PANEL, 384, 327, "comfortable"),
     "camera": (camera.PANEL, 384, 275, "comfortable"),
     "sensors": (sensors.PANEL, 384, 250, "comfortable"),

@@ -33,7 +33,7 @@ def test_alerts_come_the_worst_first_and_go_when_they_are_cured(panel, window) -
     alerts = window.session.alerts
     alerts.put("silent:/cam", "warn", "The camera has been silent for 4 s.")
     panel.refresh()
-    assert [row.alert.severity for row in panel.rows] == ["error", "warn"]
+    assert [alert.severity for alert in panel.shown] == ["error", "warn"]
     assert not panel.rows[1].button.isVisibleTo(panel)
     alerts.cure("message:/faces")
     panel.refresh()

@@ -29,7 +29,8 @@ def panel(qtbot, window) -> DoctorPanel:
 
 def test_it_looks_when_it_is_first_seen_and_shows_the_worst_first(panel, window) -> None:
     assert window.session.calls == [("look",)]
-    assert [row.finding for row in panel.rows] == list(FOUND)
+    assert panel.shown == list(FOUND)
+    assert len(panel.rows) == len(FOUND)
     assert panel.rows[0].accessibleName().startswith("error: Port 7780 is held by")
     assert panel.chip.accessibleName() == "2"
     panel.refresh()
@@ -57,7 +58,7 @@ def test_studio_starts_the_master_and_looks_again_when_it_is_there(qtbot, panel,
     window.session.doctor.found = (Finding("master", "ok", "A master runs."),)
     window.session.master = SimpleNamespace(kind="searching", address="127.0.0.1:7780", sentence="")
     panel.refresh()
-    assert [each.finding.id for each in panel.rows] == ["master"]
+    assert [each.id for each in panel.shown] == ["master"]
     assert panel.chip.accessibleName() == "all is well"
 
 

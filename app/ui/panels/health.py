@@ -6,16 +6,16 @@ import time
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.robots.health_facts import HealthFact, facts_of
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text.numbers import age_words
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Scrolled, label, paint
+from app.ui.widgets.indicators import StatusIcon
 
 if TYPE_CHECKING:
     from app.core.network.watches import Look, Watch
@@ -24,33 +24,7 @@ if TYPE_CHECKING:
 TITLE_WIDTH = 96
 BESIDE_FROM = 300
 ROW = {"compact": 22, "comfortable": 28}
-ICON = 18
 TEXT = {"compact": "body", "comfortable": "bodyLarge"}
-
-
-class StatusIcon(QWidget):
-    """How one thing is, as an icon; words beside it say the same."""
-
-    def __init__(self, theme: Theme, height: int) -> None:
-        """``height`` of the line of words beside it."""
-        super().__init__()
-        self._theme, self._status, self._height = theme, "off", height
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-
-    def set(self, status: str) -> None:
-        """Show another status."""
-        if status != self._status:
-            self._status = status
-            self.update()
-
-    def sizeHint(self) -> QSize:
-        return QSize(round(self._theme.scaled(ICON)), self._height)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        look, painter = self._theme.status(self._status), QPainter(self)
-        square = QRectF(0, (self.height() - self.width()) / 2, self.width(), self.width())
-        paint_icon(painter, square, look.icon, self._theme.colour(look.colour))
-        painter.end()
 
 
 class HealthRow(QWidget):
@@ -65,7 +39,7 @@ class HealthRow(QWidget):
         line = paint.height_of(theme.font(TEXT[density]))
         space = round(max(1.0, (theme.scaled(ROW[density]) - line) / 2))
         self._space = space
-        self.icon = StatusIcon(theme, round(line) + 2 * space)
+        self.icon = StatusIcon(theme, height=round(line) + 2 * space)
         self._said = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._said.setSpacing(10)
         self._said.addWidget(self.title, 0, Qt.AlignmentFlag.AlignTop)

@@ -20,10 +20,10 @@ from app.core.documents.problems import Listed, Mend, listed
 from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text import plain
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, Scrolled, label, paint
 from app.ui.widgets.cards import Tile
+from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.keyboard import is_pressed_key
 from app.ui.widgets.labels import BoldInLine
 
@@ -34,23 +34,6 @@ STATUS = {"error": "error", "warning": "warn", "info": "info"}
 PLURAL = {"error": ("error", "errors"), "warning": ("warning", "warnings"), "info": ("hint", "hints")}
 MOST_ROWS = 60
 NOTHING = "Nothing to mend.\nProblems appear here while you build."
-
-
-class StatusIcon(QWidget):
-    """The icon of a status, with its word for those who can't see it."""
-
-    def __init__(self, theme: Theme, status: str) -> None:
-        super().__init__()
-        self._theme, self._status = theme, status
-        self.setFixedSize(18, 18)
-        self.setAccessibleName({"warn": "warning"}.get(status, status))
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        status = self._theme.status(self._status)
-        role = "text" if self._status == "info" else status.colour
-        painter = QPainter(self)
-        paint_icon(painter, QRectF(self.rect()), status.icon, self._theme.colour(role))
-        painter.end()
 
 
 class ProblemRow(QWidget):
@@ -74,7 +57,8 @@ class ProblemRow(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(14, 0, 8, 0)
         row.setSpacing(10)
-        row.addWidget(StatusIcon(theme, STATUS[problem.severity]))
+        status = STATUS[problem.severity]
+        row.addWidget(StatusIcon(theme, status, ink="text" if status == "info" else ""))
         category = problem.category or "values"
         icon = problem.icon or theme.block_icon(category)
         if problem.category:

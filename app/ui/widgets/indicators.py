@@ -14,11 +14,13 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
 CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
+ICON = 18
 # px at 100 % that a fact keeps where there is too little room for all; its tooltip has the whole
 LEAST_ITEM = 64
 SPARK = QSize(56, 16)
 SPARK_STROKE = 1.25
 BAR_HEIGHT = 6
+SPOKEN = {"warn": "warning"}  # what a screen reader says for the word of a status
 # the status that a chip gives what `RobotLink.state` says
 ROBOT_STATUS = {
     "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
@@ -114,6 +116,34 @@ class Chip(QWidget):
             paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
             left += side + CHIP_GAP
         paint.words(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
+        painter.end()
+
+
+class StatusIcon(QWidget):
+    """The icon of a status beside words that say the same; its name is the status' word."""
+
+    def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, ink: str = "") -> None:
+        """``height`` of the line of words beside it, 0 for the icon's own; ``ink`` instead of the status'."""
+        super().__init__()
+        self._theme, self._status, self._height, self._ink = theme, "", height, ink
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.set(status)
+
+    def set(self, status: str) -> None:
+        """Show another status."""
+        if status != self._status:
+            self._status = status
+            self.setAccessibleName(SPOKEN.get(status, status))
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        side = round(self._theme.scaled(ICON))
+        return QSize(side, self._height or side)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        status, painter = self._theme.status(self._status), QPainter(self)
+        square = QRectF(0, (self.height() - self.width()) / 2, self.width(), self.width())
+        paint_icon(painter, square, status.icon, self._theme.colour(self._ink or status.colour))
         painter.end()
 
 

@@ -13,22 +13,19 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Protocol
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt, Signal
-from PySide6.QtGui import QCursor, QMoveEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QBoxLayout, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
+from PySide6.QtGui import QCursor, QMoveEvent, QResizeEvent
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QWidget
 
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.alert_box import AlertBox
 from app.ui.widgets.buttons import Button, IconButton
 from app.ui.widgets.labels import label
 
 FIGURES = re.compile(r"\d+")
 LEAST_HEIGHT = 52
-ICON = 20
 STEP_ICONS = {"help.doctor": "stethoscope", "robots.virtual": "bot", "file.open": "folder-open"}
-LEAST_WORDS = 360  # px at 100 % that a sentence has beside its buttons
-BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 FRESH_S = 0.5
 """So long after it came under a mouse the banner lets a press through to what was there before."""
 
@@ -61,8 +58,11 @@ class AlertLike(Protocol):
         """The next step's name in the table of actions."""
 
 
-class Banner(QWidget):
+class Banner(AlertBox):
     """Icon, a bold sentence, a plain one, one button with the next step, perhaps a second one, and close."""
+
+    icon_side, icon_left, left, high, gap = 20, 16, 48, 8, 8
+    least_words = 360
 
     pressed = Signal()
     second_pressed = Signal()
@@ -71,9 +71,7 @@ class Banner(QWidget):
     mouse_left = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self._status = "error"
+        super().__init__(theme)
         self.setMinimumHeight(LEAST_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._words = ("", "")
@@ -85,15 +83,9 @@ class Banner(QWidget):
         self.button = Button(theme, "", size="form")
         self.second = Button(theme, "", size="form")
         self.close_button = IconButton(theme, "x", "Close this message", size=32)
-        self._whole = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        self._whole.setContentsMargins(16 + ICON + 12, 8, 12, 8)
-        self._whole.setSpacing(8)
-        self._whole.addWidget(self.words, 1)
-        self._row = QHBoxLayout()
-        self._row.setSpacing(8)
+        self.text_column.addWidget(self.words)
         for widget in (self.more, self.second, self.button, self.close_button):
-            self._row.addWidget(widget)
-        self._whole.addLayout(self._row)
+            self.button_row.addWidget(widget)
         self.button.clicked.connect(self.pressed)
         self.second.clicked.connect(self.second_pressed)
         self.more.clicked.connect(self.more_pressed)
@@ -112,7 +104,7 @@ class Banner(QWidget):
     ) -> None:
         """Say what is wrong; ``others`` counts the alerts that wait behind this one."""
         self.button.icon_name = icon
-        self._status = status
+        self.set_status(status)
         self._words = (title, detail)
         self._write()
         spoken = f"{title} {detail}".strip()
@@ -126,29 +118,10 @@ class Banner(QWidget):
             paint.show_when(widget, bool(text))
         self.more.set_word(f"and {others} more" if others else "")
         paint.show_when(self.more, others > 0)
-        self.update()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self.mouse_left.emit()
-
-    def event(self, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.LayoutRequest:
-            self._fit()
-        return super().event(event)
-
-    def _fit(self) -> None:
-        """Large or long words: the buttons go below them."""
-        beside = self.width() - self._row.sizeHint().width() >= self._theme.scaled(LEAST_WORDS)
-        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
-        if self._whole.direction() != wanted:
-            self._whole.setDirection(wanted)
-            right = Qt.AlignmentFlag.AlignRight
-            self._whole.setAlignment(self._row, Qt.AlignmentFlag(0) if beside else right)
 
     def _write(self) -> None:
         title, detail = (escape(words) for words in self._words)
@@ -157,16 +130,8 @@ class Banner(QWidget):
             f'<span style="font-weight:600">{title}</span> <span style="color:{quiet}">{detail}</span>'
         )
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme = self._theme
-        status = theme.status(self._status)
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
-        edge = theme.colour(BORDERS.get(self._status, "borderStrong"))
-        paint.box(painter, rect, theme.radius("panel"), theme.colour(status.tint or "panel"), edge)
-        square = QRectF(16, rect.center().y() - ICON / 2, ICON, ICON)
-        paint_icon(painter, square, status.icon, theme.colour(status.colour))
-        painter.end()
+    def icon_top(self) -> float:
+        return (self.height() - self.icon_side) / 2
 
 
 class BannerPlace(QWidget):
