@@ -46,7 +46,7 @@ NODES = """
 import os, sys, time, zmq
 from nep.backends.zeromq.master_session import Pace
 from nep.protocol.encoding import decode_answer, encode_request
-from nep.protocol.records import (NodeRecord, PublisherCount, PublisherRecord,
+from nep.protocol.requests import (NodeRecord, PublisherCount, PublisherRecord,
     SubscriberCount, SubscriberRecord)
 from nep.protocol.requests import Found, Join, Renew, Renewed
 count, topics = int(sys.argv[1]), int(sys.argv[2])

@@ -5,6 +5,8 @@ import nep
 node = nep.node("python_sender")
 pub = node.new_pub("example", "json")
 pub.publish({"message": "hello"})
+
+Its public names are in `nep.public`, which is imported when any of them is first asked for.
 """
 
 import importlib
@@ -13,104 +15,8 @@ TYPE_CHECKING = False
 """As `typing` has it, whose import would take ten times as long as this module."""
 
 if TYPE_CHECKING:
-    from nep.backends.connection import Configuration, Direct, Hybrid
-    from nep.errors import (
-        AddressInUseError,
-        BackendUnavailableError,
-        BadNameError,
-        BadTopicError,
-        ClosedError,
-        DecodeError,
-        EncodeError,
-        MasterUnreachable,
-        NepError,
-        RequestRefusedError,
-        TooManyFilesError,
-        UnknownBackendError,
-        WaitTimeoutError,
-    )
-    from nep.masters.graph import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
-    from nep.masters.master import Master, is_running, master_address, start_process
-    from nep.messages.encoded import Encoded
-    from nep.messages.image_codec import raw_image
-    from nep.messages.message import Message
-    from nep.nodes.node import Node
-    from nep.nodes.publisher import Publisher, Subscriber
-    from nep.version import __version__
-
-    node = Node
-    """A node; see `Node`. The paper's spelling."""
-
-    master = Master
-    """A master; see `Master`."""
-
-__all__ = [
-    "AddressInUseError",
-    "Alert",
-    "BackendUnavailableError",
-    "BadNameError",
-    "BadTopicError",
-    "ClosedError",
-    "Configuration",
-    "DecodeError",
-    "Direct",
-    "EncodeError",
-    "Encoded",
-    "GraphView",
-    "Hybrid",
-    "Master",
-    "MasterUnreachable",
-    "Message",
-    "NepError",
-    "Node",
-    "NodeInfo",
-    "Publisher",
-    "PublisherInfo",
-    "RequestRefusedError",
-    "Subscriber",
-    "SubscriberInfo",
-    "TooManyFilesError",
-    "TopicInfo",
-    "UnknownBackendError",
-    "WaitTimeoutError",
-    "__version__",
-    "is_running",
-    "master",
-    "master_address",
-    "node",
-    "raw_image",
-    "start_process",
-]
-
-_FROM = {
-    "nep.backends.connection": ("Configuration", "Direct", "Hybrid"),
-    "nep.messages.encoded": ("Encoded",),
-    "nep.errors": (
-        "AddressInUseError",
-        "BackendUnavailableError",
-        "BadNameError",
-        "BadTopicError",
-        "ClosedError",
-        "DecodeError",
-        "EncodeError",
-        "MasterUnreachable",
-        "NepError",
-        "RequestRefusedError",
-        "TooManyFilesError",
-        "UnknownBackendError",
-        "WaitTimeoutError",
-    ),
-    "nep.masters.graph": ("Alert", "GraphView", "NodeInfo", "PublisherInfo", "SubscriberInfo", "TopicInfo"),
-    "nep.messages.image_codec": ("raw_image",),
-    "nep.masters.master": ("Master", "is_running", "master_address", "start_process"),
-    "nep.messages.message": ("Message",),
-    "nep.nodes.node": ("Node",),
-    "nep.nodes.publisher": ("Publisher", "Subscriber"),
-    "nep.version": ("__version__",),
-}
-"""The imports above, for `_imported`."""
-
-_PAPER = {"node": "Node", "master": "Master"}
+    from nep.public import *  # noqa: F403 - the names are told once, there
+    from nep.version import __version__ as __version__
 
 
 def _imported(name: str) -> object:
@@ -120,31 +26,32 @@ def _imported(name: str) -> object:
     does before it imports the rest. All at once: a program that has opened all the files that it may, or has
     left its folder, must not find a part of nep missing an hour later. Raises `AttributeError`.
     """
-    if name in __all__ and name != "__version__":
-        for module, names in _FROM.items():
-            loaded = importlib.import_module(module)
-            globals().update({each: getattr(loaded, each) for each in names})
-        globals().update({paper: globals()[known] for paper, known in _PAPER.items()})
-        return globals()[name]
-    found = importlib.import_module("nep.version").__version__ if name == "__version__" else _submodule(name)
-    globals()[name] = found
-    return found
+    if name == "__version__":
+        globals()[name] = importlib.import_module("nep.version").__version__
+    elif name == "__all__" or not (name.startswith("_") or _is_submodule(name)):
+        public = vars(importlib.import_module("nep.public"))
+        names = {each: public[each] for each in public if not each.startswith("_")}
+        globals().update(names, __all__=[*sorted(names), "__version__"])
+    if name not in globals():
+        raise AttributeError(f"module 'nep' has no attribute '{name}'")
+    return globals()[name]
 
 
-def _submodule(name: str) -> object:
-    """`nep.errors` and the like, which `import nep` alone has always given."""
+def _is_submodule(name: str) -> bool:
+    """Whether it is `nep.errors` or the like, which `import nep` alone has always given; it is imported."""
     whole = f"nep.{name}"
     try:
-        if not name.startswith("_"):
-            return importlib.import_module(whole)
+        importlib.import_module(whole)
     except ModuleNotFoundError as error:
         if error.name != whole:
             raise
-    raise AttributeError(f"module 'nep' has no attribute '{name}'")
+        return False
+    return True
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    _imported("__all__")
+    return sorted(globals())
 
 
 if not TYPE_CHECKING:  # which would take any name for one of ours

@@ -17,6 +17,8 @@
     │   └── WireError               parts that are no message of the native wire
     └── RecordingError          a recording cannot be written or read
 
+Beside them `WrongTypeError`, for an argument that is refused at the call.
+
 Every sentence is lower case, without full stop, with values in quotes and the next step after a semicolon.
 """
 
@@ -44,6 +46,7 @@ __all__ = [
     "UnknownBackendError",
     "WaitTimeoutError",
     "WireError",
+    "WrongTypeError",
     "did_you_mean",
 ]
 
@@ -229,3 +232,7 @@ class RecordingError(NepError):
         self.path = path
         self.reason = reason
         super().__init__(f"cannot use the recording '{path}'; {reason}")
+
+
+class WrongTypeError(TypeError, ValueError):
+    """An argument of a wrong type: a `ValueError` as every wrong argument, and what Python calls it."""

@@ -18,7 +18,7 @@ from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.messages.queue import MAX_BYTES, MAX_MESSAGES, Keep
 from nep.protocol.graph_view import GraphView
-from nep.protocol.records import NodeRecord
+from nep.protocol.requests import NodeRecord
 
 __all__ = [
     "HANDSHAKE_S",
@@ -42,7 +42,7 @@ Sink = Callable[[Sequence[Message]], None]
 class PublisherSpec:
     """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit.
 
-    `number` proves the id: see `nep.protocol.registration`.
+    `number` proves the id: see `nep.protocol.requests.is_proven`.
     """
 
     id: int

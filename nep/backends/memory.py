@@ -14,12 +14,13 @@ from collections.abc import Sequence
 from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.errors import NepError, RequestRefusedError
-from nep.masters.graph import Graph, GraphView
+from nep.masters.graph import Graph
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message, arrived, kind_of
 from nep.messages.queue import Inbox
 from nep.protocol import requests
-from nep.protocol.records import (
+from nep.protocol.graph_view import GraphView
+from nep.protocol.requests import (
     NodeRecord,
     PublisherCount,
     PublisherRecord,

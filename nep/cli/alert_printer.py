@@ -6,9 +6,9 @@ import logging
 from collections.abc import Sequence
 
 from nep.cli.screen import console, show_alerts
-from nep.masters.graph import Alert, GraphView
 from nep.masters.master import Master
 from nep.nodes.node import Node
+from nep.protocol.graph_view import Alert, GraphView
 from nep.system.terminal import Terminal
 from nep.text import escaped
 

@@ -15,8 +15,8 @@ import typer
 from nep.cli.fields import leaves
 from nep.cli.graphs import look
 from nep.errors import NepError
-from nep.masters.graph import GraphView
 from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
 from nep.system.addresses import host_of, master_address
 
 _ASK_S = 0.4

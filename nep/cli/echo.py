@@ -21,7 +21,7 @@ from nep.cli.table_file import Fields, Table
 from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
 from nep.messages.message import Message
-from nep.nodes.publisher import Subscriber
+from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
 

@@ -9,8 +9,8 @@ from contextlib import suppress
 
 from nep.cli.screen import say
 from nep.errors import NepError, did_you_mean
-from nep.masters.graph import GraphView
 from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
 from nep.protocol.wire import check_topic
 
 _AGAIN_S = 1.0

@@ -29,7 +29,7 @@ from nep.nodes.log_handler import (
     level_of,
 )
 from nep.nodes.node import Node
-from nep.nodes.publisher import Subscriber
+from nep.nodes.subscriber import Subscriber
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:

@@ -16,9 +16,8 @@ from nep.cli.options import MasterOption
 from nep.cli.screen import console, say
 from nep.errors import AddressInUseError, NepError
 from nep.masters.master import Attachment, Master, is_running
-from nep.system.addresses import host_of, is_loopback, master_address
+from nep.system.addresses import ANY, host_of, is_loopback, master_address, own_addresses
 from nep.system.descriptors import allow_many
-from nep.system.interfaces import ANY, own_addresses
 from nep.system.lazy_import import later
 from nep.system.terminal import Terminal, log_to
 

@@ -10,7 +10,7 @@ import typer
 from nep.cli.graphs import look
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import UNKNOWN, Column, duration, say, show_alerts, show_json, show_table
-from nep.masters.graph import GraphView, NodeInfo
+from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import escaped
 
 app = typer.Typer(no_args_is_help=True, help="The programs that are there.")

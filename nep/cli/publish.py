@@ -15,7 +15,6 @@ from typing import Annotated
 import orjson
 import typer
 
-from nep.arguments import text
 from nep.cli.complete import complete_topic
 from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
@@ -23,6 +22,7 @@ from nep.cli.screen import say, size
 from nep.errors import EncodeError, NepError
 from nep.messages.codecs import CODECS, codec_for
 from nep.messages.encoded import Encoded
+from nep.nodes.arguments import text
 from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import TopicInfo
 

@@ -20,7 +20,7 @@ from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, w
 from nep.errors import WaitTimeoutError
 from nep.messages.message import Message
 from nep.nodes.node import Node
-from nep.nodes.publisher import Subscriber
+from nep.nodes.subscriber import Subscriber
 
 _EVERY_S = 1.0
 _SLICE_S = 0.1

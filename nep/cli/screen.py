@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-    from nep.masters.graph import Alert
+    from nep.protocol.graph_view import Alert
     from nep.system.terminal import Terminal
 
 _GAP = 3

@@ -13,7 +13,7 @@ from nep.cli.publish import publish
 from nep.cli.rates import bw, hz
 from nep.cli.screen import UNKNOWN, Column, rate, say, show_alerts, show_json, show_table, size
 from nep.cli.values import ids_as_text
-from nep.masters.graph import GraphView, TopicInfo
+from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.text import escaped
 
 app = typer.Typer(no_args_is_help=True, help="What is published: list it, look into it, measure it, publish.")

@@ -12,9 +12,9 @@ from nep.gateway.native import Native
 from nep.gateway.portmap import default_file
 from nep.gateway.processes import SystemProcesses
 from nep.gateway.request_server import Ports
-from nep.masters.graph import Alert, GraphView
 from nep.masters.master import Master
 from nep.nodes.node import Node
+from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import Reply, ReportAlerts, Request
 from nep.system.descriptors import allow_many
 from nep.system.lazy_import import later

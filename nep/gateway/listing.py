@@ -12,14 +12,18 @@ from nep.errors import BadTopicError
 from nep.gateway.processes import load_of
 from nep.gateway.programs import Link, Program
 from nep.gateway.relay import Key
-from nep.protocol.records import (
+from nep.protocol.requests import (
+    Join,
+    Leave,
     NodeRecord,
     PublisherCount,
     PublisherRecord,
+    Renew,
+    Reply,
+    Request,
     SubscriberCount,
     SubscriberRecord,
 )
-from nep.protocol.requests import Join, Leave, Renew, Reply, Request
 from nep.protocol.wire import check_topic
 from nep.system.cpu import CpuLoad
 from nep.text import escaped, shortened

@@ -11,12 +11,13 @@ from nep.gateway.inbox import Inbox
 from nep.gateway.listing import Listing
 from nep.gateway.programs import Program
 from nep.gateway.relay import Key
-from nep.masters.graph import Alert
 from nep.messages import image_codec
 from nep.messages.image_files import examine
 from nep.messages.message import Message
 from nep.nodes.node import Node
-from nep.nodes.publisher import Publisher, Subscriber
+from nep.nodes.publisher import Publisher
+from nep.nodes.subscriber import Subscriber
+from nep.protocol.graph_view import Alert
 from nep.text import escaped
 
 _AGAIN_S = 1.0

@@ -13,38 +13,40 @@ seconds of any clock that does not jump.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
 
 from nep.errors import WireError
-from nep.masters.leases import LEASE_S, Leases
-from nep.masters.outgoing import Outgoing
-from nep.masters.registry import Census, Member
-from nep.masters.renewals import RenewalSaid, same_ids, take_over
-from nep.masters.snapshot import Viewer
-from nep.protocol.graph_view import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
-from nep.protocol.records import Expected, NodeRecord, PublisherRecord, SubscriberRecord
-from nep.protocol.registration import (
+from nep.masters.leases import LEASE_S, Leases, RawRenewal
+from nep.masters.registry import (
     ALL_RECORDS_MAX,
     ALWAYS_ROOM,
     RECORDS_MAX,
+    RegisteredNode,
+    Registry,
     check_record,
     check_request,
-    is_proven,
     records_of,
 )
+from nep.masters.snapshot import GraphViewer
+from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     Added,
     AddPublisher,
     AddSubscriber,
     Done,
+    Expected,
     Found,
     Join,
     Leave,
     Listen,
     Look,
+    NodeRecord,
     Ping,
     Probe,
     PublisherCame,
     PublisherGone,
+    PublisherRecord,
     Push,
     Refused,
     RemovePublisher,
@@ -56,25 +58,51 @@ from nep.protocol.requests import (
     ReportMissing,
     Request,
     Seen,
+    SubscriberRecord,
     TopicPublishers,
+    is_proven,
     node_of,
 )
 
-__all__ = [
-    "LEASE_S",
-    "Alert",
-    "Graph",
-    "GraphView",
-    "NodeInfo",
-    "Outgoing",
-    "PublisherInfo",
-    "SubscriberInfo",
-    "TopicInfo",
-]
+__all__ = ["Graph", "Outgoing", "with_hosts", "without"]
 
 
 _WAITING_MAX = 10_000
 """So many wait while the master learns who is there."""
+
+
+class Outgoing(NamedTuple):
+    """One thing to send: a push to the node `to` (call is None), or the reply to `call` of a connection."""
+
+    to: str
+    answer: Reply | Push
+    call: int | None = None
+
+
+def without(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
+    """`answer` that expects nothing from these nodes: they turned out to be dead while it was on its way."""
+    if isinstance(answer, Found) and node_ids:
+        return replace(
+            answer, publishers=tuple(each for each in answer.publishers if each.node_id not in node_ids)
+        )
+    if isinstance(answer, Added) and node_ids:
+        return replace(
+            answer,
+            expected=tuple(each for each in answer.expected if each.node_id not in node_ids),
+            hung=tuple(each for each in answer.hung if each.node_id not in node_ids),
+        )
+    return answer
+
+
+def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
+    """`answer` that tells at which addresses the master serves other computers."""
+    if not hosts:
+        return answer
+    if isinstance(answer, Added | Found | Renewed):
+        return replace(answer, hosts=hosts)
+    if isinstance(answer, Seen):
+        return replace(answer, view=replace(answer.view, listens=hosts))
+    return answer
 
 
 class Graph:
@@ -82,9 +110,9 @@ class Graph:
 
     def __init__(self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S) -> None:
         self.epoch = epoch
-        self._census = Census()
-        self._viewer = Viewer(self._census)
-        self._leases = Leases(self._census, lease_s)
+        self._registry = Registry()
+        self._viewer = GraphViewer(self._registry)
+        self._leases = Leases(self._registry, lease_s)
         self._learnt_at = now + learn_s
         self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
 
@@ -93,17 +121,17 @@ class Graph:
     @property
     def revision(self) -> int:
         """Grows with every change of who is there."""
-        return self._census.revision
+        return self._registry.revision
 
     @property
-    def members(self) -> Mapping[str, Member]:
+    def members(self) -> Mapping[str, RegisteredNode]:
         """All nodes that are registered now, by their ids."""
-        return self._census.members
+        return self._registry.members
 
     @property
     def nodes(self) -> tuple[NodeRecord, ...]:
         """All nodes that are registered now."""
-        return tuple(member.node for member in self._census.members.values())
+        return tuple(member.node for member in self._registry.members.values())
 
     def apply(
         self, request: Request, call: int, now: float, sender: str, *, is_foreign: bool = False
@@ -111,7 +139,7 @@ class Graph:
         """Carry out a request of `sender`. What is wrong with it becomes a `Refused`, never an exception.
 
         `is_foreign`: it came from another program over the connection `sender`, which speaks for its own node
-        only; see `nep.protocol.registration`.
+        only; see `nep.masters.registry`.
         """
         out: list[Outgoing] = []
         try:
@@ -151,13 +179,13 @@ class Graph:
     def probes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
         """Probes for those of these nodes that are registered."""
         probe = Probe(self.epoch, self.revision)
-        return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._census.members)
+        return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._registry.members)
 
     def drop(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
         """Unlist nodes that are dead or silent."""
         out: list[Outgoing] = []
         for node_id in node_ids:
-            member = self._census.members.get(node_id)
+            member = self._registry.members.get(node_id)
             if member is not None:
                 self._forget(member, out, is_closed=False)
         return tuple(out)
@@ -166,24 +194,22 @@ class Graph:
         """The whole graph as a value."""
         return self._viewer.view(self.epoch)
 
-    def renew_quickly(self, said: RenewalSaid, now: float, sender: str) -> dict[int, int] | None:
+    def renew_quickly(self, said: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
         """Take over a usual renewal of `sender`; the newest messages of those that the node hears.
 
         None when it has to be applied as a request; it may have been taken over in part.
         """
-        member = self._census.members.get(said.node_id)
-        if member is None or member.route != sender or said.epoch != self.epoch:
+        if said.revision < self._registry.publishers_revision:
             return None
-        if said.revision < self._census.publishers_revision:
-            return None
-        if not take_over(self._census, member, said, now):
+        member = self._renewed_member(said, now, sender)
+        if member is None:
             return None
         self._leases.renew(member, now)
-        return self._census.last_seqs(member)
+        return self._registry.last_seqs(member)
 
-    def node_at(self, route: str) -> Member | None:
+    def node_at(self, route: str) -> RegisteredNode | None:
         """The node that this connection speaks for."""
-        return self._census.speaking.get(route)
+        return self._registry.speaking.get(route)
 
     # ---- who may ask
 
@@ -198,7 +224,7 @@ class Graph:
             self._admit_more(request, len(records))
             return
         node_id = node_of(request)
-        member = None if node_id is None else self._census.members.get(node_id)
+        member = None if node_id is None else self._registry.members.get(node_id)
         if member is not None and member.route != sender and not isinstance(request, Renew):
             raise WireError("a node speaks for itself only")
 
@@ -207,10 +233,10 @@ class Graph:
             raise WireError(f"the node's id '{node.id}' does not come from its key")
         if not node.key and sender != node.id:
             raise WireError("a node needs a key that proves its id, or its id as its routing id; update nep")
-        other = self._census.speaking.get(sender)
+        other = self._registry.speaking.get(sender)
         if other is not None and other.node.id != node.id:
             raise WireError(f"this connection speaks for the node '{other.node.id}' already")
-        known = self._census.members.get(node.id)
+        known = self._registry.members.get(node.id)
         if known is None or known.route == sender:
             return
         if not node.key:
@@ -226,7 +252,7 @@ class Graph:
                 f"the id {record.id} does not come from the node's key and the number {record.number}"
             )
         is_publisher = isinstance(record, PublisherRecord)
-        owners = self._census.publisher_owners if is_publisher else self._census.subscriber_owners
+        owners = self._registry.publisher_owners if is_publisher else self._registry.subscriber_owners
         owner = owners.get(record.id)
         if owner is None or owner.node.id == node.id:
             return
@@ -236,16 +262,16 @@ class Graph:
         if is_publisher:
             self._unlist_publisher(owner, record.id, out)
         else:
-            self._census.remove_subscriber(owner.node.id, record.id)
+            self._registry.remove_subscriber(owner.node.id, record.id)
 
     def _admit_more(self, request: Join | AddPublisher | AddSubscriber, count: int) -> None:
-        census = self._census
-        member = census.members.get(request.node.id)
+        registry = self._registry
+        member = registry.members.get(request.node.id)
         own = 0 if member is None else len(member.publishers) + len(member.subscribers)
         mine = count if isinstance(request, Join) else own + 1
         if mine > max(own, RECORDS_MAX):
             raise WireError(f"a node has {RECORDS_MAX} publishers and subscribers at most")
-        all_ = len(census.publisher_owners) + len(census.subscriber_owners)
+        all_ = len(registry.publisher_owners) + len(registry.subscriber_owners)
         if mine > max(own, ALWAYS_ROOM) and all_ + mine - own > ALL_RECORDS_MAX:
             raise WireError(f"the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most")
 
@@ -263,7 +289,7 @@ class Graph:
         if isinstance(request, Look):
             return Seen(self.epoch, self.revision, self.view())
         if isinstance(request, ReportAlerts):
-            self._census.report_alerts(request.source, request.alerts)
+            self._registry.report_alerts(request.source, request.alerts)
         elif not isinstance(request, Ping | Listen):
             self._note(request, out)
         return Done(self.epoch, self.revision)
@@ -276,17 +302,19 @@ class Graph:
         if isinstance(request, RemovePublisher):
             self._remove_publisher(request, out)
         elif isinstance(request, RemoveSubscriber):
-            self._census.remove_subscriber(request.node_id, request.id)
+            self._registry.remove_subscriber(request.node_id, request.id)
         elif isinstance(request, ReportMissing):
-            self._census.report_missing(request.node_id, request.publisher_id, request.subscriber_ids)
+            self._registry.report_missing(request.node_id, request.publisher_id, request.subscriber_ids)
         else:
-            member = self._census.members.get(request.node_id)
+            member = self._registry.members.get(request.node_id)
             if member is not None:
                 self._forget(member, out, is_closed=True)
 
-    def _meet(self, node: NodeRecord, now: float, sender: str, *, is_managed: bool | None = None) -> Member:
-        member = self._census.meet(node, now, is_managed=is_managed)
-        self._census.bind(member, sender)
+    def _meet(
+        self, node: NodeRecord, now: float, sender: str, *, is_managed: bool | None = None
+    ) -> RegisteredNode:
+        member = self._registry.meet(node, now, is_managed=is_managed)
+        self._registry.bind(member, sender)
         return member
 
     def _add_publisher(self, request: AddPublisher, now: float, sender: str, out: list[Outgoing]) -> Reply:
@@ -295,7 +323,7 @@ class Graph:
         self._place(member, request.publisher, out)
         expected: list[Expected] = []
         hung: list[Expected] = []
-        for other, subscriber in self._census.subscribers_of(request.publisher.topic):
+        for other, subscriber in self._registry.subscribers_of(request.publisher.topic):
             if not other.is_managed:
                 entry = Expected(subscriber.record.id, other.node.id, other.node.name)
                 # Who did not answer this node is not waited for by it; by others when it is late as well.
@@ -306,8 +334,8 @@ class Graph:
     def _add_subscriber(self, request: AddSubscriber, now: float, sender: str, out: list[Outgoing]) -> Reply:
         check_record(request.subscriber)
         member = self._meet(request.node, now, sender)
-        self._census.add_subscriber(member, request.subscriber)
-        found = self._census.publishers_of(request.subscriber.topic)
+        self._registry.add_subscriber(member, request.subscriber)
+        found = self._registry.publishers_of(request.subscriber.topic)
         # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
         out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
         return Found(self.epoch, self.revision, found)
@@ -319,48 +347,68 @@ class Graph:
         member = self._meet(request.node, now, sender, is_managed=request.managed)
         kept = {record.id for record in request.publishers}
         for gone in [known for known in member.publishers if known not in kept]:
-            self._census.remove_publisher(member.node.id, gone)
+            self._registry.remove_publisher(member.node.id, gone)
         kept = {record.id for record in request.subscribers}
         for gone in [known for known in member.subscribers if known not in kept]:
-            self._census.remove_subscriber(member.node.id, gone)
+            self._registry.remove_subscriber(member.node.id, gone)
         for subscriber in request.subscribers:
-            self._census.add_subscriber(member, subscriber)
+            self._registry.add_subscriber(member, subscriber)
         for publisher in request.publishers:
             self._place(member, publisher, out)
         topics = {record.topic for record in request.subscribers}
-        found = [remote for topic in sorted(topics) for remote in self._census.publishers_of(topic)]
+        found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
         return Found(self.epoch, self.revision, tuple(found))
 
+    def _renewed_member(self, said: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
+        """Who has renewed; None when it has to join again: it is not registered just so over `sender`."""
+        member = self._member_at(said.node_id, sender)
+        if member is None or said.epoch != self.epoch:
+            return None
+        is_registered = self._registry.renew(member, said.publishers, said.subscribers, now, said.cpu_ratio)
+        return member if is_registered else None
+
+    def _member_at(self, node_id: str, sender: str) -> RegisteredNode | None:
+        """A node, if this connection speaks for it."""
+        member = self._registry.members.get(node_id)
+        return member if member is not None and member.route == sender else None
+
     def _renew(self, request: Renew, now: float, sender: str) -> Reply:
-        member = self._census.members.get(request.node_id)
-        if member is not None and member.route != sender:
-            member = None  # it has another connection now, or it is not this node at all: joining tells
-        if member is None or request.epoch != self.epoch or not same_ids(member, request):
-            if member is not None:
-                member.renewed_at = now
+        said = RawRenewal(
+            0,
+            request.node_id,
+            request.epoch,
+            request.revision,
+            tuple(map(vars, request.publishers)),
+            tuple(map(vars, request.subscribers)),
+            request.cpu_ratio,
+        )
+        member = self._renewed_member(said, now, sender)
+        if member is None:
+            unknown = self._member_at(request.node_id, sender)
+            if unknown is not None:
+                unknown.renewed_at = now
             return Renewed(self.epoch, self.revision, again=True)
-        self._census.renew(member, request.publishers, request.subscribers, now, request.cpu_ratio)
         topics: Iterable[str] = ()
-        if self._census.publishers_revision > request.revision:
+        if self._registry.publishers_revision > request.revision:
             topics = sorted({subscriber.record.topic for subscriber in member.subscribers.values()})
         changed = tuple(
-            TopicPublishers(topic, self._census.publishers_of(topic))
+            TopicPublishers(topic, self._registry.publishers_of(topic))
             for topic in topics
-            if self._census.topic_revision(topic) > request.revision
+            if self._registry.topic_revision(topic) > request.revision
         )
-        last_seqs, next_s = self._census.last_seqs(member), self._leases.renew(member, now)
+        last_seqs, next_s = self._registry.last_seqs(member), self._leases.renew(member, now)
         return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s)
 
-    def _unlist_publisher(self, member: Member, publisher: int, out: list[Outgoing]) -> None:
+    def _unlist_publisher(self, member: RegisteredNode, publisher: int, out: list[Outgoing]) -> None:
         """Take out a publisher that has not said that it closes."""
         last_seq = member.publishers[publisher].last_seq
-        record = self._census.remove_publisher(member.node.id, publisher)
+        record = self._registry.remove_publisher(member.node.id, publisher)
         if record is not None:
             gone = PublisherGone(self.epoch, self.revision, record.id, record.topic, False, last_seq)
             self._tell(record, gone, out)
 
     def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
-        record = self._census.remove_publisher(request.node_id, request.id)
+        record = self._registry.remove_publisher(request.node_id, request.id)
         if record is not None:
             gone = PublisherGone(
                 self.epoch, self.revision, record.id, record.topic, is_closed=True, last_seq=request.last_seq
@@ -369,14 +417,14 @@ class Graph:
 
     # ---- telling subscribers
 
-    def _place(self, member: Member, record: PublisherRecord, out: list[Outgoing]) -> None:
-        if self._census.add_publisher(member, record) and record.endpoints:
-            remote = self._census.remote(member, record)
+    def _place(self, member: RegisteredNode, record: PublisherRecord, out: list[Outgoing]) -> None:
+        if self._registry.add_publisher(member, record) and record.endpoints:
+            remote = self._registry.remote(member, record)
             self._tell(record, PublisherCame(self.epoch, self.revision, remote), out)
 
-    def _forget(self, member: Member, out: list[Outgoing], *, is_closed: bool) -> None:
+    def _forget(self, member: RegisteredNode, out: list[Outgoing], *, is_closed: bool) -> None:
         publishers = list(member.publishers.values())
-        self._census.forget(member.node.id)
+        self._registry.forget(member.node.id)
         for publisher in publishers:
             gone = PublisherGone(
                 self.epoch,
@@ -390,7 +438,7 @@ class Graph:
 
     def _tell(self, record: PublisherRecord, push: Push, out: list[Outgoing]) -> None:
         told: set[str] = set()
-        for member, _subscriber in self._census.subscribers_of(record.topic):
+        for member, _subscriber in self._registry.subscribers_of(record.topic):
             if not member.is_managed and member.node.id not in told:
                 told.add(member.node.id)
                 out.append(Outgoing(member.node.id, push))

@@ -1,11 +1,19 @@
-"""Leases: when each node renews, who is late, and who has been silent for too long."""
+"""Leases: when each node renews, who is late, and who has been silent for too long.
+
+What every node sends every second is read and answered as it comes, without making values of it
+(`RawRenewal`). What is unusual is left to the way of all requests, which says what is wrong.
+"""
 
 from __future__ import annotations
 
-from nep.masters.registry import Census, Member
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from nep.masters.registry import Counts, RegisteredNode, Registry
+from nep.messages.packing import pack_surely, unpack, unpack_bounded
 from nep.protocol.requests import RENEW_S
 
-__all__ = ["LEASE_S", "Leases"]
+__all__ = ["LEASE_S", "Leases", "RawRenewal", "is_renewal", "read_renewal", "renewed_body"]
 
 LEASE_S = 3.0
 """A node that renews every second and has not for so long is unlisted; others have as much longer."""
@@ -18,16 +26,20 @@ _LONGEST_RENEW_S = 5.0
 _SLOT_S = 0.1
 """Nodes that renew less often do it together, so long after each other: waking up costs most of all."""
 
+_BEGINS = b"\x83\xa2do\xa5renew"
+"""How our own renewals begin. Another order of the fields is as right, and takes the usual way."""
+_SMALL_BYTES, _LISTS_MAX = 4096, 20_000
+
 
 class Leases:
-    """The leases of the nodes in `census`; managed ones have none: who manages one says when it leaves."""
+    """The leases of the nodes in `registry`; managed ones have none: who manages one says when it leaves."""
 
-    def __init__(self, census: Census, lease_s: float) -> None:
-        self._census = census
+    def __init__(self, registry: Registry, lease_s: float) -> None:
+        self._registry = registry
         self._grace_s = lease_s - RENEW_S
         self._renew_s = RENEW_S
         self._paced_at = 0
-        """The revision of the census for which this was decided."""
+        """The revision of the registry for which this was decided."""
         self._slot_size = 0
         self._slots: dict[int, int] = {}
         """How many nodes were told to renew in each slot to come."""
@@ -35,14 +47,14 @@ class Leases:
     def set_pace(self, now: float) -> None:
         """Decide how often nodes renew from now on: each is told with its next renewal."""
         self._slots = {slot: told for slot, told in self._slots.items() if slot * _SLOT_S > now}
-        if self._paced_at == self._census.revision:
+        if self._paced_at == self._registry.revision:
             return
-        self._paced_at = self._census.revision
-        nodes = sum(not member.is_managed for member in self._census.members.values())
+        self._paced_at = self._registry.revision
+        nodes = sum(not member.is_managed for member in self._registry.members.values())
         self._renew_s = min(_LONGEST_RENEW_S, max(RENEW_S, nodes / _RENEWALS_A_S))
         self._slot_size = 1 + int(nodes * _SLOT_S / self._renew_s)
 
-    def renew(self, member: Member, now: float) -> float:
+    def renew(self, member: RegisteredNode, now: float) -> float:
         """It has renewed; in how many seconds it shall renew next."""
         member.renewed_at, member.renew_s = now, RENEW_S
         if self._renew_s > RENEW_S and not member.is_managed:
@@ -60,7 +72,7 @@ class Leases:
                 return slot
         return min(slots, key=lambda slot: self._slots.get(slot, 0))
 
-    def is_late(self, member: Member, now: float) -> bool:
+    def is_late(self, member: RegisteredNode, now: float) -> bool:
         """Whether it missed a renewal."""
         return not member.is_managed and member.renewed_at + member.renew_s <= now - _LATE_S
 
@@ -76,6 +88,67 @@ class Leases:
         latest = now - by_s
         return [
             node_id
-            for node_id, member in self._census.members.items()
+            for node_id, member in self._registry.members.items()
             if member.renewed_at + member.renew_s <= latest and not member.is_managed
         ]
+
+
+class RawRenewal(NamedTuple):
+    """A renewal as it came: of `publishers` and `subscribers` nothing is known but that they are lists."""
+
+    call: int
+    node_id: str
+    epoch: int
+    revision: int
+    publishers: Counts
+    subscribers: Counts
+    cpu_ratio: float | None
+
+
+def is_renewal(body: bytes) -> bool:
+    """Whether a body seems to be one of our own renewals: it is worth `read_renewal`."""
+    return body.startswith(_BEGINS)
+
+
+def read_renewal(body: bytes) -> RawRenewal | None:
+    """The renewal in a body; None when it is none, or an unusual one."""
+    if not body.startswith(_BEGINS):
+        return None
+    try:
+        envelope: Any = (
+            unpack_bounded(body, _LISTS_MAX, _LISTS_MAX) if len(body) > _SMALL_BYTES else unpack(body)
+        )
+        what = envelope["what"]
+        said = RawRenewal(
+            envelope["call"],
+            what["node_id"],
+            what["epoch"],
+            what["revision"],
+            what.get("publishers", ()),
+            what.get("subscribers", ()),
+            what.get("cpu_ratio"),
+        )
+    except (ValueError, LookupError, TypeError, AttributeError):
+        return None
+    numbers = type(said.call) is type(said.epoch) is type(said.revision) is int
+    is_usual = numbers and said.call >= 0 and type(said.node_id) is str
+    is_usual = is_usual and type(said.cpu_ratio) in {float, type(None)}
+    is_usual = is_usual and {type(said.publishers), type(said.subscribers)} <= {list, tuple}
+    return said if is_usual else None
+
+
+def renewed_body(
+    call: int,
+    epoch: int,
+    revision: int,
+    last_seqs: Mapping[int, int],
+    hosts: tuple[str, ...],
+    next_s: float = RENEW_S,
+) -> bytes:
+    """The body of a `Renewed` with which nothing has changed."""
+    what: dict[str, object] = {"epoch": epoch, "revision": revision, "last_seqs": last_seqs}
+    if hosts:
+        what["hosts"] = hosts
+    if next_s != RENEW_S:
+        what["next_s"] = next_s
+    return pack_surely({"is": "renewed", "re": call, "what": what})

@@ -11,8 +11,7 @@ import zmq
 
 from nep.errors import AddressInUseError, NepError
 from nep.protocol.graph_view import Alert
-from nep.system.addresses import endpoint_of
-from nep.system.interfaces import ANY, OwnAddress, own_addresses
+from nep.system.addresses import ANY, OwnAddress, endpoint_of, own_addresses
 
 __all__ = ["Listening", "check_hosts"]
 

@@ -13,9 +13,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from nep.errors import ClosedError, RequestRefusedError
-from nep.masters.graph import LEASE_S, Graph, GraphView
+from nep.masters.graph import Graph
+from nep.masters.leases import LEASE_S
 from nep.masters.process import Owner, is_running, listen, start_process
-from nep.masters.server import MasterLoop
+from nep.masters.server import MasterServer
+from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Listen, Look, Refused, Reply, Request, Seen
 from nep.system.addresses import master_address
 from nep.system.forks import give_up, watch
@@ -62,7 +64,7 @@ class Master:
         self._learn_s = learn_s
         self._lease_s = lease_s
         self._owner = None if owner_pid is None else Owner(owner_pid)
-        self._loop: MasterLoop | None = None
+        self._server: MasterServer | None = None
         self._lock = threading.Lock()
         self._is_forked = False
         watch(self)
@@ -71,10 +73,10 @@ class Master:
         """Bind, start what is attached, answer. Returns itself."""
         graph = Graph(self.epoch, time.monotonic(), self._learn_s, self._lease_s)
         listeners = [attachment.changed for attachment in self._attachments]
-        loop = MasterLoop(self.address, graph, listeners, self._owner)
-        self.address = loop.address
-        self._loop = loop
-        loop.start()
+        server = MasterServer(self.address, graph, listeners, self._owner)
+        self.address = server.address
+        self._server = server
+        server.start()
         started: list[Attachment] = []
         try:
             for attachment in self._attachments:
@@ -83,38 +85,38 @@ class Master:
         except BaseException:
             for attachment in reversed(started):
                 attachment.close()
-            self._loop = None
-            loop.close()
+            self._server = None
+            server.close()
             raise
-        loop.open()
+        server.open()
         return self
 
     def close(self) -> None:
         """Close what is attached, then end. May be called twice and from any thread but the master's."""
         with self._lock:
-            loop, self._loop = self._loop, None
-        if loop is None:
+            server, self._server = self._server, None
+        if server is None:
             return
         for attachment in reversed(self._attachments):
             attachment.close()
-        loop.close()
+        server.close()
 
     def forked(self) -> None:
         """In a child that was forked: the master stays with the parent. See `nep.system.forks`."""
-        if self._loop is not None:
-            give_up(*self._loop.endpoints)
-        self._loop = None
+        if self._server is not None:
+            give_up(*self._server.endpoints)
+        self._server = None
         self._lock = threading.Lock()
         self._is_forked = True
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until the master has ended, by itself (`owner_pid`) or by `close`; True when it has."""
-        loop = self._loop
-        if loop is None:
+        server = self._server
+        if server is None:
             return True
         if timeout_s is not None:
-            return loop.ended.wait(timeout_s)
-        while not loop.ended.wait(0.1):
+            return server.ended.wait(timeout_s)
+        while not server.ended.wait(0.1):
             pass  # in slices: Windows does not interrupt a wait for Ctrl+C
         return True
 
@@ -123,10 +125,10 @@ class Master:
 
         Raises `ClosedError` when the master has ended, `WaitTimeoutError` when it does not get to it in time.
         """
-        loop = self._loop
-        if loop is None or loop.ended.is_set():
+        server = self._server
+        if server is None or server.ended.is_set():
             raise ClosedError(f"the master at '{self.address}'", is_forked=self._is_forked)
-        return loop.submit(request, timeout_s)
+        return server.submit(request, timeout_s)
 
     def listen(self, hosts: Sequence[str]) -> None:
         """Serve other computers at these addresses of this one, none: no more. See `listen`."""

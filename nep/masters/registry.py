@@ -1,25 +1,61 @@
-"""Census: the tables behind the graph: nodes, their publishers and subscribers, and their statistics."""
+"""Registry: the tables behind the graph: nodes, their publishers and subscribers, and their statistics.
+
+What programs may register is checked here, too (`check_request`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
+from nep.errors import NepError, WireError
 from nep.masters.rates import Meter
 from nep.protocol.graph_view import Alert
-from nep.protocol.records import (
+from nep.protocol.requests import (
+    COUNT_MAX,
+    RENEW_S,
+    AddPublisher,
+    AddSubscriber,
+    Join,
     NodeRecord,
-    PublisherCount,
     PublisherRecord,
     RemotePublisher,
-    SubscriberCount,
+    Request,
     SubscriberRecord,
     as_count,
 )
-from nep.protocol.requests import RENEW_S
-from nep.text import escaped, shortened
+from nep.protocol.wire import check_node_name, check_topic
+from nep.text import control_in, escaped, shortened
 
-__all__ = ["Census", "Member", "Publisher", "Subscriber", "as_ratio"]
+__all__ = [
+    "ALL_RECORDS_MAX",
+    "ALWAYS_ROOM",
+    "RECORDS_MAX",
+    "Counts",
+    "RegisteredNode",
+    "RegisteredPublisher",
+    "RegisteredSubscriber",
+    "Registry",
+    "check_record",
+    "check_request",
+    "is_tcp_endpoint",
+    "records_of",
+]
+
+RECORDS_MAX = 5_000
+"""So many publishers and subscribers one node may have,"""
+ALL_RECORDS_MAX = 20_000
+"""and all nodes together,"""
+ALWAYS_ROOM = 100
+"""but so many each of them in any case: nobody keeps others out."""
+_ENDPOINTS_MAX = 32
+_PID_MAX = 2**32 - 1
+_NODE_ID = re.compile("[0-9a-f]{16}")
+_ENDPOINT = re.compile(
+    r"tcp://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}(?:%[\w.-]{1,20})?\]):(\d{1,5})", re.ASCII
+)
 
 _HUNG_MAX = 100
 """So many nodes are noted that one does not answer."""
@@ -28,10 +64,12 @@ _PROBLEM_MAX = 500
 """Letters of the sentence about what a subscriber cannot read."""
 FADES_S = 12.0
 """So long after its last message a publisher's rate may still sink."""
+Counts = Sequence[Mapping[str, Any]]
+"""Statistics of publishers or of subscribers, with the fields of `PublisherCount` or `SubscriberCount`."""
 
 
 @dataclass
-class Publisher:
+class RegisteredPublisher:
     """A publisher and what its node counted."""
 
     record: PublisherRecord
@@ -45,7 +83,7 @@ class Publisher:
 
 
 @dataclass
-class Subscriber:
+class RegisteredSubscriber:
     """A subscriber and what its node counted."""
 
     record: SubscriberRecord
@@ -55,7 +93,7 @@ class Subscriber:
 
 
 @dataclass
-class Member:
+class RegisteredNode:
     """A node with all that it has. `hung`: it did not answer publishers of the nodes with these ids.
 
     Its next renewal is due `renew_s` after `renewed_at`: that is what it was told. `route` is the connection
@@ -67,25 +105,25 @@ class Member:
     renew_s: float = RENEW_S
     is_managed: bool = False
     route: str = ""
-    publishers: dict[int, Publisher] = field(default_factory=dict)
-    subscribers: dict[int, Subscriber] = field(default_factory=dict)
+    publishers: dict[int, RegisteredPublisher] = field(default_factory=dict)
+    subscribers: dict[int, RegisteredSubscriber] = field(default_factory=dict)
     hung: set[str] = field(default_factory=set)
     cpu_ratio: float | None = None
-    heard: dict[int, Publisher] = field(default_factory=dict)
-    """Whom its subscribers can connect to, as of the revision `heard_at`. See `Census.heard_by`."""
+    heard: dict[int, RegisteredPublisher] = field(default_factory=dict)
+    """Whom its subscribers can connect to, as of the revision `heard_at`. See `Registry.heard_by`."""
     heard_at: int = -1
 
 
-class Census:
+class Registry:
     """The tables, and the few ways in which they change."""
 
     def __init__(self) -> None:
-        self.members: dict[str, Member] = {}
-        self.speaking: dict[str, Member] = {}
+        self.members: dict[str, RegisteredNode] = {}
+        self.speaking: dict[str, RegisteredNode] = {}
         """By connection: the node that it speaks for."""
-        self.publisher_owners: dict[int, Member] = {}
+        self.publisher_owners: dict[int, RegisteredNode] = {}
         """By the id of a publisher: the node that has it."""
-        self.subscriber_owners: dict[int, Member] = {}
+        self.subscriber_owners: dict[int, RegisteredNode] = {}
         """The same of subscribers."""
         self.revision = 1
         self.publishers_revision = 0
@@ -96,8 +134,8 @@ class Census:
         Names that nobody uses any more leave nothing behind: a program may use a new one every second.
         """
         self._topic_revisions: dict[str, int] = {}
-        self._publishing: dict[str, dict[int, Member]] = {}
-        self._subscribing: dict[str, dict[int, Member]] = {}
+        self._publishing: dict[str, dict[int, RegisteredNode]] = {}
+        self._subscribing: dict[str, dict[int, RegisteredNode]] = {}
         self._reported: dict[str, tuple[Alert, ...]] = {}
 
     # ---- reading
@@ -116,17 +154,17 @@ class Census:
         """The names of all topics that somebody publishes or subscribes."""
         return sorted(set(self._publishing) | set(self._subscribing))
 
-    def publishing(self, topic: str) -> list[tuple[Member, Publisher]]:
+    def publishing(self, topic: str) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
         """All publishers of a topic, also those that cannot be connected to, each with its node."""
         found = self._publishing.get(topic)
         return [(member, member.publishers[known]) for known, member in found.items()] if found else []
 
-    def subscribers_of(self, topic: str) -> list[tuple[Member, Subscriber]]:
+    def subscribers_of(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
         """The subscribers of a topic, each with its node."""
         found = self._subscribing.get(topic)
         return [(member, member.subscribers[known]) for known, member in found.items()] if found else []
 
-    def remote(self, member: Member, record: PublisherRecord) -> RemotePublisher:
+    def remote(self, member: RegisteredNode, record: PublisherRecord) -> RemotePublisher:
         """A publisher as subscribers have to know it."""
         return RemotePublisher(record, member.node.id, member.node.name)
 
@@ -134,7 +172,7 @@ class Census:
         """The revision at which the publishers of this topic changed last."""
         return self._topic_revisions.get(topic, 0)
 
-    def heard_by(self, member: Member) -> dict[int, Publisher]:
+    def heard_by(self, member: RegisteredNode) -> dict[int, RegisteredPublisher]:
         """Everybody who can be connected to on the topics that this node subscribes to."""
         if member.heard_at != self.revision:
             member.heard_at = self.revision
@@ -147,17 +185,17 @@ class Census:
             }
         return member.heard
 
-    def last_seqs(self, member: Member) -> dict[int, int]:
-        """Publisher id → newest message, for everybody who can be connected to on this node's topics."""
+    def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
+        """Publisher id → newest message, for all that can be connected to on this node's topics."""
         return {known: publisher.last_seq for known, publisher in self.heard_by(member).items()}
 
     # ---- changing
 
-    def meet(self, node: NodeRecord, now: float, *, is_managed: bool | None = None) -> Member:
+    def meet(self, node: NodeRecord, now: float, *, is_managed: bool | None = None) -> RegisteredNode:
         """The member for a node, made when it is new. Its lease begins anew."""
         member = self.members.get(node.id)
         if member is None:
-            member = self.members[node.id] = Member(node, now)
+            member = self.members[node.id] = RegisteredNode(node, now)
             self.revision += 1
         elif member.node != node:  # an original's version shows only in what it sends
             member.node = node
@@ -167,7 +205,7 @@ class Census:
             member.is_managed = is_managed
         return member
 
-    def bind(self, member: Member, route: str) -> None:
+    def bind(self, member: RegisteredNode, route: str) -> None:
         """From now on this connection speaks for the member."""
         if member.route != route:
             self._unbind(member)
@@ -175,27 +213,27 @@ class Census:
         if route:
             self.speaking[route] = member
 
-    def _unbind(self, member: Member) -> None:
+    def _unbind(self, member: RegisteredNode) -> None:
         if self.speaking.get(member.route) is member:
             del self.speaking[member.route]
 
-    def add_publisher(self, member: Member, record: PublisherRecord) -> bool:
+    def add_publisher(self, member: RegisteredNode, record: PublisherRecord) -> bool:
         """Register a publisher; False when it was registered just so before."""
         known = member.publishers.get(record.id)
         if known is not None and known.record == record:
             return False
         if known is not None:
             self.remove_publisher(member.node.id, record.id)
-        member.publishers[record.id] = Publisher(record)
+        member.publishers[record.id] = RegisteredPublisher(record)
         self.publisher_owners[record.id] = member
         self._publishing.setdefault(record.topic, {})[record.id] = member
         self._changed(record.topic)
         return True
 
-    def add_subscriber(self, member: Member, record: SubscriberRecord) -> None:
+    def add_subscriber(self, member: RegisteredNode, record: SubscriberRecord) -> None:
         """Register a subscriber, once."""
         if record.id not in member.subscribers:
-            member.subscribers[record.id] = Subscriber(record)
+            member.subscribers[record.id] = RegisteredSubscriber(record)
             self.subscriber_owners[record.id] = member
             self._subscribing.setdefault(record.topic, {})[record.id] = member
             self.touched.add(record.topic)
@@ -243,26 +281,56 @@ class Census:
 
     def renew(
         self,
-        member: Member,
-        publishers: Iterable[PublisherCount],
-        subscribers: Iterable[SubscriberCount],
+        member: RegisteredNode,
+        publisher_counts: Counts,
+        subscriber_counts: Counts,
         now: float,
         cpu_ratio: float | None = None,
-    ) -> None:
-        """Take over a node's statistics; it is alive. Numbers that can't be become the nearest."""
-        member.renewed_at = now
-        member.cpu_ratio = as_ratio(cpu_ratio)
-        member.hung.clear()
-        for count in publishers:
-            publisher = member.publishers[count.id]
-            self.counted(publisher, count.count, count.bytes, now)
-            self.reached(publisher, count.last_seq, count.last_stamp_ns)
-            if count.problem != publisher.problem:
-                self.troubled(publisher, count.problem)
-        for seen in subscribers:
-            self.seen(member.subscribers[seen.id], seen.received, seen.lost, seen.problem)
+    ) -> bool:
+        """Take over a node's statistics; it is alive. Numbers that can't be become the nearest.
 
-    def counted(self, publisher: Publisher, count: int, size_bytes: int, now: float) -> None:
+        The maps have the fields of `PublisherCount` and `SubscriberCount`, as they came. False when they are
+        not those of just what is registered, or not of these types: some of it may have been taken over.
+        """
+        try:
+            return self._renew(member, publisher_counts, subscriber_counts, now, cpu_ratio)
+        except (LookupError, TypeError, AttributeError):  # a field or a publisher is missing, or no map
+            return False
+
+    def _renew(
+        self,
+        member: RegisteredNode,
+        publisher_counts: Counts,
+        subscriber_counts: Counts,
+        now: float,
+        cpu_ratio: float | None,
+    ) -> bool:
+        publishers, subscribers = member.publishers, member.subscribers
+        if len(publisher_counts) != len(publishers) or len(subscriber_counts) != len(subscribers):
+            return False
+        for counts in publisher_counts:
+            publisher = publishers[counts["id"]]
+            count, size_bytes, last_seq = counts["count"], counts["bytes"], counts["last_seq"]
+            stamp_ns, problem = counts.get("last_stamp_ns"), counts.get("problem", "")
+            if not type(count) is type(size_bytes) is type(last_seq) is int:
+                return False
+            if (stamp_ns is not None and type(stamp_ns) is not int) or type(problem) is not str:
+                return False
+            self.counted(publisher, count, size_bytes, now)
+            self.reached(publisher, last_seq, stamp_ns)
+            if problem != publisher.problem:
+                self.troubled(publisher, problem)
+        for seen in subscriber_counts:
+            received, lost, problem = seen["received"], seen["lost"], seen.get("problem", "")
+            if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
+                return False
+            self.seen(subscribers[seen["id"]], received, lost, problem)
+        member.renewed_at, member.cpu_ratio = now, _as_ratio(cpu_ratio)
+        if member.hung:
+            member.hung.clear()
+        return True
+
+    def counted(self, publisher: RegisteredPublisher, count: int, size_bytes: int, now: float) -> None:
         """A publisher has sent so much until now."""
         count, size_bytes = as_count(count), as_count(size_bytes)
         if count != publisher.count:
@@ -273,17 +341,19 @@ class Census:
             self.touched.add(publisher.record.topic)
         publisher.meter.add(now, count, size_bytes)
 
-    def reached(self, publisher: Publisher, last_seq: int, last_stamp_ns: int | None) -> None:
+    def reached(self, publisher: RegisteredPublisher, last_seq: int, last_stamp_ns: int | None) -> None:
         """The number and the stamp of a publisher's newest message."""
         publisher.last_seq = as_count(last_seq)
         publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
 
-    def troubled(self, publisher: Publisher, problem: str) -> None:
+    def troubled(self, publisher: RegisteredPublisher, problem: str) -> None:
         """A publisher cannot send what it is given, and why; an empty sentence means that it can again."""
         publisher.problem = escaped(shortened(problem, _PROBLEM_MAX)) if problem else ""
         self.touched.add(publisher.record.topic)
 
-    def seen(self, subscriber: Subscriber, received: int | None, lost: int | None, problem: str) -> None:
+    def seen(
+        self, subscriber: RegisteredSubscriber, received: int | None, lost: int | None, problem: str
+    ) -> None:
         """A subscriber has received so much until now."""
         received = None if received is None else as_count(received)
         lost = None if lost is None else as_count(lost)
@@ -321,13 +391,91 @@ class Census:
         self.publishers_revision = self._topic_revisions[topic] = self.revision
 
 
-def as_ratio(value: float | None) -> float | None:
+def _as_ratio(value: float | None) -> float | None:
     """A share of a processor as somebody told it; None for what can be none."""
     return value if value is not None and 0.0 <= value < _CORES_MAX else None
 
 
-def _take_out(table: dict[str, dict[int, Member]], topic: str, known: int) -> None:
+def _take_out(table: dict[str, dict[int, RegisteredNode]], topic: str, known: int) -> None:
     entries = table.get(topic, {})
     entries.pop(known, None)
     if not entries:
         table.pop(topic, None)
+
+
+# ---- what may be registered
+
+
+def is_tcp_endpoint(endpoint: str) -> bool:
+    """Whether it is `tcp://HOST:PORT`: the only form in which a publisher says where it is to be reached."""
+    found = _ENDPOINT.fullmatch(endpoint)
+    return found is not None and 1 <= int(found.group(1)) <= 65535
+
+
+def check_request(request: Request) -> None:
+    """Raises `WireError` for what no program may register. Everything else is the graph's to decide."""
+    if not isinstance(request, Join | AddPublisher | AddSubscriber):
+        return
+    _check_node(request.node)
+    if isinstance(request, Join) and request.managed:
+        raise WireError("only what is attached to the master manages nodes")
+    for record in records_of(request):
+        _check_foreign(record)
+
+
+def records_of(
+    request: Join | AddPublisher | AddSubscriber,
+) -> tuple[PublisherRecord | SubscriberRecord, ...]:
+    """All publishers and subscribers that a request registers."""
+    if isinstance(request, Join):
+        return (*request.publishers, *request.subscribers)
+    return (request.publisher if isinstance(request, AddPublisher) else request.subscriber,)
+
+
+def check_record(record: PublisherRecord | SubscriberRecord) -> None:
+    """Raises `WireError` unless its topic can be one."""
+    try:
+        check_topic(record.topic)
+    except NepError as error:
+        raise WireError(str(error)) from error
+
+
+def _check_node(node: NodeRecord) -> None:
+    if not _NODE_ID.fullmatch(node.id):
+        raise WireError(f"'{shortened(node.id, 40)}' is no id of a node; it has 16 hexadecimal digits")
+    try:
+        check_node_name(node.name)
+    except NepError as error:
+        raise WireError(str(error)) from error
+    _check_word("host", node.host, 255)
+    _check_word("language", node.language, 50)
+    _check_word("generation", node.generation, 50)
+    _check_word("key", node.key, 200)
+    if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
+        raise WireError(f"{node.pid} is no number of a process")
+    if not 0 <= node.since_ns <= COUNT_MAX:
+        raise WireError(f"{node.since_ns} is no time at which a node began")
+
+
+def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
+    check_record(record)
+    if not 1 <= record.id <= COUNT_MAX:
+        raise WireError(f"{record.id} is no id of a publisher or subscriber; it is from 1 to 2^63-1")
+    _check_word("type", record.msg_type, 200)
+    if isinstance(record, PublisherRecord):
+        _check_word("codec", record.codec, 50)
+        if len(record.endpoints) > _ENDPOINTS_MAX:
+            raise WireError(
+                f"a publisher has {len(record.endpoints)} endpoints; {_ENDPOINTS_MAX} are allowed"
+            )
+        for endpoint in record.endpoints:
+            if not is_tcp_endpoint(endpoint):
+                said = escaped(shortened(endpoint, 80))
+                raise WireError(f"'{said}' is no endpoint of a publisher; it is written 'tcp://HOST:PORT'")
+
+
+def _check_word(what: str, word: str, most: int) -> None:
+    control = control_in(word)
+    if len(word) > most or control:
+        hint = f"the character '{control}' is not allowed in it" if control else f"use {most} letters at most"
+        raise WireError(f"'{escaped(shortened(word, 40))}' cannot be its {what}; {hint}")

@@ -1,4 +1,4 @@
-"""MasterLoop: the master's thread: its ROUTER socket, requests in, pushes and replies out."""
+"""MasterServer: the master's thread: its ROUTER socket, requests in, pushes and replies out."""
 
 from __future__ import annotations
 
@@ -15,23 +15,21 @@ import zmq
 
 from nep.errors import ClosedError, NepError, WaitTimeoutError
 from nep.masters.bad_requests import BadRequests, who_sends
-from nep.masters.graph import Graph, GraphView
+from nep.masters.graph import Graph, Outgoing, with_hosts, without
+from nep.masters.leases import is_renewal, read_renewal, renewed_body
 from nep.masters.listen_addresses import Listening
-from nep.masters.outgoing import Outgoing, with_hosts, without
 from nep.masters.process import Owner
-from nep.masters.renewals import is_renewal, read_renewal, renewed_body
 from nep.masters.router import MasterPort
-from nep.masters.submission import Submission
-from nep.protocol.encoding import Asked, decode_request, encode_answer
+from nep.protocol.encoding import AnswerEncoder, Asked, collecting_later, decode_request
+from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Done, Listen, Look, Refused, Reply, ReportAlerts, Request
-from nep.protocol.viewpacking import ViewPacker
 from nep.system.addresses import endpoint_of
 from nep.system.forks import watch
-from nep.system.garbage import collecting_later
 from nep.system.log_rarely import is_told
 from nep.system.wakeup import Waker
 
-__all__ = ["MasterLoop"]
+__all__ = ["MasterServer", "Submission"]
+
 
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
@@ -44,7 +42,16 @@ _FOLLOW_S = 2.0
 """How often the addresses of this computer are looked at while other computers are served."""
 
 
-class MasterLoop:
+class Submission:
+    """`done` is set with the reply, or without one when the master has ended."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.done = threading.Event()
+        self.reply: Reply | None = None
+
+
+class MasterServer:
     """The thread with all that only it touches. `listeners` are told of every new revision.
 
     Raises `AddressInUseError` when `address` cannot be bound.
@@ -66,7 +73,7 @@ class MasterLoop:
         self._submitted: deque[Submission] = deque()
         self._pending: dict[int, Submission] = {}
         self._calls = 0
-        self._views = ViewPacker()
+        self._encoder = AnswerEncoder()
         self._bad = BadRequests()
         self._renewals: list[tuple[bytes, bytes]] = []
         self._tell_at = 0.0
@@ -324,12 +331,12 @@ class MasterLoop:
             route = member.route
         answer = with_hosts(without(each.answer, dead), self._listening.hosts)
         try:
-            body = self._views.body(answer, each.call or 0)
+            body = self._encoder.encode(answer, each.call or 0)
         except Exception as error:  # noqa: BLE001 - logged; the others get theirs, who asked gets an answer
             self._failed(error, "an answer")
             if each.call is None:
                 return True
-            body = encode_answer(self._refused(), each.call)
+            body = self._encoder.encode(self._refused(), each.call)
         return self._port.send(route.encode("utf-8", "surrogateescape"), body)
 
     def _speaking_at(self, route: str) -> tuple[str, ...]:

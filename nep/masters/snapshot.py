@@ -1,33 +1,33 @@
-"""Viewing: the census as frozen values, with the alerts that follow from it."""
+"""Viewing: the registry as frozen values, with the alerts that follow from it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from nep.masters.registry import Census, Member, Publisher, Subscriber
+from nep.masters.registry import RegisteredNode, RegisteredPublisher, RegisteredSubscriber, Registry
+from nep.protocol.encoding import made
 from nep.protocol.graph_view import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
-from nep.protocol.plain import made
-from nep.protocol.records import as_count
+from nep.protocol.requests import as_count
 
-__all__ = ["Viewer"]
+__all__ = ["GraphViewer"]
 
 
 _NAMES = 5
 """So many programs are named in a sentence."""
 
 
-class Viewer:
-    """Looks at `census` again and again. What has not changed is the very value of the last view."""
+class GraphViewer:
+    """Looks at `registry` again and again. What has not changed is the very value of the last view."""
 
-    def __init__(self, census: Census) -> None:
-        self._census = census
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
         self._topics: dict[str, TopicInfo] = {}
         self._alerts: dict[str, tuple[Alert, ...]] = {}
 
     def view(self, epoch: int) -> GraphView:
-        """Everything that the census knows now."""
-        census, touched = self._census, self._census.touched
-        names = census.topics
+        """Everything that the registry knows now."""
+        registry, touched = self._registry, self._registry.touched
+        names = registry.topics
         for name in touched:
             self._topics.pop(name, None)
             self._alerts.pop(name, None)
@@ -39,25 +39,25 @@ class Viewer:
                 self._alerts.pop(gone, None)
         for name in names:
             if name not in known:
-                publishing, subscribing = census.publishing(name), census.subscribers_of(name)
+                publishing, subscribing = registry.publishing(name), registry.subscribers_of(name)
                 known[name] = _look_at(name, publishing, subscribing)
                 is_told = any(each.problem for _member, each in subscribing)
                 is_told = is_told or any(each.problem for _member, each in publishing)
                 if len(publishing) > 1 or is_told:
                     self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
-        nodes = {each.node.id: _node_info(each) for each in census.members.values()}
+        nodes = {each.node.id: _node_info(each) for each in registry.members.values()}
         topics = {name: known[name] for name in names}
-        return GraphView(epoch, census.revision, nodes, topics, tuple(self._all_alerts()))
+        return GraphView(epoch, registry.revision, nodes, topics, tuple(self._all_alerts()))
 
     def _all_alerts(self) -> Iterator[Alert]:
-        yield from self._census.reported_alerts
-        yield from _name_alerts(self._census)
+        yield from self._registry.reported_alerts
+        yield from _name_alerts(self._registry)
         for name in sorted(self._alerts):
             yield from self._alerts[name]
-        yield from _missing_alerts(self._census)
+        yield from _missing_alerts(self._registry)
 
 
-def _node_info(member: Member) -> NodeInfo:
+def _node_info(member: RegisteredNode) -> NodeInfo:
     node = member.node
     every_field: dict[str, object] = {
         "id": node.id,
@@ -73,7 +73,9 @@ def _node_info(member: Member) -> NodeInfo:
 
 
 def _look_at(
-    name: str, publishing: list[tuple[Member, Publisher]], subscribing: list[tuple[Member, Subscriber]]
+    name: str,
+    publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
+    subscribing: list[tuple[RegisteredNode, RegisteredSubscriber]],
 ) -> TopicInfo:
     """A topic as it is now. Plain loops: with thousands of topics this is what a look waits for."""
     first = publishing[0][1].record if publishing else None
@@ -113,13 +115,17 @@ def _look_at(
     return made(TopicInfo, every_field)
 
 
-def _counted(publishing: list[tuple[Member, Publisher]]) -> list[tuple[Member, Publisher]]:
+def _counted(
+    publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
+) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
     """Those whose messages are counted: the gateway's own publishers repeat what the originals sent."""
     has_originals = any(member.node.generation not in {"native", "gateway"} for member, _ in publishing)
     return [each for each in publishing if not (has_originals and each[0].node.generation == "gateway")]
 
 
-def _publisher_info(member: Member, publisher: Publisher, rates: tuple[float, float] | None) -> PublisherInfo:
+def _publisher_info(
+    member: RegisteredNode, publisher: RegisteredPublisher, rates: tuple[float, float] | None
+) -> PublisherInfo:
     record = publisher.record
     every_field: dict[str, object] = {
         "id": record.id,
@@ -136,7 +142,7 @@ def _publisher_info(member: Member, publisher: Publisher, rates: tuple[float, fl
     return made(PublisherInfo, every_field)
 
 
-def _subscriber_info(member: Member, subscriber: Subscriber) -> SubscriberInfo:
+def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -> SubscriberInfo:
     every_field: dict[str, object] = {
         "id": subscriber.record.id,
         "node_id": member.node.id,
@@ -146,9 +152,9 @@ def _subscriber_info(member: Member, subscriber: Subscriber) -> SubscriberInfo:
     return made(SubscriberInfo, every_field)
 
 
-def _name_alerts(census: Census) -> Iterator[Alert]:
+def _name_alerts(registry: Registry) -> Iterator[Alert]:
     by_name: dict[str, int] = {}
-    for member in census.members.values():
+    for member in registry.members.values():
         by_name[member.node.name] = by_name.get(member.node.name, 0) + 1
     for name, count in sorted(by_name.items()):
         if count > 1:
@@ -159,18 +165,20 @@ def _name_alerts(census: Census) -> Iterator[Alert]:
             )
 
 
-def _missing_alerts(census: Census) -> Iterator[Alert]:
-    for member in census.members.values():
+def _missing_alerts(registry: Registry) -> Iterator[Alert]:
+    for member in registry.members.values():
         if member.hung:
             yield Alert(
                 f"missing:{member.node.id}",
-                f"“{member.node.name}” does not answer {_names(_names_of(census, member.hung))}",
+                f"“{member.node.name}” does not answer {_names(_names_of(registry, member.hung))}",
                 "It may be busy or stopped in a debugger. What is published meanwhile may not reach it.",
             )
 
 
 def _topic_alerts(
-    topic: str, publishing: list[tuple[Member, Publisher]], subscribing: list[tuple[Member, Subscriber]]
+    topic: str,
+    publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
+    subscribing: list[tuple[RegisteredNode, RegisteredSubscriber]],
 ) -> Iterator[Alert]:
     types: dict[str, list[str]] = {}
     for member, publisher in publishing:
@@ -201,9 +209,9 @@ def _topic_alerts(
             return
 
 
-def _names_of(census: Census, node_ids: Iterable[str]) -> set[str]:
+def _names_of(registry: Registry, node_ids: Iterable[str]) -> set[str]:
     """The names of these nodes, as far as they are there."""
-    return {census.members[each].node.name for each in node_ids if each in census.members} or {"programs"}
+    return {registry.members[each].node.name for each in node_ids if each in registry.members} or {"programs"}
 
 
 def _names(names: Iterable[str]) -> str:

@@ -16,18 +16,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
 
-from nep.arguments import WrongTypeError, at_least, flag, function, limit, one_of, seconds, text
 from nep.backends.base import PublisherSpec, Sink, SubscriberSpec, SubscriberTransport, Transport
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
 from nep.backends.lookup import backend_named
-from nep.errors import ClosedError, DecodeError
+from nep.errors import ClosedError, DecodeError, WrongTypeError
 from nep.messages.codecs import codec_for
 from nep.messages.queue import MAX_MESSAGES, Keep
+from nep.nodes.arguments import at_least, flag, function, limit, one_of, seconds, text
 from nep.nodes.log_handler import LogHandler, handler_of
-from nep.nodes.publisher import SLICE_S, Publisher, Subscriber
+from nep.nodes.publisher import Publisher
+from nep.nodes.subscriber import SLICE_S, Subscriber
 from nep.protocol.graph_view import GraphView
-from nep.protocol.records import NodeRecord
-from nep.protocol.registration import id_from, node_id_from
+from nep.protocol.requests import NodeRecord, id_from, node_id_from
 from nep.protocol.wire import check_node_name, check_topic
 from nep.system import forks
 from nep.system.addresses import checked_host, master_address

@@ -1,31 +1,40 @@
-"""Publisher and Subscriber: payloads in, payloads out. Made by `Node.new_pub` and `Node.new_sub`."""
+"""Publisher: payloads in, messages out. Made by `Node.new_pub`.
+
+Payloads that cannot become bytes are refused, counted, logged rarely and told in the graph, never raised
+(`Unsendable`). Whether a payload can be sent shows only when it is encoded, and it is encoded only when
+somebody listens. If that raised, a program would run until somebody looks at its topic: see
+docs/adr/0013-watching.md.
+"""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from nep.arguments import limit, seconds
-from nep.backends.base import PublisherSpec, PublisherTransport, SubscriberSpec, SubscriberTransport
-from nep.errors import ClosedError, DecodeError, EncodeError, WireError
-from nep.messages.codecs import codec_for
+from nep.backends.base import PublisherSpec, PublisherTransport
+from nep.errors import ClosedError, EncodeError, WireError
+from nep.messages.codecs import NullTeller
 from nep.messages.encoded import Encoded, encoded
-from nep.messages.message import Message
-from nep.messages.nulls import NullTeller
-from nep.nodes.unsendable import Unsendable
+from nep.nodes.arguments import limit
+from nep.protocol.wire import extension_part
 from nep.system.log_rarely import is_told
+from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["SLICE_S", "Publisher", "Subscriber"]
-
-SLICE_S = 0.1
-"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+__all__ = ["Publisher", "Unsendable", "place_of"]
 
 _logger = logging.getLogger("nep")
+_LOOK_S = 1.0
+"""So often at most a payload is tried out that nobody wants; and a fiftieth of the time at most."""
+_SHARE = 50
+_LOOKED_AT = 10_000
+_DEEPEST = 50
+_LONGEST = 300
+
 _DATA = (bytes, memoryview)  # made once: this is asked for every message that nobody hears
 
 
@@ -176,188 +185,124 @@ class Publisher:
         return f"Publisher({self.topic!r}, {self.msg_type!r})"
 
 
-class Subscriber:
-    """Receives from one topic, in order. Iterating yields `Message`s until it is closed."""
+class Unsendable:
+    """Payloads of one publisher that cannot become bytes.
+
+    `encode` is its codec's; `report` tells the graph why, "" when all is well again.
+    """
 
     def __init__(
         self,
-        transport: SubscriberTransport,
-        spec: SubscriberSpec,
-        on_close: Callable[[Subscriber], object] | None = None,
+        topic: str,
+        encode: Callable[[object], Encoded],
+        report: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._on_close = on_close
-        self._is_forked = False
-        self._transport = transport
-        self._spec = spec
-        self._ready = transport.ready
-        self._empty = codec_for(spec.msg_type).empty
-        self._problem = ""
-        self._unreadable = 0
+        self.count = 0
+        """How many were refused."""
+        self.problem = ""
+        """Why the newest was; empty when it could be sent."""
+        self._topic = topic
+        self._encode = encode
+        self._report = report
+        self._clock = clock
+        self._look_at = clock()
+        self._place_at = clock()
+        self._known = ("", "")
 
-    @property
-    def topic(self) -> str:
-        """The topic's name."""
-        return self._spec.topic
-
-    @property
-    def msg_type(self) -> str:
-        """The type under which it is registered; messages tell their own."""
-        return self._spec.msg_type
-
-    @property
-    def id(self) -> int:
-        """Its id in the graph."""
-        return self._spec.id
-
-    @property
-    def received(self) -> int:
-        """Messages that arrived."""
-        return self._transport.received
-
-    @property
-    def lost(self) -> int | None:
-        """Messages that did not arrive or were dropped here unread; None where nobody can know."""
-        return self._transport.lost
-
-    @property
-    def refused(self) -> int:
-        """What came and was no message at all; why is an alert in the graph."""
-        return self._transport.refused
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether it, or its node, was closed."""
-        return self._transport.is_closed
-
-    def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
-        """(True, payload) of the next message, or (False, an empty payload) when there is none.
-
-        Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
-        decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
-        """
+    def try_out(self, payload: object) -> bool:
+        """Whether a payload that nobody wants could be sent. It is looked at now and then only."""
+        started = self._clock()
+        if started < self._look_at:
+            return True
         try:
-            is_wrong = timeout_s is not None and not timeout_s >= 0.0
-        except TypeError:
-            is_wrong = True
-        if is_wrong:
-            seconds("timeout_s", timeout_s)
-        ready = self._ready
-        while ready:  # read already
-            try:
-                message = ready.popleft()
-            except IndexError:  # another thread took the last one
-                break
-            try:
-                return True, self.decoded(message) if self._problem else message.payload
-            except DecodeError as error:
-                self._tell(error)
-        limit = None if block_mode and timeout_s is None else timeout_s or 0.0
-        deadline = time.monotonic() + limit if limit else None
-        while True:
-            came = self.receive(limit)
-            if came is None:
-                return False, self._empty()
-            try:
-                return True, self.decoded(came)
-            except DecodeError:
-                if deadline is not None:
-                    limit = max(0.0, deadline - time.monotonic())
+            check_sendable(payload) if isinstance(payload, Encoded) else self._encode(payload)
+        except Exception as error:  # noqa: BLE001 - a payload may be of any class, which may raise anything
+            self.add(payload, error)
+        else:
+            self.cure()
+        ended = self._clock()
+        self._look_at = ended + max(_LOOK_S, _SHARE * (ended - started))
+        return not self.problem
 
-    def receive(self, timeout_s: float | None = None) -> Message | None:
-        """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
-
-        Raises `ClosedError`, and `ValueError` for a time below 0.
-        """
-        try:
-            is_wrong = timeout_s is not None and not timeout_s >= 0.0
-        except TypeError:
-            is_wrong = True
-        if is_wrong:
-            seconds("timeout_s", timeout_s)
-        if self._ready:  # read already
-            try:
-                return self._ready.popleft()
-            except IndexError:  # another thread took it
-                pass
-        if self._transport.is_closed or (timeout_s is not None and timeout_s <= 0.0):
-            return self._poll()
-        wait_s = SLICE_S if timeout_s is None or timeout_s > SLICE_S else timeout_s
-        message = self._transport.receive(wait_s)
-        return message or self._receive_on(None if timeout_s is None else timeout_s - wait_s)
-
-    def _receive_on(self, timeout_s: float | None) -> Message | None:
-        """After the first slice."""
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        while True:
-            if self._transport.is_closed:
-                raise self._closed()
-            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
-            if left <= 0.0:
-                return None
-            message = self._transport.receive(left)
-            if message is not None:
-                return message
-
-    def _poll(self) -> Message | None:
-        if self._transport.is_closed:
-            raise self._closed()
-        return self._transport.poll()
-
-    def _closed(self) -> ClosedError:
-        return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
-
-    def decoded(self, message: Message) -> object:
-        """The payload of a message that it got; a problem is logged rarely and shown in the graph.
-
-        Raises `DecodeError`.
-        """
-        try:
-            payload = message.payload
-        except DecodeError as error:
-            self._tell(error)
-            raise
-        if self._problem:
-            self._problem = ""
-            self._transport.report("")
-        return payload
-
-    def _tell(self, error: DecodeError) -> None:
-        """A message cannot be read: tell the graph, and log it rarely."""
-        self._unreadable += 1
-        if is_told(self._unreadable):
+    def add(self, payload: object, error: Exception) -> None:
+        """`payload` cannot be sent because of `error`."""
+        self.count += 1
+        said = _said(error)
+        now = self._clock()
+        if self._known[0] != said and (now >= self._place_at or not self._known[0]):
+            self._place_at = now + _LOOK_S  # looking for the place may take long
+            place = _place_of(payload, self._encode)
+            self._known = (said, f"{said}; it is at '{place}'" if place else said)
+        sentence = self._known[1] if self._known[0] == said else said
+        if is_told(self.count):
             _logger.warning(
-                "a message on '%s' cannot be read (%d so far): %s", self.topic, self._unreadable, error
+                "a message on '%s' cannot be sent (%d so far): %s", self._topic, self.count, sentence
             )
-        self._problem = str(error)
-        self._transport.report(self._problem)
+        if sentence != self.problem:
+            self.problem = sentence
+            self._report(sentence)
 
-    def close(self) -> None:
-        """Unregister; what was not read is forgotten. May be called twice."""
-        if not self._is_forked:
-            self._transport.close()
-            if self._on_close is not None:
-                self._on_close(self)
+    def cure(self) -> None:
+        """A payload could be sent."""
+        if self.problem:
+            self.problem = ""
+            self._report("")
 
-    def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
-        self._is_forked = True
-        self._transport.forked()
 
-    def __iter__(self) -> Iterator[Message]:
-        while True:
-            try:
-                message = self.receive()
-            except ClosedError:
-                return
-            if message is not None:
-                yield message
-                message = None  # what was read can be given back before the next one comes
+def _said(error: Exception) -> str:
+    try:
+        said = str(error)
+    except Exception:  # noqa: BLE001 - its class is the payload's own
+        said = ""
+    if not isinstance(error, EncodeError | WireError):
+        said = f"{type(error).__name__}: {said}"
+    return escaped(shortened(said, _LONGEST))
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(self, *_exc: object) -> None:
-        self.close()
+def check_sendable(payload: Encoded) -> None:
+    """Raises `WireError` for an extension that has no form on the wire."""
+    if payload.extension:
+        extension_part(payload.extension)
 
-    def __repr__(self) -> str:
-        return f"Subscriber({self.topic!r}, {self.msg_type!r})"
+
+def _place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
+    try:
+        return "" if isinstance(payload, Encoded) else escaped(shortened(place_of(payload, encode), _LONGEST))
+    except Exception:  # noqa: BLE001 - its keys may be of any class
+        return ""
+
+
+def place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
+    """Where in `payload` the first value is that cannot be encoded, such as "pose.x" or "joints[3]".
+
+    Empty when that is the whole, or is not found among ten thousand values.
+    """
+    path, value, left = "", payload, _LOOKED_AT
+    for _ in range(_DEEPEST):
+        for step, part in _parts(value):
+            left -= 1
+            if left <= 0:
+                return path
+            if not _can(part, encode):
+                path, value = path + step, part
+                break
+        else:
+            break
+    return path.removeprefix(".")
+
+
+def _can(value: object, encode: Callable[[object], Encoded]) -> bool:
+    try:
+        encode(value)
+    except Exception:  # noqa: BLE001 - see `Unsendable.try_out`
+        return False
+    return True
+
+
+def _parts(value: object) -> list[tuple[str, object]]:
+    if isinstance(value, Mapping):
+        return [(f".{str(key)[:100]}", part) for key, part in value.items()]
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview):
+        return [(f"[{number}]", part) for number, part in enumerate(value[:_LOOKED_AT])]
+    return []

@@ -1,17 +1,26 @@
 """The form on the wire of what nodes and the master say. Pure functions; the specification is `docs/wire.md`.
 
 A body is one msgpack map. Requests carry `do` (what is asked) and `call` (a number that the reply repeats as
-`re`); replies and pushes carry `is`; `what` holds the fields.
+`re`); replies and pushes carry `is`; `what` holds the fields. Values become maps with `write`, and maps are
+parsed with `read`, once, at the edge; a graph has its own way out, which keeps what has not changed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+import gc
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
+from operator import itemgetter
+from types import UnionType
+from typing import Any, NamedTuple, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+import msgpack  # type: ignore[import-untyped]
 
 from nep.errors import WireError
-from nep.messages.packing import pack_surely, unpack, unpack_bounded, unpack_first
-from nep.protocol.plain import read, write
+from nep.messages.packing import pack_surely, saturated, unpack, unpack_bounded, unpack_first
+from nep.protocol.graph_view import NodeInfo, TopicInfo
 from nep.protocol.requests import (
     Added,
     AddPublisher,
@@ -37,7 +46,23 @@ from nep.protocol.requests import (
     Request,
     Seen,
 )
-from nep.system.garbage import collecting_later
+
+__all__ = [
+    "AnswerEncoder",
+    "Asked",
+    "call_of_view",
+    "collecting_later",
+    "decode_answer",
+    "decode_request",
+    "encode_answer",
+    "encode_request",
+    "made",
+    "read",
+    "write",
+]
+
+T = TypeVar("T")
+_PLAIN = frozenset({str, int, float, bool, bytes, type(None)})
 
 _REQUESTS: Mapping[str, type[Request]] = {
     "join": Join,
@@ -65,13 +90,12 @@ _ANSWERS: Mapping[str, type[Reply | Push]] = {
 }
 _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
 _ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
-
 _LARGE_BYTES = 50_000
 _SMALL_BYTES = 4096
 _LISTS_MAX, _LONGEST = 50_000, 20_000
 """A request has fewer lists and maps, and none is longer: a node that joins has 5 000 records at most."""
 _VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
-"""How an answer with a graph begins that `ViewPacker` made."""
+"""How an answer with a graph begins that `AnswerEncoder` made."""
 
 
 class Asked(NamedTuple):
@@ -106,9 +130,71 @@ def decode_request(body: bytes) -> Asked:
         return Asked(call, error.reason)
 
 
+class AnswerEncoder:
+    """Makes the bodies of replies and pushes.
+
+    Of a graph it keeps the bytes of each node and topic as long as its value is the same.
+    """
+
+    def __init__(self) -> None:
+        self._pack = msgpack.Packer(use_bin_type=True, unicode_errors="replace", default=_packable).pack
+        self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
+
+    def encode(self, answer: Reply | Push, call: int = 0) -> bytes:
+        """The body of a reply to `call`, or of a push."""
+        if isinstance(answer, Seen):
+            return self._seen(answer, call)
+        return pack_surely({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
+
+    def _seen(self, answer: Seen, call: int) -> bytes:
+        view = answer.view
+        header = msgpack.Packer().pack_map_header
+        rest = {
+            "epoch": view.epoch,
+            "revision": view.revision,
+            "alerts": write(view.alerts),
+            "listens": view.listens,
+        }
+        nodes = [self._part(f"n{key}", key, node) for key, node in view.nodes.items()]
+        topics = [self._part(f"t{key}", key, topic) for key, topic in view.topics.items()]
+        if len(self._parts) > 2 * (len(nodes) + len(topics)) + 100:
+            self._parts.clear()  # many have gone
+        return b"".join(
+            (
+                header(3),
+                *map(pack_surely, ("is", "seen", "re", call, "what")),
+                header(3),
+                *map(pack_surely, ("epoch", answer.epoch, "revision", answer.revision, "view")),
+                header(len(rest) + 2),
+                *(pack_surely(key) + pack_surely(item) for key, item in rest.items()),
+                pack_surely("nodes"),
+                header(len(nodes)),
+                *nodes,
+                pack_surely("topics"),
+                header(len(topics)),
+                *topics,
+            )
+        )
+
+    def _part(self, name: str, key: str, value: NodeInfo | TopicInfo) -> bytes:
+        kept = self._parts.get(name)
+        # A topic that has not changed is the same value; comparing two that are not takes as long as packing.
+        if kept is not None and (kept[0] is value or (isinstance(value, NodeInfo) and kept[0] == value)):
+            return kept[1]
+        # All fields, also those that have their default: to look for these takes longer.
+        packed: bytes = self._pack(key) + self._pack(vars(value))
+        self._parts[name] = (value, packed)
+        return packed
+
+
+def _packable(value: object) -> object:
+    """What msgpack does not know: our own values, and numbers beyond its own."""
+    return saturated(value) if isinstance(value, int) else vars(value)
+
+
 def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
     """The body of a reply to `call`, or of a push."""
-    return pack_surely({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
+    return AnswerEncoder().encode(answer, call)
 
 
 def call_of_view(body: bytes) -> int | None:
@@ -150,3 +236,204 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
     if not isinstance(value, dict):
         raise WireError("the body is no map", len(body))
     return value
+
+
+@contextmanager
+def collecting_later() -> Iterator[None]:
+    """Makes a large graph in half of the time. For milliseconds only: it holds for the whole process."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+# ---- frozen dataclasses ↔ maps and lists. The classes have no `__post_init__` and no slots.
+
+
+def write(value: object) -> object:
+    """`value` as maps, lists and plain values; fields that have their default are left out."""
+    if type(value) in _PLAIN:
+        return value
+    if is_dataclass(value) and not isinstance(value, type):
+        out: dict[str, object] = {}
+        for name, default in _fields_of(type(value)):
+            item = getattr(value, name)
+            if default is MISSING or item != default:
+                out[name] = item if type(item) in _PLAIN else write(item)
+        return out
+    if isinstance(value, Mapping):
+        return {key: write(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [write(item) for item in value]
+    return value
+
+
+@cache
+def _fields_of(kind: type) -> tuple[tuple[str, object], ...]:
+    return tuple((field.name, field.default) for field in fields(kind))
+
+
+def read(kind: type[T], value: object) -> T:
+    """A `kind` from what `write` made of one. Unknown fields are ignored (newer peers may send more).
+
+    Raises `WireError` that names the field when something is missing or of another type.
+    """
+    hint: Any = kind
+    try:
+        return cast("T", _reader(hint)(value))
+    except _MisfitError as misfit:
+        where = ".".join((kind.__name__, *reversed(misfit.path)))
+        raise WireError(f"'{where}' {misfit.reason}") from None
+
+
+class _MisfitError(Exception):
+    """A value that is none of its type. The way to it is noted on the way out: there is one rarely."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.path: list[str] = []
+
+
+def made(kind: type[T], every_field: dict[str, object]) -> T:
+    """A frozen `kind` of all its fields, in a fifth of the time: its own way to set them is slow.
+
+    It keeps `every_field`, which nobody else may change from now on.
+    """
+    value = object.__new__(kind)
+    object.__setattr__(value, "__dict__", every_field)
+    return value
+
+
+Reader = Callable[[object], object]
+
+
+@cache
+def _reader(hint: Any) -> Reader:  # noqa: ANN401 - a type hint is any object
+    if isinstance(hint, type) and is_dataclass(hint):
+        return _of_dataclass(hint)
+    origin, args = get_origin(hint), get_args(hint)
+    if origin in {UnionType, Union}:
+        inner = _reader(next(arg for arg in args if arg is not type(None)))
+        return lambda value: None if value is None else inner(value)
+    if origin is tuple:
+        return _of_tuple(_reader(args[0]))
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return _of_mapping(_reader(args[0]), _reader(args[1]))
+    return _of_plain(hint)
+
+
+def _of_plain(hint: type) -> Reader:
+    def parse(value: object) -> object:
+        if hint is float and isinstance(value, int) and not isinstance(value, bool):
+            return float(value)
+        if not isinstance(value, hint) or (hint is int and isinstance(value, bool)):
+            raise _MisfitError(f"is a '{type(value).__name__}', not '{hint.__name__}'")
+        return value
+
+    return parse
+
+
+def _of_tuple(item: Reader) -> Reader:
+    def parse(value: object) -> object:
+        if not isinstance(value, list | tuple):
+            raise _MisfitError(f"is a '{type(value).__name__}', not a list")
+        return tuple([item(each) for each in value])
+
+    return parse
+
+
+def _of_mapping(key: Reader, item: Reader) -> Reader:
+    def parse(value: object) -> object:
+        if not isinstance(value, Mapping):
+            raise _MisfitError(f"is a '{type(value).__name__}', not a map")
+        return {key(name): item(each) for name, each in value.items()}
+
+    return parse
+
+
+def _of_dataclass(kind: type) -> Reader:
+    hints = get_type_hints(kind)
+    # The type that a value has nearly always: then nothing needs to be called for it.
+    readers = [
+        (each.name, hints[each.name] if hints[each.name] in _PLAIN else None, _reader(hints[each.name]), each)
+        for each in fields(kind)
+    ]
+    quickly = _quickly(kind, hints)
+
+    def parse(value: object) -> object:
+        made_quickly = quickly(value) if type(value) is dict else None
+        if made_quickly is not None:
+            return made_quickly
+        if not isinstance(value, Mapping):
+            raise _MisfitError(f"is a '{type(value).__name__}', not a map")
+        found: dict[str, object] = {}
+        for name, usual, reader, field in readers:
+            item = value.get(name, MISSING)
+            if item is MISSING:
+                found[name] = _default(field)
+            elif type(item) is usual:
+                found[name] = item
+            else:
+                try:
+                    found[name] = reader(item)
+                except _MisfitError as misfit:
+                    misfit.path.append(name)
+                    raise
+        return made(kind, found)
+
+    return parse
+
+
+def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object]], object | None]:
+    """Makes a `kind` of a map with just its fields, each of just its type: nearly all are so in a graph.
+
+    None for all others, also for those with something wrong deeper down: who asks finds out what.
+    """
+    plain = {name: _plain_types(hint) for name, hint in hints.items()}
+    names = [name for name, types in plain.items() if types]
+    others = [(name, _reader(hints[name])) for name, types in plain.items() if not types]
+    of_plain = itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
+    known: set[tuple[type, ...]] = set()
+    """Combinations of types that were found right; there are two for each field that may be None."""
+
+    def quickly(value: dict[str, object]) -> object | None:
+        if len(value) != len(plain):
+            return None
+        try:
+            types = tuple(map(type, of_plain(value)))
+            if types not in known:
+                if not all(each in plain[name] for name, each in zip(names, types, strict=True)):
+                    return None
+                known.add(types)
+            fields_of_it = dict(value)
+            for name, reader in others:
+                fields_of_it[name] = reader(value[name])
+        except (LookupError, _MisfitError):
+            return None
+        fresh: object = made(kind, fields_of_it)
+        return fresh
+
+    return quickly
+
+
+def _plain_types(hint: Any) -> frozenset[type]:  # noqa: ANN401 - a type hint is any object
+    """The types of which values are taken as they are; none when values have to be looked into."""
+    if hint in _PLAIN:
+        return frozenset({hint})
+    if get_origin(hint) in {UnionType, Union} and set(get_args(hint)) <= _PLAIN:
+        return frozenset(get_args(hint))
+    return frozenset()
+
+
+def _default(field: Field[Any]) -> object:
+    if field.default is not MISSING:
+        return field.default
+    if field.default_factory is not MISSING:
+        return field.default_factory()
+    misfit = _MisfitError("is missing")
+    misfit.path.append(field.name)
+    raise misfit

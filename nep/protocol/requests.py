@@ -2,26 +2,137 @@
 
 Every reply and push carries the master's `epoch`, which changes when the master is restarted, and the graph's
 `revision`.
+
+A node has a *key*, which only it and its masters know, and its id comes from the key: nobody else can
+register that id, whether the node is there, is unlisted or comes back to a master that was started again.
+Ids of publishers and subscribers come from the key and a number. See docs/adr/0014-who-speaks-for-a-node.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from hashlib import sha256
 
 from nep.protocol.graph_view import Alert, GraphView
-from nep.protocol.records import (
-    Expected,
-    NodeRecord,
-    PublisherCount,
-    PublisherRecord,
-    RemotePublisher,
-    SubscriberCount,
-    SubscriberRecord,
-)
+
+COUNT_MAX = 2**63 - 1
+"""Counters stop here: every language and every encoding has room for it."""
 
 RENEW_S = 1.0
 """How often a node renews, unless the master says otherwise."""
+
+
+def as_count(value: int) -> int:
+    """A number that somebody told as a counter: 0 to `COUNT_MAX`, whatever it was."""
+    return value if 0 <= value <= COUNT_MAX else 0 if value < 0 else COUNT_MAX
+
+
+@dataclass(frozen=True)
+class NodeRecord:
+    """A node as it presents itself. `since_ns` is its own clock when it was made.
+
+    `key` is known to the node and its masters only and proves its id: see `is_proven`.
+    """
+
+    id: str
+    name: str
+    host: str
+    pid: int | None
+    language: str = "Python"
+    generation: str = "native"
+    since_ns: int = 0
+    key: str = field(default="", repr=False)
+
+
+@dataclass(frozen=True)
+class PublisherRecord:
+    """A publisher as its node presents it. `endpoints` is empty when nobody can connect to it directly.
+
+    `local` says that it is bound to the name of this computer that goes with its loopback endpoint, too.
+    `number` proves its id: see `is_proven`.
+    """
+
+    id: int
+    topic: str
+    msg_type: str
+    codec: str
+    endpoints: tuple[str, ...] = ()
+    latched: bool = False
+    local: bool = False
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class SubscriberRecord:
+    """A subscriber as its node presents it. `number` proves its id: see `is_proven`."""
+
+    id: int
+    topic: str
+    msg_type: str
+    number: int = 0
+
+
+def node_id_from(key: str) -> str:
+    """The id of the node that has this key: 16 hexadecimal digits."""
+    return sha256(key.encode("utf-8", "replace")).hexdigest()[:16]
+
+
+def id_from(key: str, number: int) -> int:
+    """The id of the publisher or subscriber with this number (from 1) of the node that has this key."""
+    digest = sha256(f"{key}/{number}".encode("utf-8", "replace")).digest()
+    return int.from_bytes(digest[:8], "little") >> 1 or 1
+
+
+def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | None = None) -> bool:
+    """Whether the node's id comes from its key; with a record, whether that one's id does, too."""
+    if not node.key or node_id_from(node.key) != node.id:
+        return False
+    return record is None or (record.number > 0 and id_from(node.key, record.number) == record.id)
+
+
+@dataclass(frozen=True)
+class PublisherCount:
+    """A publisher's statistics: all messages and bytes so far, and the newest message.
+
+    `problem` is a sentence about payloads that cannot be sent, or empty.
+    """
+
+    id: int
+    count: int
+    bytes: int
+    last_seq: int
+    last_stamp_ns: int | None = None
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class SubscriberCount:
+    """A subscriber's statistics. `problem` is a sentence about messages that it could not read, or empty."""
+
+    id: int
+    received: int | None
+    lost: int | None
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class RemotePublisher:
+    """A publisher with the node that it belongs to: what a subscriber needs to connect."""
+
+    publisher: PublisherRecord
+    node_id: str
+    node_name: str
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A subscriber that a new publisher waits for."""
+
+    id: int
+    node_id: str
+    node_name: str
+
 
 # ---- requests
 
@@ -151,6 +262,7 @@ Request = (
     | Ping
 )
 
+
 # ---- replies
 
 
@@ -232,6 +344,7 @@ class Refused:
 
 
 Reply = Done | Added | Found | Renewed | Seen | Refused
+
 
 # ---- pushes
 

@@ -22,7 +22,7 @@ _PLAIN = {
     **dict.fromkeys("●•", "*"), "│": "|", "…": "...", "→": "->", "←": "<-", "↔": "<->", "✗": "x", "✓": "+",
     "≤": "<=", "≥": ">=", "\u00d7": "x", "°": " deg",
 }  # fmt: skip
-_HANDLER = "nep.protocol.plain"
+_HANDLER = "nep.protocol.encoding"
 _GONE = frozenset({errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])})
 """What writing into a pipe gives that nobody reads any more; Windows calls it an invalid argument."""
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})

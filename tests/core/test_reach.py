@@ -11,7 +11,7 @@ from app.core.network.remote_access import ALERT, Reach
 from app.core.storage.settings import Settings
 from nep.errors import RequestRefusedError
 from nep.protocol.graph_view import GraphView
-from nep.system.interfaces import OwnAddress
+from nep.system.addresses import OwnAddress
 
 
 class World:

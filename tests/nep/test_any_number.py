@@ -17,22 +17,27 @@ from hypothesis import strategies as st
 
 import nep
 from nep.errors import WireError
-from nep.masters.graph import Graph
+from nep.masters.graph import Graph, with_hosts
+from nep.masters.leases import read_renewal, renewed_body
 from nep.masters.master import Master
-from nep.masters.outgoing import with_hosts
-from nep.masters.renewals import read_renewal, renewed_body
 from nep.messages.packing import pack_surely
 from nep.protocol import encoding, requests, wire
-from nep.protocol.records import (
+from nep.protocol.encoding import AnswerEncoder
+from nep.protocol.requests import (
     COUNT_MAX,
+    AddPublisher,
+    AddSubscriber,
+    Join,
+    Look,
     NodeRecord,
     PublisherCount,
     PublisherRecord,
+    Renew,
+    Request,
+    Seen,
     SubscriberCount,
     SubscriberRecord,
 )
-from nep.protocol.requests import AddPublisher, AddSubscriber, Join, Look, Renew, Request, Seen
-from nep.protocol.viewpacking import ViewPacker
 from tests.nep.programs import eventually
 
 MANY = settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
@@ -90,7 +95,7 @@ def test_every_answer_can_be_sent_and_read(kind: type[Any]) -> None:
     @MANY
     @given(of(kind))
     def check(answer: Any) -> None:
-        for body in (encoding.encode_answer(answer, 7), ViewPacker().body(answer, 7)):
+        for body in (encoding.encode_answer(answer, 7), AnswerEncoder().encode(answer, 7)):
             call, read = encoding.decode_answer(body)
             assert (call, type(read)) == (7, kind)
         with_hosts(answer, ("127.0.0.1",))
@@ -122,7 +127,7 @@ def test_nothing_that_comes_in_raises_anything_unexpected(name: str, what: objec
 def test_no_request_raises_in_the_graph_and_everybody_can_still_look(
     asked: list[Request], is_foreign: bool
 ) -> None:
-    graph, packer = Graph(epoch=7, now=0.0, learn_s=0.0), ViewPacker()
+    graph, packer = Graph(epoch=7, now=0.0, learn_s=0.0), AnswerEncoder()
     honest = NodeRecord("0" * 16, "honest", "host", 1)
     graph.apply(Join(honest, 0, (PublisherRecord(1, "/a", "json", "json"),)), 1, 0.0, honest.id)
     for now, request in enumerate(asked):
@@ -130,11 +135,11 @@ def test_no_request_raises_in_the_graph_and_everybody_can_still_look(
         if is_foreign and isinstance(request, Join | AddPublisher | AddSubscriber):
             route = request.node.id
         for each in graph.apply(request, 1, float(now) / 100, route or "x", is_foreign=is_foreign):
-            packer.body(each.answer, 1)
+            packer.encode(each.answer, 1)
         graph.tick(float(now) / 100)
     (answer,) = graph.apply(Look(), 1, 1.0, "looker")
     assert isinstance(answer.answer, Seen)
-    call, seen = encoding.decode_answer(packer.body(answer.answer, 5))
+    call, seen = encoding.decode_answer(packer.encode(answer.answer, 5))
     assert (call, type(seen)) == (5, Seen)
     for topic in answer.answer.view.topics.values():
         assert topic.lost is None or 0 <= topic.lost <= COUNT_MAX

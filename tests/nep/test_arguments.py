@@ -11,7 +11,7 @@ import pytest
 import nep
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.masters.master import Master
-from nep.protocol.records import PublisherRecord, RemotePublisher
+from nep.protocol.requests import PublisherRecord, RemotePublisher
 from nep.system.addresses import is_endpoint, master_address
 from tests.nep.programs import eventually
 

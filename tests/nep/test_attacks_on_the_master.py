@@ -15,16 +15,9 @@ import zmq
 
 import nep
 from nep.masters.master import Master
+from nep.masters.registry import is_tcp_endpoint
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView
-from nep.protocol.records import (
-    NodeRecord,
-    PublisherCount,
-    PublisherRecord,
-    SubscriberCount,
-    SubscriberRecord,
-)
-from nep.protocol.registration import id_from, is_endpoint, node_id_from
 from nep.protocol.requests import (
     Added,
     AddPublisher,
@@ -34,7 +27,10 @@ from nep.protocol.requests import (
     Join,
     Leave,
     Look,
+    NodeRecord,
+    PublisherCount,
     PublisherGone,
+    PublisherRecord,
     Refused,
     RemovePublisher,
     RemoveSubscriber,
@@ -44,6 +40,10 @@ from nep.protocol.requests import (
     ReportMissing,
     Request,
     Seen,
+    SubscriberCount,
+    SubscriberRecord,
+    id_from,
+    node_id_from,
 )
 from tests.nep.programs import eventually
 
@@ -298,7 +298,7 @@ BAD_ENDPOINTS = [
 
 @pytest.mark.parametrize("endpoint", BAD_ENDPOINTS, ids=ascii)
 def test_an_endpoint_is_a_host_and_a_port_and_nothing_else(endpoint: str) -> None:
-    assert not is_endpoint(endpoint)
+    assert not is_tcp_endpoint(endpoint)
 
 
 @pytest.mark.parametrize(
@@ -312,7 +312,7 @@ def test_an_endpoint_is_a_host_and_a_port_and_nothing_else(endpoint: str) -> Non
     ],
 )
 def test_all_forms_of_hosts_are_endpoints(endpoint: str) -> None:
-    assert is_endpoint(endpoint)
+    assert is_tcp_endpoint(endpoint)
 
 
 @pytest.mark.parametrize("endpoint", ["ipc:///tmp/x", "inproc://x", "udp://127.0.0.1:9", "tcp://a b:9", "x"])

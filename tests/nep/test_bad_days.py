@@ -18,7 +18,7 @@ import pytest
 
 from nep.cli.alert_printer import Changes
 from nep.errors import AddressInUseError
-from nep.masters.graph import Alert, GraphView
+from nep.protocol.graph_view import Alert, GraphView
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LONG_S = 120

@@ -25,8 +25,7 @@ from nep.masters.master import Master
 from nep.messages.message import Message
 from nep.messages.packing import pack
 from nep.protocol import encoding, wire
-from nep.protocol.records import NodeRecord
-from nep.protocol.requests import AddSubscriber, Done, Found, Ping, Refused, SubscriberRecord
+from nep.protocol.requests import AddSubscriber, Done, Found, NodeRecord, Ping, Refused, SubscriberRecord
 from tests.nep.programs import eventually
 
 FEW = settings(

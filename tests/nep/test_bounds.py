@@ -15,52 +15,65 @@ from nep.gateway.framing import PORT_A
 from nep.gateway.listing import Listing
 from nep.gateway.native import Native
 from nep.gateway.portmap import Line, PortMap, Registration
-from nep.gateway.programs import Census as GatewayCensus
 from nep.gateway.programs import Link, Program
+from nep.gateway.programs import Registry as GatewayCensus
 from nep.gateway.requests import RequestError, read_request
 from nep.masters.bad_requests import BadRequests
 from nep.masters.graph import Graph
-from nep.masters.registry import Census
+from nep.masters.registry import Registry
 from nep.masters.router import MasterPort
 from nep.masters.snapshot import Viewer
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView, TopicInfo
-from nep.protocol.records import NodeRecord, PublisherRecord, SubscriberCount, SubscriberRecord
-from nep.protocol.requests import AddPublisher, Done, Join, Look, Ping, Renew, Renewed, Seen, TopicPublishers
+from nep.protocol.requests import (
+    AddPublisher,
+    Done,
+    Join,
+    Look,
+    NodeRecord,
+    Ping,
+    PublisherRecord,
+    Renew,
+    Renewed,
+    Seen,
+    SubscriberCount,
+    SubscriberRecord,
+    TopicPublishers,
+)
 from nep.text import control_in
 from tests.nep.programs import eventually
 
 
-def census_with_node() -> Census:
-    census = Census()
-    census.meet(NodeRecord("n", "N", "host", 1), 0.0)
-    return census
+def census_with_node() -> Registry:
+    registry = Registry()
+    registry.meet(NodeRecord("n", "N", "host", 1), 0.0)
+    return registry
 
 
 def test_names_of_topics_that_nobody_uses_leave_nothing_behind() -> None:
-    census = census_with_node()
-    member, viewer = census.members["n"], Viewer(census)
+    registry = census_with_node()
+    member, viewer = registry.members["n"], Viewer(registry)
     for n in range(20_000):
-        census.add_publisher(member, PublisherRecord(1, f"/p{n}", "json", "json", ("tcp://h:1",)))
-        census.add_subscriber(member, SubscriberRecord(2, f"/s{n}", "json"))
+        registry.add_publisher(member, PublisherRecord(1, f"/p{n}", "json", "json", ("tcp://h:1",)))
+        registry.add_subscriber(member, SubscriberRecord(2, f"/s{n}", "json"))
         if n % 1000 == 500:
             assert set(viewer.view(7).topics) == {f"/p{n}", f"/s{n}"}
             assert len(viewer._topics) == 2
-        census.remove_publisher("n", 1)
-        census.remove_subscriber("n", 2)
-    assert (census.touched, census._topic_revisions) == (set(), {})
-    assert (census.publisher_owners, census.subscriber_owners) == ({}, {})
+        registry.remove_publisher("n", 1)
+        registry.remove_subscriber("n", 2)
+    assert (registry.touched, registry._topic_revisions) == (set(), {})
+    assert (registry.publisher_owners, registry.subscriber_owners) == ({}, {})
     assert viewer.view(7).topics == {}
     assert (viewer._topics, viewer._alerts) == ({}, {})
 
 
 def test_a_topic_that_comes_again_between_two_looks_is_looked_at_again() -> None:
-    census = census_with_node()
-    member, viewer = census.members["n"], Viewer(census)
-    census.add_publisher(member, PublisherRecord(1, "/t", "json", "json"))
+    registry = census_with_node()
+    member, viewer = registry.members["n"], Viewer(registry)
+    registry.add_publisher(member, PublisherRecord(1, "/t", "json", "json"))
     assert viewer.view(7).topics["/t"].msg_type == "json"
-    census.remove_publisher("n", 1)
-    census.add_publisher(member, PublisherRecord(1, "/t", "image", "image"))
+    registry.remove_publisher("n", 1)
+    registry.add_publisher(member, PublisherRecord(1, "/t", "image", "image"))
     assert viewer.view(7).topics["/t"].msg_type == "image"
 
 
@@ -203,15 +216,15 @@ def test_who_asked_and_never_came_makes_room() -> None:
     known = PortMap(None)
     line = Line("t", "bare", "json", "many2many")
     processes = SimpleNamespace(started=lambda _pid: None, is_joined=lambda *_a, **_k: None)
-    census = GatewayCensus(known, processes, lambda _line: None)  # type: ignore[arg-type]
+    registry = GatewayCensus(known, processes, lambda _line: None)  # type: ignore[arg-type]
     for n in range(3):
         known.add(Registration(line, f"n{n}", "publisher", "json", "A", None, None, None))
-    census.look()
-    assert census.make_room()
+    registry.look()
+    assert registry.make_room()
     assert [each.node for each in known.registrations] == ["n1", "n2"]
-    assert census.make_room()
-    assert census.make_room()
-    assert not census.make_room()
+    assert registry.make_room()
+    assert registry.make_room()
+    assert not registry.make_room()
 
 
 def test_an_original_with_endless_words_is_refused() -> None:

@@ -17,7 +17,7 @@ from nep.cli.screen import (
     show_table,
     size,
 )
-from nep.masters.graph import Alert
+from nep.protocol.graph_view import Alert
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import pytest
 
 import nep
 from nep.cli.screen import say, say_error, show_alerts
-from nep.masters.graph import Alert
+from nep.protocol.graph_view import Alert
 from nep.system.streams import words_given
 
 REPOSITORY = Path(__file__).resolve().parents[2]

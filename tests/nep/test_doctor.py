@@ -9,7 +9,7 @@ import pytest
 from nep.doctor import Facts, findings, report, to_plain, worst
 from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact, ProgramFact
 from nep.doctor.installs import Install
-from nep.masters.graph import Alert, GraphView, NodeInfo
+from nep.protocol.graph_view import Alert, GraphView, NodeInfo
 
 NOW = 1_800_000_000.0
 MASTER = ProcessFact(41, "nep", is_master=True, since_s=NOW - 7200)

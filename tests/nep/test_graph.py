@@ -7,32 +7,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nep.errors import WireError
-from nep.masters.graph import Graph, GraphView
-from nep.masters.outgoing import Outgoing, without
+from nep.masters.graph import Graph, Outgoing, without
 from nep.masters.rates import Meter
 from nep.messages.packing import pack
 from nep.protocol import encoding
-from nep.protocol.records import (
-    Expected,
-    NodeRecord,
-    PublisherCount,
-    PublisherRecord,
-    SubscriberCount,
-    SubscriberRecord,
-)
+from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     Added,
     AddPublisher,
     AddSubscriber,
     Done,
+    Expected,
     Found,
     Join,
     Leave,
     Look,
+    NodeRecord,
     Ping,
     Probe,
     PublisherCame,
+    PublisherCount,
     PublisherGone,
+    PublisherRecord,
     Refused,
     RemovePublisher,
     RemoveSubscriber,
@@ -41,6 +37,8 @@ from nep.protocol.requests import (
     ReportMissing,
     Request,
     Seen,
+    SubscriberCount,
+    SubscriberRecord,
 )
 
 

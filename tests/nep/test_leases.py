@@ -16,24 +16,23 @@ from nep.masters import leases
 from nep.masters.graph import Graph
 from nep.masters.leases import LEASE_S, Leases
 from nep.masters.master import Master
-from nep.masters.registry import Census
+from nep.masters.registry import Registry
 from nep.masters.router import MasterPort
-from nep.protocol.records import NodeRecord
-from nep.protocol.requests import Join, Renew, Renewed
+from nep.protocol.requests import Join, NodeRecord, Renew, Renewed
 from tests.nep.programs import eventually, running
 
 
-def census_of(nodes: int, managed: int = 0) -> Census:
-    census = Census()
+def census_of(nodes: int, managed: int = 0) -> Registry:
+    registry = Registry()
     for n in range(nodes + managed):
-        census.meet(NodeRecord(f"n{n}", f"N{n}", "host", 1), 0.0, is_managed=n >= nodes)
-    return census
+        registry.meet(NodeRecord(f"n{n}", f"N{n}", "host", 1), 0.0, is_managed=n >= nodes)
+    return registry
 
 
 def told(nodes: int, managed: int = 0, rounds: int = 4, within_s: float = 1.0) -> list[list[float]]:
     """When each node renewed, round by round, when all of them started `within_s`."""
-    census = census_of(nodes, managed)
-    found = Leases(census, LEASE_S)
+    registry = census_of(nodes, managed)
+    found = Leases(registry, LEASE_S)
     due = [within_s * n / nodes for n in range(nodes)]
     times = []
     for _ in range(rounds):
@@ -43,7 +42,7 @@ def told(nodes: int, managed: int = 0, rounds: int = 4, within_s: float = 1.0) -
         next_due = list(due)
         for n in order:
             found.set_pace(due[n])
-            next_due[n] = due[n] + found.renew(census.members[f"n{n}"], due[n])
+            next_due[n] = due[n] + found.renew(registry.members[f"n{n}"], due[n])
         due = next_due
     return times
 
@@ -70,10 +69,10 @@ def test_nodes_of_large_graphs_renew_less_often_together_and_spread(
 
 
 def test_a_node_that_comes_a_little_late_stays_in_its_place() -> None:
-    census = census_of(500)
-    found = Leases(census, LEASE_S)
+    registry = census_of(500)
+    found = Leases(registry, LEASE_S)
     found.set_pace(0.0)
-    member = census.members["n0"]
+    member = registry.members["n0"]
     at = 10.03
     for late_s in (0.04, 0.0, 0.03, 0.01):
         at += found.renew(member, at) + late_s
@@ -81,10 +80,10 @@ def test_a_node_that_comes_a_little_late_stays_in_its_place() -> None:
 
 
 def test_whoever_was_told_to_wait_is_late_and_lapses_that_much_later() -> None:
-    census = census_of(500)
-    found = Leases(census, LEASE_S)
+    registry = census_of(500)
+    found = Leases(registry, LEASE_S)
     found.set_pace(0.0)
-    assert found.renew(census.members["n0"], 0.0) == pytest.approx(4.0)
+    assert found.renew(registry.members["n0"], 0.0) == pytest.approx(4.0)
     assert "n0" not in found.late(4.39)
     assert "n0" in found.late(4.41)
     assert "n0" not in found.lapsed(5.9)

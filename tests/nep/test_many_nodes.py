@@ -10,22 +10,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nep.masters.graph import Graph
+from nep.masters.leases import read_renewal, renewed_body
 from nep.masters.master import Master
-from nep.masters.renewals import read_renewal, renewed_body
 from nep.masters.snapshot import Viewer
 from nep.messages.packing import pack
 from nep.protocol import encoding
+from nep.protocol.encoding import AnswerEncoder, write
 from nep.protocol.graph_view import Alert, GraphView
-from nep.protocol.plain import write
-from nep.protocol.records import (
+from nep.protocol.requests import (
+    Join,
+    Leave,
+    Look,
     NodeRecord,
+    Ping,
     PublisherCount,
     PublisherRecord,
+    RemovePublisher,
+    Renew,
+    Renewed,
+    ReportAlerts,
+    Seen,
     SubscriberCount,
     SubscriberRecord,
 )
-from nep.protocol.requests import Join, Leave, Look, Ping, RemovePublisher, Renew, Renewed, ReportAlerts, Seen
-from nep.protocol.viewpacking import ViewPacker
 from tests.nep.programs import eventually
 
 EPOCH = 5
@@ -71,7 +78,7 @@ def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
 
 def view(graph: Graph) -> GraphView:
     """What somebody sees who looks for the first time."""
-    return Viewer(graph._census).view(EPOCH)
+    return Viewer(graph._registry).view(EPOCH)
 
 
 def test_a_quick_renewal_says_and_does_what_the_long_way_does() -> None:
@@ -145,7 +152,7 @@ CHANGES = st.lists(st.tuples(KINDS, st.integers(0, 4)))
 @settings(deadline=None, max_examples=60)
 @given(CHANGES)
 def test_a_view_of_what_changed_is_the_view_of_everything(changes: list[tuple[str, int]]) -> None:
-    graph, packer = graph_of(3), ViewPacker()
+    graph, packer = graph_of(3), AnswerEncoder()
     for now, (what, n) in enumerate(changes):
         if what == "join":
             graph.apply(joining(n, 5), 1, float(now), f"n{n}")
@@ -162,7 +169,7 @@ def test_a_view_of_what_changed_is_the_view_of_everything(changes: list[tuple[st
         (answer,) = graph.apply(Look(), 3, float(now), "somebody")
         assert isinstance(answer.answer, Seen)
         assert answer.answer.view == view(graph)
-        assert encoding.decode_answer(packer.body(answer.answer, 3)) == (3, answer.answer)
+        assert encoding.decode_answer(packer.encode(answer.answer, 3)) == (3, answer.answer)
 
 
 def test_what_has_not_changed_is_the_same_value() -> None:

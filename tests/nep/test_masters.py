@@ -14,8 +14,18 @@ from nep.masters.master import Master, is_running
 from nep.messages.packing import pack
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView
-from nep.protocol.records import NodeRecord, PublisherCount, PublisherRecord
-from nep.protocol.requests import Done, Join, Leave, Ping, Refused, Renew, Renewed
+from nep.protocol.requests import (
+    Done,
+    Join,
+    Leave,
+    NodeRecord,
+    Ping,
+    PublisherCount,
+    PublisherRecord,
+    Refused,
+    Renew,
+    Renewed,
+)
 from tests.nep.programs import eventually, running
 
 ORIGINAL = NodeRecord("original-1", "old", "host", 1, "JavaScript", "A")

@@ -13,7 +13,7 @@ import nep
 from nep.backends.zeromq.io_thread import SharedContext, shared_context
 from nep.backends.zeromq.master_session import MasterName, MasterSession
 from nep.masters.master import Master
-from nep.protocol.records import NodeRecord
+from nep.protocol.requests import NodeRecord
 from tests.nep.programs import eventually
 
 

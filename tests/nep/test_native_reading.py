@@ -16,7 +16,7 @@ from nep.backends.connection import Hybrid
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.masters.master import Master
 from nep.protocol import wire
-from nep.protocol.records import PublisherRecord, RemotePublisher
+from nep.protocol.requests import PublisherRecord, RemotePublisher
 from tests.nep.programs import GREETINGS_S, eventually, running
 
 

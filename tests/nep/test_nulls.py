@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.messages.nulls import AGAIN_S, NullTeller, nan_in
+from nep.messages.codecs import AGAIN_S, NullTeller, nan_in
 
 
 @dataclasses.dataclass

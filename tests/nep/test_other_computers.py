@@ -18,7 +18,7 @@ from nep.masters.master import Master
 from nep.masters.process import listen
 from nep.protocol.encoding import decode_answer, encode_request
 from nep.protocol.requests import Listen, Refused
-from nep.system.interfaces import ANY, OwnAddress, has_address, nearest, own_addresses
+from nep.system.addresses import ANY, OwnAddress, has_address, nearest, own_addresses
 from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")

@@ -22,7 +22,7 @@ from nep.backends.zeromq.publisher import MAX_SUBSCRIBERS, Subscriptions
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
-from nep.protocol.records import PublisherRecord, RemotePublisher
+from nep.protocol.requests import PublisherRecord, RemotePublisher
 from nep.protocol.wire import hello_part
 from nep.system import addresses
 from nep.system.plugins import discover

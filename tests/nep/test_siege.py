@@ -14,15 +14,21 @@ import zmq
 import nep
 from nep.messages.packing import pack, pack_surely
 from nep.protocol import encoding
-from nep.protocol.records import (
+from nep.protocol.requests import (
+    AddPublisher,
+    Join,
+    Leave,
+    Look,
     NodeRecord,
     PublisherCount,
     PublisherRecord,
+    RemovePublisher,
+    Renew,
+    Request,
     SubscriberCount,
     SubscriberRecord,
+    node_id_from,
 )
-from nep.protocol.registration import node_id_from
-from nep.protocol.requests import AddPublisher, Join, Leave, Look, RemovePublisher, Renew, Request
 from tests.nep.programs import MASTER, eventually, running
 
 NAMES = ("Arm", "Eye", "Leg")

@@ -8,7 +8,7 @@ import pytest
 
 import nep
 from nep.messages.codecs import CODECS
-from nep.nodes.unsendable import Unsendable, place_of
+from nep.nodes.publisher import Unsendable, place_of
 from nep.system.log_rarely import is_told
 
 

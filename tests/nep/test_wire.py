@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nep.errors import BadTopicError, WireError
 from nep.protocol import wire
-from nep.protocol.registration import id_from, node_id_from
+from nep.protocol.requests import id_from, node_id_from
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "wire" / "messages.json").read_text("utf-8"))
 

@@ -11,7 +11,7 @@ from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.network_access import OthersSheet
 from app.ui.theme.theme import Theme
 from nep.protocol.graph_view import GraphView
-from nep.system.interfaces import OwnAddress
+from nep.system.addresses import OwnAddress
 
 
 @pytest.fixture

@@ -20,8 +20,8 @@ from app.robots.identity import (
     wrong_topic,
 )
 from nep.errors import NepError
-from nep.masters.graph import GraphView
 from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
 
 RIZE = "rize"
 SLICE_S = 0.1

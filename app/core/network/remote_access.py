@@ -12,8 +12,7 @@ from app.errors import SettingsError
 from nep.errors import NepError
 from nep.masters.master import listen
 from nep.protocol.graph_view import GraphView
-from nep.system.addresses import host_of, is_loopback
-from nep.system.interfaces import OwnAddress, own_addresses
+from nep.system.addresses import OwnAddress, host_of, is_loopback, own_addresses
 
 KEPT = "listen_at"
 ALERT, NOT_KEPT = "reach", "reach:kept"

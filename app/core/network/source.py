@@ -19,7 +19,7 @@ from nep.errors import NepError
 from nep.masters.process import look
 from nep.messages.message import Message
 from nep.nodes.node import Node
-from nep.nodes.publisher import Subscriber
+from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 
 POLL_S = 0.4

@@ -21,10 +21,9 @@ import zmq
 
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, bind_free_port
 from nep.errors import AddressInUseError, TooManyFilesError
-from nep.protocol.records import RemotePublisher
-from nep.system.addresses import is_loopback
+from nep.protocol.requests import RemotePublisher
+from nep.system.addresses import is_loopback, nearest
 from nep.system.descriptors import has_room
-from nep.system.interfaces import nearest
 
 __all__ = ["SMALL", "Bindings", "has_local_names", "in_reach", "local_of", "may_stay"]
 

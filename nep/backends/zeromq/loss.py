@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from nep.errors import WireError
 from nep.messages.message import Kind, kind_of
-from nep.protocol.records import RemotePublisher
+from nep.protocol.requests import RemotePublisher
 
 __all__ = ["UNLISTED_MAX", "Source", "Sources"]
 

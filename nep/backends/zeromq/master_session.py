@@ -26,7 +26,6 @@ from nep.errors import (
     TooManyFilesError,
 )
 from nep.protocol.graph_view import GraphView
-from nep.protocol.records import NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
 from nep.protocol.requests import (
     RENEW_S,
     Added,
@@ -36,9 +35,12 @@ from nep.protocol.requests import (
     Join,
     Leave,
     Look,
+    NodeRecord,
     PublisherCame,
     PublisherGone,
+    PublisherRecord,
     Push,
+    RemotePublisher,
     RemovePublisher,
     RemoveSubscriber,
     Renew,
@@ -46,6 +48,7 @@ from nep.protocol.requests import (
     Reply,
     ReportMissing,
     Seen,
+    SubscriberRecord,
 )
 from nep.system.addresses import host_of, is_loopback
 from nep.system.cpu import CpuLoad

@@ -20,7 +20,7 @@ from nep.backends.zeromq.io_thread import Rest, Served
 from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
-from nep.protocol.records import Expected, PublisherCount
+from nep.protocol.requests import Expected, PublisherCount
 from nep.protocol.wire import (
     BYE,
     LATCHED,

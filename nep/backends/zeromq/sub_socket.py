@@ -21,7 +21,7 @@ from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive, receive_ma
 from nep.errors import WireError
 from nep.messages.codecs import codec_for, codec_numbered
 from nep.messages.message import NOTHING, UNDECODED, Message, arrived, kind_of, new_message
-from nep.protocol.records import RemotePublisher
+from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import (
     BYE,
     EXTENSION,

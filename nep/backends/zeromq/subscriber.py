@@ -32,7 +32,7 @@ from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
 from nep.backends.zeromq.sub_socket import Into, SubSocket
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
-from nep.protocol.records import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
 __all__ = ["NativeSubscriber", "Readable", "SocketSubscriber"]

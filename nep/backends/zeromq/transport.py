@@ -26,7 +26,7 @@ from nep.backends.zeromq.sub_socket import SubSocket
 from nep.backends.zeromq.subscriber import NativeSubscriber, SocketSubscriber
 from nep.errors import ClosedError, NepError
 from nep.protocol.graph_view import GraphView
-from nep.protocol.records import NodeRecord, PublisherRecord, SubscriberRecord
+from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import SUBSCRIPTION_MAX_BYTES
 from nep.system.descriptors import check_room
 from nep.system.forks import give_up, watch

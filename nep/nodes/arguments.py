@@ -6,20 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TypeVar, cast
 
+from nep.errors import WrongTypeError
 from nep.text import control_in, escaped, shortened
 
-__all__ = ["WrongTypeError", "at_least", "flag", "function", "limit", "one_of", "seconds", "text"]
+__all__ = ["at_least", "flag", "function", "limit", "one_of", "seconds", "text"]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
-
-
 _LETTERS = 200
 """Of a type; the master takes no more."""
-
-
-class WrongTypeError(TypeError, ValueError):
-    """An argument of a wrong type: a `ValueError` as every wrong argument, and what Python calls it."""
 
 
 def text(name: str, value: object) -> str:

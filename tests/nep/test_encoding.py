@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nep.errors import WireError
-from nep.protocol import plain
+from nep.protocol import encoding
 from nep.protocol.graph_view import NodeInfo, PublisherInfo, TopicInfo
-from nep.protocol.records import PublisherCount, SubscriberCount
-from nep.protocol.requests import Look, Renew
+from nep.protocol.requests import Look, PublisherCount, Renew, SubscriberCount
 
 PUBLISHER: dict[str, object] = {
     "id": 5,
@@ -62,7 +61,7 @@ def read_slowly(kind: type, value: object) -> object:
 
 def said(kind: type, value: object) -> str:
     try:
-        return repr(plain.read(kind, value))
+        return repr(encoding.read(kind, value))
     except WireError as error:
         return error.reason
 
@@ -88,15 +87,15 @@ def test_any_map_is_read_alike(kind: type, value: dict[str, object]) -> None:
 
 def test_what_was_read_does_not_change_with_its_map() -> None:
     value = dict(TOPIC)
-    read = plain.read(TopicInfo, value)
+    read = encoding.read(TopicInfo, value)
     value["name"] = "other"
     assert (read.name, value["publishers"]) == ("t", [PUBLISHER])
-    assert read.publishers == (plain.read(PublisherInfo, PUBLISHER),)
+    assert read.publishers == (encoding.read(PublisherInfo, PUBLISHER),)
 
 
 @pytest.mark.parametrize(("item", "kept"), [(2, 2.0), (2.5, 2.5), (None, None)])
 def test_a_whole_number_is_a_float_where_one_is_due(item: object, kept: object) -> None:
-    plain.read(TopicInfo, TOPIC)
-    read = plain.read(TopicInfo, TOPIC | {"rate_hz": item})
+    encoding.read(TopicInfo, TOPIC)
+    read = encoding.read(TopicInfo, TOPIC | {"rate_hz": item})
     assert read.rate_hz == kept
     assert type(read.rate_hz) is type(kept)

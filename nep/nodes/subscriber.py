@@ -1,0 +1,212 @@
+"""Subscriber: messages in, payloads out. Made by `Node.new_sub`."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from nep.backends.base import SubscriberSpec, SubscriberTransport
+from nep.errors import ClosedError, DecodeError
+from nep.messages.codecs import codec_for
+from nep.messages.message import Message
+from nep.nodes.arguments import seconds
+from nep.system.log_rarely import is_told
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["SLICE_S", "Subscriber"]
+
+SLICE_S = 0.1
+"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+
+_logger = logging.getLogger("nep")
+
+
+class Subscriber:
+    """Receives from one topic, in order. Iterating yields `Message`s until it is closed."""
+
+    def __init__(
+        self,
+        transport: SubscriberTransport,
+        spec: SubscriberSpec,
+        on_close: Callable[[Subscriber], object] | None = None,
+    ) -> None:
+        self._on_close = on_close
+        self._is_forked = False
+        self._transport = transport
+        self._spec = spec
+        self._ready = transport.ready
+        self._empty = codec_for(spec.msg_type).empty
+        self._problem = ""
+        self._unreadable = 0
+
+    @property
+    def topic(self) -> str:
+        """The topic's name."""
+        return self._spec.topic
+
+    @property
+    def msg_type(self) -> str:
+        """The type under which it is registered; messages tell their own."""
+        return self._spec.msg_type
+
+    @property
+    def id(self) -> int:
+        """Its id in the graph."""
+        return self._spec.id
+
+    @property
+    def received(self) -> int:
+        """Messages that arrived."""
+        return self._transport.received
+
+    @property
+    def lost(self) -> int | None:
+        """Messages that did not arrive or were dropped here unread; None where nobody can know."""
+        return self._transport.lost
+
+    @property
+    def refused(self) -> int:
+        """What came and was no message at all; why is an alert in the graph."""
+        return self._transport.refused
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it, or its node, was closed."""
+        return self._transport.is_closed
+
+    def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
+        """(True, payload) of the next message, or (False, an empty payload) when there is none.
+
+        Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
+        decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
+        """
+        try:
+            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+        except TypeError:
+            is_wrong = True
+        if is_wrong:
+            seconds("timeout_s", timeout_s)
+        ready = self._ready
+        while ready:  # read already
+            try:
+                message = ready.popleft()
+            except IndexError:  # another thread took the last one
+                break
+            try:
+                return True, self.decoded(message) if self._problem else message.payload
+            except DecodeError as error:
+                self._tell(error)
+        limit = None if block_mode and timeout_s is None else timeout_s or 0.0
+        deadline = time.monotonic() + limit if limit else None
+        while True:
+            came = self.receive(limit)
+            if came is None:
+                return False, self._empty()
+            try:
+                return True, self.decoded(came)
+            except DecodeError:
+                if deadline is not None:
+                    limit = max(0.0, deadline - time.monotonic())
+
+    def receive(self, timeout_s: float | None = None) -> Message | None:
+        """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
+
+        Raises `ClosedError`, and `ValueError` for a time below 0.
+        """
+        try:
+            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+        except TypeError:
+            is_wrong = True
+        if is_wrong:
+            seconds("timeout_s", timeout_s)
+        if self._ready:  # read already
+            try:
+                return self._ready.popleft()
+            except IndexError:  # another thread took it
+                pass
+        if self._transport.is_closed or (timeout_s is not None and timeout_s <= 0.0):
+            return self._poll()
+        wait_s = SLICE_S if timeout_s is None or timeout_s > SLICE_S else timeout_s
+        message = self._transport.receive(wait_s)
+        return message or self._receive_on(None if timeout_s is None else timeout_s - wait_s)
+
+    def _receive_on(self, timeout_s: float | None) -> Message | None:
+        """After the first slice."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            if self._transport.is_closed:
+                raise self._closed()
+            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+            if left <= 0.0:
+                return None
+            message = self._transport.receive(left)
+            if message is not None:
+                return message
+
+    def _poll(self) -> Message | None:
+        if self._transport.is_closed:
+            raise self._closed()
+        return self._transport.poll()
+
+    def _closed(self) -> ClosedError:
+        return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
+
+    def decoded(self, message: Message) -> object:
+        """The payload of a message that it got; a problem is logged rarely and shown in the graph.
+
+        Raises `DecodeError`.
+        """
+        try:
+            payload = message.payload
+        except DecodeError as error:
+            self._tell(error)
+            raise
+        if self._problem:
+            self._problem = ""
+            self._transport.report("")
+        return payload
+
+    def _tell(self, error: DecodeError) -> None:
+        """A message cannot be read: tell the graph, and log it rarely."""
+        self._unreadable += 1
+        if is_told(self._unreadable):
+            _logger.warning(
+                "a message on '%s' cannot be read (%d so far): %s", self.topic, self._unreadable, error
+            )
+        self._problem = str(error)
+        self._transport.report(self._problem)
+
+    def close(self) -> None:
+        """Unregister; what was not read is forgotten. May be called twice."""
+        if not self._is_forked:
+            self._transport.close()
+            if self._on_close is not None:
+                self._on_close(self)
+
+    def forked(self) -> None:
+        """In a child that was forked. See `nep.system.forks`."""
+        self._is_forked = True
+        self._transport.forked()
+
+    def __iter__(self) -> Iterator[Message]:
+        while True:
+            try:
+                message = self.receive()
+            except ClosedError:
+                return
+            if message is not None:
+                yield message
+                message = None  # what was read can be given back before the next one comes
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Subscriber({self.topic!r}, {self.msg_type!r})"

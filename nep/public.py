@@ -1,0 +1,40 @@
+"""The public names of nep, all of them and only once. `nep` imports this module at the first use of any."""
+
+from nep.backends.connection import Configuration as Configuration
+from nep.backends.connection import Direct as Direct
+from nep.backends.connection import Hybrid as Hybrid
+from nep.errors import AddressInUseError as AddressInUseError
+from nep.errors import BackendUnavailableError as BackendUnavailableError
+from nep.errors import BadNameError as BadNameError
+from nep.errors import BadTopicError as BadTopicError
+from nep.errors import ClosedError as ClosedError
+from nep.errors import DecodeError as DecodeError
+from nep.errors import EncodeError as EncodeError
+from nep.errors import MasterUnreachable as MasterUnreachable
+from nep.errors import NepError as NepError
+from nep.errors import RequestRefusedError as RequestRefusedError
+from nep.errors import TooManyFilesError as TooManyFilesError
+from nep.errors import UnknownBackendError as UnknownBackendError
+from nep.errors import WaitTimeoutError as WaitTimeoutError
+from nep.masters.master import Master as Master
+from nep.masters.master import is_running as is_running
+from nep.masters.master import master_address as master_address
+from nep.masters.master import start_process as start_process
+from nep.messages.encoded import Encoded as Encoded
+from nep.messages.image_codec import raw_image as raw_image
+from nep.messages.message import Message as Message
+from nep.nodes.node import Node as Node
+from nep.nodes.publisher import Publisher as Publisher
+from nep.nodes.subscriber import Subscriber as Subscriber
+from nep.protocol.graph_view import Alert as Alert
+from nep.protocol.graph_view import GraphView as GraphView
+from nep.protocol.graph_view import NodeInfo as NodeInfo
+from nep.protocol.graph_view import PublisherInfo as PublisherInfo
+from nep.protocol.graph_view import SubscriberInfo as SubscriberInfo
+from nep.protocol.graph_view import TopicInfo as TopicInfo
+
+node = Node
+"""A node; see `Node`. The paper's spelling."""
+
+master = Master
+"""A master; see `Master`."""
