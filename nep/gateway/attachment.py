@@ -1,23 +1,36 @@
-"""The gateway as something that lives with a master."""
+"""The gateway as something that lives with a master, and the native network as the gateway uses it.
+
+`NativeNetwork` has a native node of its own, shows the originals in the graph, and tells their alerts.
+"""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from nep.errors import ClosedError, WaitTimeoutError
+from nep.errors import BadTopicError, ClosedError, DecodeError, EncodeError, NepError, WaitTimeoutError
 from nep.gateway.gateway import Gateway
+from nep.gateway.inbox import NativeInbox
 from nep.gateway.listing import Listing
-from nep.gateway.native import Native
 from nep.gateway.portmap import default_file
 from nep.gateway.processes import SystemProcesses
+from nep.gateway.programs import OriginalProgram
+from nep.gateway.relay import Key
 from nep.gateway.request_server import Ports
 from nep.masters.master import Master
+from nep.messages import image_codec
+from nep.messages.image_files import examine
+from nep.messages.message import Message
 from nep.nodes.node import Node
+from nep.nodes.publisher import Publisher
+from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import Reply, ReportAlerts, Request
 from nep.system.descriptors import allow_many
 from nep.system.lazy_import import later
+from nep.text import escaped
 
 if TYPE_CHECKING:
     import psutil
@@ -26,6 +39,11 @@ else:
 
 _WAIT_S = 3.0
 """A master that has just started keeps newcomers waiting for a second."""
+
+_AGAIN_S = 1.0
+"""A topic that could not be joined is tried again after this: trying costs the gateway's thread time."""
+_ALERTS_MAX = 200
+_Made = TypeVar("_Made", Publisher, Subscriber)
 
 
 class GatewayAttachment:
@@ -56,7 +74,7 @@ class GatewayAttachment:
         def report(alerts: tuple[Alert, ...]) -> None:
             submit(ReportAlerts("gateway", alerts))
 
-        native = Native(make_node, Listing(submit, master.epoch), report)
+        native = NativeNetwork(make_node, Listing(submit, master.epoch), report)
         file = self._file or default_file(int(address.rpartition(":")[2]))
         self._gateway = Gateway(native, SystemProcesses(), file, ports=self._ports, boot=psutil.boot_time())
         self._gateway.start()
@@ -69,3 +87,148 @@ class GatewayAttachment:
         if self._gateway is not None:
             self._gateway.close()
             self._gateway = None
+
+
+class NativeNetwork:
+    """The native network as the gateway uses it (see `Outside`).
+
+    `make_node` joins the network; it is called when the first topic is carried over, so that a master without
+    original programs has no node of a gateway.
+    """
+
+    def __init__(
+        self,
+        make_node: Callable[[], Node],
+        listing: Listing,
+        report: Callable[[tuple[Alert, ...]], None],
+    ) -> None:
+        self._make_node = make_node
+        self._listing = listing
+        self._report = report
+        self._node: Node | None = None
+        self._inbox: NativeInbox | None = None
+        self._publishers: dict[Key, Publisher] = {}
+        self._subscribers: dict[Key, Subscriber] = {}
+        self._own: frozenset[int] = frozenset()
+        self._alerts: dict[str, Alert] = {}
+        self._again_at: dict[str, float] = {}
+        self._dropped = 0
+
+    # ---- the network
+
+    def start(self, inbox: NativeInbox) -> None:
+        """See `Outside`."""
+        self._inbox = inbox
+
+    def publish(self, topic: str, codec: str, data: bytes) -> None:
+        """See `NativeSide`."""
+        self._listing.count((topic, codec), len(data))
+        publisher = self._publishers.get((topic, codec))
+        if publisher is None:
+            publisher = self._try(topic, lambda node: node.new_pub(topic, codec))
+            if publisher is None:
+                return
+            self._publishers[topic, codec] = publisher
+            self._own |= {publisher.id}
+        publisher.publish_bytes(data, image_codec.picture_info(data) if codec == "image" else None)
+
+    def stop_publishing(self, topic: str, codec: str) -> None:
+        """See `NativeSide`."""
+        publisher = self._publishers.pop((topic, codec), None)
+        if publisher is not None:
+            publisher.close()
+
+    def subscribe(self, topic: str, codec: str) -> bool:
+        """See `NativeSide`."""
+        subscriber = self._try(topic, lambda node: node.new_sub(topic, codec, sink=self._arrived))
+        if subscriber is None:
+            return False
+        self._subscribers[topic, codec] = subscriber
+        return True
+
+    def unsubscribe(self, topic: str, codec: str) -> None:
+        """See `NativeSide`."""
+        subscriber = self._subscribers.pop((topic, codec), None)
+        if subscriber is not None:
+            subscriber.close()
+
+    def data_of(self, message: Message) -> bytes | memoryview | None:
+        """See `Outside`."""
+        if message.codec != "image":
+            return message.data
+        try:
+            if image_codec.raw_layout(message.extension.get("encoding")) is None:
+                examine(message.data)  # the originals decode whatever they get, a bomb as well
+                return message.data
+            made = image_codec.encode(message.payload)
+            if image_codec.raw_layout((made.extension or {}).get("encoding")) is not None:
+                raise EncodeError("image", "picture", "they read JPEG and PNG, which have no such numbers")
+            return made.data
+        except (DecodeError, EncodeError) as error:
+            self.tell(
+                f"message:{message.topic}", f"Original programs get no pictures of “{message.topic}”: {error}"
+            )
+            return None
+
+    def _arrived(self, messages: Sequence[Message]) -> None:
+        """Called in the node's thread: what did not come from here goes to the gateway's thread."""
+        if self._inbox is not None:
+            for message in messages:
+                if message.publisher not in self._own:
+                    self._inbox.post(message)
+
+    def _try(self, topic: str, make: Callable[[Node], _Made]) -> _Made | None:
+        """Something native for a topic of the originals; what cannot be becomes an alert."""
+        id = f"topic:{topic}"
+        if time.monotonic() < self._again_at.get(topic, 0.0):
+            return None
+        try:
+            if self._node is None:
+                self._node = self._make_node()
+            made = make(self._node)
+        except NepError as error:
+            now = time.monotonic()
+            self._again_at = {each: at for each, at in self._again_at.items() if at > now}
+            self._again_at[topic] = now + _AGAIN_S
+            why, hint = str(error), ""
+            if isinstance(error, BadTopicError):
+                why, hint = error.reason, "Give the topic another name."
+            self.tell(id, f"“{topic}” stays among programs of the original NEP: {why}", hint)
+            return None
+        self._again_at.pop(topic, None)
+        self.cure(id)
+        return made
+
+    # ---- the graph and the alerts
+
+    def show(self, programs: tuple[OriginalProgram, ...]) -> None:
+        """See `Outside`."""
+        self._listing.show(programs)
+
+    def look(self) -> None:
+        """See `Outside`."""
+        self._listing.renew()
+        if self._inbox is not None and self._inbox.dropped != self._dropped:
+            lost = self._inbox.dropped - self._dropped
+            self._dropped = self._inbox.dropped
+            self.tell("gateway:full", f"{lost} messages did not reach original programs in the last second")
+        else:
+            self.cure("gateway:full")
+
+    def tell(self, id: str, sentence: str, hint: str = "") -> None:
+        """See `Alerts`."""
+        alert = Alert(escaped(id), escaped(sentence), escaped(hint))
+        if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _ALERTS_MAX):
+            self._alerts[id] = alert
+            self._report(tuple(self._alerts.values()))
+
+    def cure(self, id: str) -> None:
+        """See `Alerts`."""
+        if self._alerts.pop(id, None) is not None:
+            self._report(tuple(self._alerts.values()))
+
+    def close(self) -> None:
+        """See `Outside`."""
+        self._listing.close()
+        if self._node is not None:
+            self._node.close()

@@ -15,6 +15,8 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from nep.backends.zeromq.legacy import has_prefix
+
 Framing = Literal["prefixed", "bare"]
 
 PORT_A = 7000
@@ -31,8 +33,6 @@ _CODECS = {
     "image": "image",
     "images": "image",
 }
-_BARE_EVERYWHERE = frozenset({"bytes", "msgpack", "images"})
-_PREFIXED_EVERYWHERE = frozenset({"dictionary", "image"})
 _NOT_A_NUMBER = re.compile(rb"\b(?:NaN|Infinity)\b")
 _JSON_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|\s+', re.DOTALL)
 
@@ -44,11 +44,7 @@ def codec_of(msg_type: str) -> str:
 
 def framing_of(port: int, msg_type: str) -> Framing:
     """The framing used by a program that asks at `port` (7000 or 50000) for a topic of `msg_type`."""
-    if msg_type in _BARE_EVERYWHERE:
-        return "bare"
-    if port == PORT_A or msg_type in _PREFIXED_EVERYWHERE:
-        return "prefixed"
-    return "bare"
+    return "prefixed" if has_prefix("A" if port == PORT_A else "B", msg_type) else "bare"
 
 
 class FrameError(ValueError):

@@ -10,13 +10,13 @@ from typing import Protocol
 
 import zmq
 
-from nep.gateway.inbox import Inbox
-from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.inbox import NativeInbox
+from nep.gateway.portmap import PortMap, Registration, TopicLine
 from nep.gateway.processes import Processes
-from nep.gateway.programs import Census, Program
-from nep.gateway.proxy_pair import Pair, is_free, port_to_tell
+from nep.gateway.programs import OriginalProgram, ProgramTable
+from nep.gateway.proxy_pair import ProxyPair, is_free, port_to_tell
 from nep.gateway.relay import Alerts, NativeSide, Relay
-from nep.gateway.request_server import Desk, Ports
+from nep.gateway.request_server import Ports, RequestServer
 from nep.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.messages.message import Message
 from nep.system.descriptors import SPARE, has_room
@@ -35,7 +35,7 @@ _logger = logging.getLogger("nep.gateway")
 class Outside(NativeSide, Alerts, Protocol):
     """All that the gateway needs of the native network; it is called in the gateway's thread."""
 
-    def start(self, inbox: Inbox) -> None:
+    def start(self, inbox: NativeInbox) -> None:
         """Join the native network; what native programs publish is posted to `inbox`."""
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
@@ -44,7 +44,7 @@ class Outside(NativeSide, Alerts, Protocol):
     def look(self) -> None:
         """A second has passed."""
 
-    def show(self, programs: tuple[Program, ...]) -> None:
+    def show(self, programs: tuple[OriginalProgram, ...]) -> None:
         """These are the original programs now."""
 
     def close(self) -> None:
@@ -70,25 +70,25 @@ class Gateway:
         self._outside = outside
         self._processes = processes
         self._known = PortMap(file, boot)
-        self._inbox = Inbox()
+        self._inbox = NativeInbox()
         self._ready = threading.Event()
         self._ending = threading.Event()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._context.set(zmq.MAX_SOCKETS, _MAX_SOCKETS)
         self._relay = Relay(self._context, outside, outside, self._who)
-        self._desk = Desk(self._context, ports or Ports(), outside, self._decide)
-        self._census = Census(self._known, processes, self._relay.pair)
+        self._request_server = RequestServer(self._context, ports or Ports(), outside, self._decide)
+        self._programs = ProgramTable(self._known, processes, self._relay.pair)
         self._poller: zmq.Poller | None = None
         self._counters: dict[zmq.Socket[bytes], int] = {}
-        self._pairs: dict[zmq.Socket[bytes], Pair] = {}
+        self._pairs: dict[zmq.Socket[bytes], ProxyPair] = {}
         self._look_at = 0.0
-        self._shown_unserved: dict[Line, dict[Role, str]] = {}
+        self._shown_unserved: dict[TopicLine, dict[Role, str]] = {}
         self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
         watch(self)
 
     def forked(self) -> None:
         """In a child: the originals' ports are the parent's. See `nep.system.forks`."""
-        for port in self._desk.ports:
+        for port in self._request_server.ports:
             give_up(f"tcp://{LOOPBACK}:{port}")
         for pair in tuple(self._relay.pairs):
             give_up(*(f"tcp://{LOOPBACK}:{end.port}" for end in pair.ends))
@@ -111,14 +111,14 @@ class Gateway:
         try:
             self._outside.start(self._inbox)
             self._restore()
-            self._desk.open()
+            self._request_server.open()
             self._show()
             self._ready.set()
             while not self._ending.is_set():
                 self._step_safely()
         finally:
             self._relay.close()
-            self._desk.close()
+            self._request_server.close()
             self._outside.close()
             self._context.term()
 
@@ -136,26 +136,26 @@ class Gateway:
             self._poller = self._watch()
         wait_s = max(0.0, self._look_at - time.monotonic())
         ready = [socket for socket, _ in self._poller.poll(int(wait_s * 1000) + 1)]
-        changed: set[Line] = set()
+        changed: set[TopicLine] = set()
         for pair in {id(pair): pair for pair in map(self._pairs.get, ready) if pair is not None}.values():
             if self._relay.serve(pair):
                 changed.add(pair.line)
         for socket in ready:
             if socket in self._counters:
-                self._desk.answer(socket, self._counters[socket])
+                self._request_server.answer(socket, self._counters[socket])
         for message in self._inbox.take():
             data = self._outside.data_of(message)
             if data is not None:
                 self._relay.deliver(message.topic, message.codec, data)
         if changed:
-            self._census.look(changed)
+            self._programs.look(changed)
             self._show()
         if time.monotonic() >= self._look_at:
             self._look()
 
     def _watch(self) -> zmq.Poller:
         poller = zmq.Poller()
-        self._counters = dict(self._desk.sockets())
+        self._counters = dict(self._request_server.sockets())
         self._pairs = dict(self._relay.sockets())
         for socket in (*self._counters, *self._pairs):
             poller.register(socket, zmq.POLLIN)
@@ -166,34 +166,34 @@ class Gateway:
         """Once a second: who has ended, which lines nobody uses, which taken ports are free now."""
         self._look_at = time.monotonic() + _LOOK_S
         self._relay.look()
-        self._census.look()
-        if self._census.forget_the_gone():
-            for line in [pair.line for pair in self._relay.pairs if not self._census.is_used(pair.line)]:
+        self._programs.look()
+        if self._programs.forget_the_gone():
+            for line in [pair.line for pair in self._relay.pairs if not self._programs.is_used(pair.line)]:
                 self._relay.close_line(line)
             self._poller = None
             self._save()
             self._show()
-        if self._desk.open():
+        if self._request_server.open():
             self._poller = None
         if self._unserved() != self._shown_unserved:
             self._show()
         self._outside.look()
 
-    def _who(self, line: Line, role: Role) -> tuple[str, ...]:
-        return self._census.names(line, role)  # made after the relay, whose pairs it looks at
+    def _who(self, line: TopicLine, role: Role) -> tuple[str, ...]:
+        return self._programs.names(line, role)  # made after the relay, whose pairs it looks at
 
-    def _unserved(self) -> dict[Line, dict[Role, str]]:
+    def _unserved(self) -> dict[TopicLine, dict[Role, str]]:
         return {pair.line: dict(pair.unserved) for pair in self._relay.pairs if pair.unserved}
 
     def _show(self) -> None:
         self._shown_unserved = self._unserved()
-        self._relay.know_languages(self._census.languages())
-        self._outside.show(self._census.programs())
-        self._desk.tell(self._census.members())
+        self._relay.know_languages(self._programs.languages())
+        self._outside.show(self._programs.programs())
+        self._request_server.tell(self._programs.members())
 
     def _restore(self) -> None:
         """Bind again what programs that are still there were told: they never ask a second time."""
-        self._census.forget_the_gone()
+        self._programs.forget_the_gone()
         for line in {known.line for known in self._known.registrations if not known.line.is_service}:
             base = self._known.port_of(line)
             if base is not None and not self._open(line, base):
@@ -206,33 +206,33 @@ class Gateway:
     def _decide(self, request: Request) -> int:
         """The port for a request, which is noted and kept. Raises `RequestError`."""
         codec = "service" if request.is_service else request.codec
-        line = Line(request.topic, request.framing, codec, request.mode)
+        line = TopicLine(request.topic, request.framing, codec, request.mode)
         if line.is_service:
-            line = Line(request.topic, "bare", codec, "many2many")
+            line = TopicLine(request.topic, "bare", codec, "many2many")
         base = self._port_for(line)
-        if len(self._known.registrations) >= _PROGRAMS_MAX and not self._census.make_room():
+        if len(self._known.registrations) >= _PROGRAMS_MAX and not self._programs.make_room():
             raise RequestError(f"{_PROGRAMS_MAX} programs have asked already", line.topic)
         registration = self._registration(request, line)
         self._known.add(registration)
-        self._census.expect(registration)
+        self._programs.expect(registration)
         self._save()
-        self._census.look([line])
+        self._programs.look([line])
         self._show()
         return port_to_tell(line, base, request.socket)
 
-    def _port_for(self, line: Line) -> int:
+    def _port_for(self, line: TopicLine) -> int:
         known = self._known.port_of(line)
         if known is not None and (line.is_service or self._relay.pair(line) or self._open(line, known)):
             return known
         if not has_room(_PAIR_FILES + SPARE):
             raise RequestError("the master has too many files open; end programs, or restart it", line.topic)
-        for base in self._known.candidates(self._census.is_used):
+        for base in self._known.candidates(self._programs.is_used):
             if self._open(line, base):
                 self._known.give(line, base)
                 return base
         raise RequestError("no ports are left between 9000 and 9999", line.topic)
 
-    def _open(self, line: Line, base: int) -> bool:
+    def _open(self, line: TopicLine, base: int) -> bool:
         """Open a line's sockets on `base`; whether that port and the next were to be had."""
         if line.is_service:
             return is_free(base)
@@ -245,7 +245,7 @@ class Gateway:
         self._poller = None
         return True
 
-    def _registration(self, request: Request, line: Line) -> Registration:
+    def _registration(self, request: Request, line: TopicLine) -> Registration:
         pid = request.pid
         started = self._processes.started(pid) if pid is not None else None
         language = request.language or (self._processes.language(pid) if pid is not None else None)

@@ -13,7 +13,7 @@ MAX_MESSAGES = 10_000
 MAX_BYTES = 64 * 1024 * 1024
 
 
-class Inbox:
+class NativeInbox:
     """Any thread posts, one thread takes. When it is full the newest is refused and counted."""
 
     def __init__(self, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:

@@ -10,7 +10,7 @@ from hashlib import blake2b
 
 from nep.errors import BadTopicError
 from nep.gateway.processes import load_of
-from nep.gateway.programs import Link, Program
+from nep.gateway.programs import OriginalProgram, TopicLink
 from nep.gateway.relay import Key
 from nep.protocol.requests import (
     Join,
@@ -76,7 +76,7 @@ class Listing:
         counted.bytes += size_bytes
         counted.last_ns = time.time_ns()
 
-    def show(self, programs: tuple[Program, ...]) -> None:
+    def show(self, programs: tuple[OriginalProgram, ...]) -> None:
         """These originals are there now; what has changed is told to the master."""
         wanted = {program.node_id: self._record(program) for program in programs}
         for node_id in [known for known in self._shown if known not in wanted]:
@@ -110,7 +110,7 @@ class Listing:
             self._loads[node_id] = self._load_of(pid)
         return self._loads[node_id].ratio()
 
-    def _record(self, program: Program) -> Join:
+    def _record(self, program: OriginalProgram) -> Join:
         since_ns = self._since.setdefault(program.node_id, time.time_ns())
         language = program.language or ""
         node = NodeRecord(
@@ -141,7 +141,7 @@ class Listing:
             managed=True,
         )
 
-    def _choose_carriers(self, programs: tuple[Program, ...]) -> None:
+    def _choose_carriers(self, programs: tuple[OriginalProgram, ...]) -> None:
         chosen: dict[Key, int] = {}
         for program in programs:
             for link in program.links:
@@ -156,12 +156,12 @@ class Listing:
         return PublisherCount(record.id, counted.messages, counted.bytes, counted.messages, counted.last_ns)
 
 
-def _type(link: Link) -> str:
+def _type(link: TopicLink) -> str:
     """The originals' names of types differ where the datum does not: the codec's name is what all share."""
     return link.codec
 
 
-def _id(program: Program, link: Link) -> int:
+def _id(program: OriginalProgram, link: TopicLink) -> int:
     """A number for a publisher or subscriber that has none of its own; the same after a restart."""
     text = f"{program.node_id}\0{link.role}\0{link.topic}\0{link.codec}"
     digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest()

@@ -23,7 +23,7 @@ _SAME_BOOT_S = 120.0
 
 
 @dataclass(frozen=True, order=True)
-class Line:
+class TopicLine:
     """What has a pair of ports of its own: one topic, in one form, joined in one way.
 
     `codec` is "service" for clients and servers, whose bytes are not translated.
@@ -44,7 +44,7 @@ class Line:
 class Registration:
     """One original program asked for one line; `started` is when its process began, if there is one."""
 
-    line: Line
+    line: TopicLine
     node: str
     socket: str
     msg_type: str
@@ -70,8 +70,8 @@ class PortMap:
     def __init__(self, file: Path | None, boot: float = 0.0) -> None:
         self._file = file
         self._boot = boot
-        self._ports: dict[Line, int] = {}
-        self._registrations: dict[tuple[str, Line, str], Registration] = {}
+        self._ports: dict[TopicLine, int] = {}
+        self._registrations: dict[tuple[str, TopicLine, str], Registration] = {}
         if file is not None:
             self._load(file)
 
@@ -81,21 +81,21 @@ class PortMap:
         return tuple(self._registrations.values())
 
     @property
-    def lines(self) -> Mapping[Line, int]:
+    def lines(self) -> Mapping[TopicLine, int]:
         """The base port of each known line."""
         return self._ports
 
-    def port_of(self, line: Line) -> int | None:
+    def port_of(self, line: TopicLine) -> int | None:
         """The base port of `line`, if it has one."""
         return self._ports.get(line)
 
-    def candidates(self, is_used: Callable[[Line], bool]) -> Iterator[int]:
+    def candidates(self, is_used: Callable[[TopicLine], bool]) -> Iterator[int]:
         """Base ports for a new line, best first: never given ones, then those whose line nobody uses."""
         taken = {port: line for line, port in self._ports.items()}
         yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in taken)
         yield from (port for port, line in taken.items() if not is_used(line))
 
-    def give(self, line: Line, port: int) -> None:
+    def give(self, line: TopicLine, port: int) -> None:
         """Let `line` have `port`; a line that had it before loses it."""
         for other in [known for known, used in self._ports.items() if used == port and known != line]:
             del self._ports[other]
@@ -166,13 +166,13 @@ def default_file(port: int) -> Path:
     return folder / f"gateway-{port}.json"
 
 
-def _line(entry: Mapping[str, object]) -> Line:
+def _line(entry: Mapping[str, object]) -> TopicLine:
     topic, framing, codec, mode = (entry[key] for key in ("topic", "framing", "codec", "mode"))
     if not isinstance(topic, str) or not isinstance(codec, str):
         raise TypeError("a line is not of text")
     framings: tuple[Framing, ...] = get_args(Framing)
     modes: tuple[Mode, ...] = get_args(Mode)
-    return Line(topic, framings[framings.index(framing)], codec, modes[modes.index(mode)])
+    return TopicLine(topic, framings[framings.index(framing)], codec, modes[modes.index(mode)])
 
 
 def _registration(entry: Mapping[str, object]) -> Registration:

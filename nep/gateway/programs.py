@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from nep.gateway.portmap import Line, PortMap, Registration
+from nep.gateway.portmap import PortMap, Registration, TopicLine
 from nep.gateway.processes import Processes
-from nep.gateway.proxy_pair import End, Pair
+from nep.gateway.proxy_pair import End, ProxyPair
 from nep.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
@@ -17,7 +17,7 @@ _COMING_S = 10.0
 
 
 @dataclass(frozen=True)
-class Link:
+class TopicLink:
     """An original program publishes or subscribes a topic."""
 
     topic: str
@@ -27,7 +27,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Program:
+class OriginalProgram:
     """One original node, as the graph shows it.
 
     `generation` is "A" or "B", or the version of a program that can't be served ("0.5.4.6", "0.5.4.7").
@@ -38,17 +38,17 @@ class Program:
     pid: int | None
     generation: str
     language: str | None
-    links: tuple[Link, ...]
+    links: tuple[TopicLink, ...]
 
 
-class Census:
+class ProgramTable:
     """Follows the registrations of a port map. Belongs to the gateway's thread."""
 
     def __init__(
         self,
         known: PortMap,
         processes: Processes,
-        pair_of: Callable[[Line], Pair | None],
+        pair_of: Callable[[TopicLine], ProxyPair | None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
@@ -59,7 +59,7 @@ class Census:
         self._was_joined: set[Registration] = set()
         self._openings: dict[Registration, tuple[int, float]] = {}
 
-    def look(self, lines: Iterable[Line] | None = None) -> None:
+    def look(self, lines: Iterable[TopicLine] | None = None) -> None:
         """Find out who is joined to these lines (all, when none are named)."""
         chosen = None if lines is None else set(lines)
         for registration in self._known.registrations:
@@ -96,14 +96,14 @@ class Census:
                 return True
         return False
 
-    def programs(self) -> tuple[Program, ...]:
+    def programs(self) -> tuple[OriginalProgram, ...]:
         """The original nodes that are there, each with what it does."""
         grouped: dict[str, list[Registration]] = {}
         for registration in self._known.registrations:
             grouped.setdefault(registration.node_id, []).append(registration)
         return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
 
-    def names(self, line: Line, role: Role) -> tuple[str, ...]:
+    def names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
         """The names of the nodes that publish or subscribe on this line."""
         return tuple(
             dict.fromkeys(
@@ -113,9 +113,9 @@ class Census:
             )
         )
 
-    def languages(self) -> dict[Line, frozenset[str]]:
+    def languages(self) -> dict[TopicLine, frozenset[str]]:
         """In which languages the programs on each line are written, as far as it is known."""
-        told: dict[Line, frozenset[str]] = {}
+        told: dict[TopicLine, frozenset[str]] = {}
         for registration in self._known.registrations:
             if registration.language is not None:
                 known = told.get(registration.line, frozenset())
@@ -143,22 +143,22 @@ class Census:
                 )
         return told
 
-    def is_used(self, line: Line) -> bool:
+    def is_used(self, line: TopicLine) -> bool:
         """Whether a program that is there asked for this line, or is still joined to it."""
         pair = self._pair_of(line)
         if pair is not None and any(pair.connections.values()):
             return True
         return any(registration.line == line for registration in self._known.registrations)
 
-    def _program(self, node_id: str, asked: list[Registration]) -> Program:
+    def _program(self, node_id: str, asked: list[Registration]) -> OriginalProgram:
         links = {
-            Link(registration.line.topic, registration.msg_type, registration.line.codec, role): None
+            TopicLink(registration.line.topic, registration.msg_type, registration.line.codec, role): None
             for registration in asked
             for role in sorted(self._roles.get(registration, ()))
         }
         first = asked[0]
         generation = self._unserved(asked) or first.generation
-        return Program(node_id, first.node, first.pid, generation, first.language, tuple(links))
+        return OriginalProgram(node_id, first.node, first.pid, generation, first.language, tuple(links))
 
     def _unserved(self, asked: list[Registration]) -> str | None:
         """The version of a program that can't be served, where no other program on the line can be meant."""

@@ -12,7 +12,7 @@ import zmq
 from zmq.utils.monitor import parse_monitor_message
 
 from nep.gateway.framing import Shape, shield_csharp, shield_javascript
-from nep.gateway.portmap import Line
+from nep.gateway.portmap import TopicLine
 from nep.gateway.requests import LOOPBACK, Role
 
 _OPENED = zmq.EVENT_ACCEPTED | zmq.EVENT_CONNECTED
@@ -37,7 +37,7 @@ class End:
     bound_by_program: bool
 
 
-def ends_of(line: Line, base: int) -> tuple[End, End]:
+def ends_of(line: TopicLine, base: int) -> tuple[End, End]:
     """Where publishers and where subscribers of `line` join, its base port being `base`."""
     return (
         End("publisher", base, bound_by_program=line.mode == "one2many"),
@@ -45,7 +45,7 @@ def ends_of(line: Line, base: int) -> tuple[End, End]:
     )
 
 
-def port_to_tell(line: Line, base: int, socket_name: str) -> int:
+def port_to_tell(line: TopicLine, base: int, socket_name: str) -> int:
     """The port to answer: `many2many` originals add one themselves, others are told their own."""
     if line.is_service or line.mode == "many2many" or socket_name == "publisher":
         return base
@@ -64,14 +64,14 @@ def is_free(port: int) -> bool:
         return True
 
 
-class Pair:
+class ProxyPair:
     """An XSUB that takes what originals publish and an XPUB from which they read.
 
     `unserved` tells on which side a version was seen that no other version understands.
     Belongs to the gateway's thread. Raises `zmq.ZMQError` when a port is taken.
     """
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], line: Line, base: int) -> None:
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], line: TopicLine, base: int) -> None:
         self.line = line
         self.base = base
         self.shape = Shape(line.topic, line.framing, line.codec)

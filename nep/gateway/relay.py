@@ -9,8 +9,8 @@ from typing import Protocol
 import zmq
 
 from nep.gateway.framing import FrameError, lost_numbers
-from nep.gateway.portmap import Line
-from nep.gateway.proxy_pair import Pair
+from nep.gateway.portmap import TopicLine
+from nep.gateway.proxy_pair import ProxyPair
 from nep.gateway.requests import Role
 
 _BATCH = 200
@@ -50,7 +50,7 @@ Key = tuple[str, str]
 """A topic and its codec: what is translated into one another."""
 
 
-Who = Callable[[Line, Role], Sequence[str]]
+Who = Callable[[TopicLine, Role], Sequence[str]]
 """The names of the programs that publish or subscribe on a line, as far as they are known."""
 
 
@@ -78,26 +78,26 @@ class Relay:
         self._native = native
         self._alerts = alerts
         self._who = who
-        self._pairs: dict[Line, Pair] = {}
+        self._pairs: dict[TopicLine, ProxyPair] = {}
         self._subscribed: set[Key] = set()
         self._publishing: set[Key] = set()
         self._refused: dict[str, _Refused] = {}
 
     @property
-    def pairs(self) -> Iterable[Pair]:
+    def pairs(self) -> Iterable[ProxyPair]:
         """The open pairs."""
         return self._pairs.values()
 
-    def pair(self, line: Line) -> Pair | None:
+    def pair(self, line: TopicLine) -> ProxyPair | None:
         """The pair of `line`, if it is open."""
         return self._pairs.get(line)
 
-    def open(self, line: Line, base: int) -> Pair:
+    def open(self, line: TopicLine, base: int) -> ProxyPair:
         """Open the sockets of `line`. Raises `zmq.ZMQError` when a port is taken."""
-        pair = self._pairs[line] = Pair(self._context, line, base)
+        pair = self._pairs[line] = ProxyPair(self._context, line, base)
         return pair
 
-    def close_line(self, line: Line) -> None:
+    def close_line(self, line: TopicLine) -> None:
         """Close the sockets of `line`, and what the native side keeps for it."""
         pair = self._pairs.pop(line, None)
         if pair is not None:
@@ -111,13 +111,13 @@ class Relay:
         for line in list(self._pairs):
             self.close_line(line)
 
-    def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], Pair]]:
+    def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], ProxyPair]]:
         """All sockets that are to be watched, each with its pair."""
         for pair in self._pairs.values():
             for socket in (pair.incoming, pair.outgoing, *pair.monitors.values()):
                 yield socket, pair
 
-    def serve(self, pair: Pair) -> bool:
+    def serve(self, pair: ProxyPair) -> bool:
         """Do what is waiting on a pair; whether somebody came, left, subscribed or unsubscribed."""
         changed = pair.read_connections()
         changed |= pair.read_filters()
@@ -127,7 +127,7 @@ class Relay:
             self._enter(pair, frame)
         return changed
 
-    def know_languages(self, languages: Mapping[Line, frozenset[str]]) -> None:
+    def know_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
         """Who is on each line: some languages need their frames written with care."""
         for line, pair in self._pairs.items():
             pair.languages = languages.get(line, frozenset())
@@ -165,10 +165,10 @@ class Relay:
         for pair in pairs:
             self._judge(pair)
 
-    def _of(self, key: Key) -> list[Pair]:
+    def _of(self, key: Key) -> list[ProxyPair]:
         return [pair for pair in self._pairs.values() if (pair.line.topic, pair.line.codec) == key]
 
-    def _enter(self, pair: Pair, frame: bytes) -> None:
+    def _enter(self, pair: ProxyPair, frame: bytes) -> None:
         key = (pair.line.topic, pair.line.codec)
         try:
             data = pair.shape.read(frame)
@@ -191,7 +191,7 @@ class Relay:
         self._publishing.add(key)
         self._native.publish(*key, data)
 
-    def _refuse(self, pair: Pair, error: FrameError) -> None:
+    def _refuse(self, pair: ProxyPair, error: FrameError) -> None:
         if error.version is not None:
             self._tell_version("publisher", pair, error.version)
             return
@@ -207,7 +207,7 @@ class Relay:
         times = f" ({refused.count} messages)" if refused.count > 1 else ""
         self._alerts.tell(f"message:{topic}", refused.reason + times)
 
-    def _judge(self, pair: Pair) -> None:
+    def _judge(self, pair: ProxyPair) -> None:
         """Name again who can't be served (its name may be known by now), or take it back."""
         if pair.has_0546:
             self._tell_version("subscriber", pair, "0.5.4.6")
@@ -219,7 +219,7 @@ class Relay:
         else:
             self._serve_again(pair, "publisher")
 
-    def _tell_version(self, role: Role, pair: Pair, version: str) -> None:
+    def _tell_version(self, role: Role, pair: ProxyPair, version: str) -> None:
         pair.unserved[role] = version
         names = [f"“{name}”" for name in self._who(pair.line, role)]
         who = "A program" if not names else names[0] if len(names) == 1 else f"One of {', '.join(names)}"
@@ -229,6 +229,6 @@ class Relay:
             "Install nep 0.5.4.8 or 0.5.4.5 for that program.",
         )
 
-    def _serve_again(self, pair: Pair, role: Role) -> None:
+    def _serve_again(self, pair: ProxyPair, role: Role) -> None:
         if pair.unserved.pop(role, None) is not None:
             self._alerts.cure(f"version:{pair.line.topic}:{role}")

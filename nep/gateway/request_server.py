@@ -35,7 +35,7 @@ class Ports:
     broadcast: int = 7777
 
 
-class Desk:
+class RequestServer:
     """Answers every request, also a bad one. A port that is taken is an alert, and is tried again.
 
     `decide` gives a request its port, or raises `RequestError`. Belongs to the gateway's thread.

@@ -9,11 +9,11 @@
 | image   | 5      | a picture: an array (height, width, 3) in BGR order, see `nep.messages.image_codec`    |
 
 JSON has no NaN and no infinity: they are sent as `null`, and a publisher tells of it
-(`NullTeller`): a sensor that has no value for a moment must not end its robot's program, and its readers must
-be able to read on. The original NEP up to 0.5.4.5 raised `ValueError`, 0.5.4.8 sends the bare word `NaN`,
-which no strict reader takes. Keys that are numbers become strings. msgpack takes numpy arrays and dataclasses as
-JSON does. Readers in other languages may want keys that are text or numbers; ours reads all that Python can
-have. Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
+(`NullTeller`): a sensor without a value must not end its robot's program, and its readers must be
+able to read on. The original NEP up to 0.5.4.5 raised `ValueError`, 0.5.4.8 sends the bare word `NaN`,
+which no strict reader takes. Keys that are numbers become strings. msgpack takes numpy arrays and dataclasses
+as JSON does. Readers in other languages may want keys that are text or numbers; ours reads all that Python
+can have. Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
 """
 
 from __future__ import annotations

@@ -11,18 +11,17 @@ import pytest
 import zmq
 
 from nep.backends.zeromq.rpc import Calls
+from nep.gateway.attachment import NativeNetwork
 from nep.gateway.framing import PORT_A
 from nep.gateway.listing import Listing
-from nep.gateway.native import Native
-from nep.gateway.portmap import Line, PortMap, Registration
-from nep.gateway.programs import Link, Program
-from nep.gateway.programs import Registry as GatewayCensus
+from nep.gateway.portmap import PortMap, Registration, TopicLine
+from nep.gateway.programs import OriginalProgram, ProgramTable, TopicLink
 from nep.gateway.requests import RequestError, read_request
 from nep.masters.bad_requests import BadRequests
 from nep.masters.graph import Graph
 from nep.masters.registry import Registry
 from nep.masters.router import MasterPort
-from nep.masters.snapshot import Viewer
+from nep.masters.snapshot import GraphViewer
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.protocol.requests import (
@@ -52,7 +51,7 @@ def census_with_node() -> Registry:
 
 def test_names_of_topics_that_nobody_uses_leave_nothing_behind() -> None:
     registry = census_with_node()
-    member, viewer = registry.members["n"], Viewer(registry)
+    member, viewer = registry.members["n"], GraphViewer(registry)
     for n in range(20_000):
         registry.add_publisher(member, PublisherRecord(1, f"/p{n}", "json", "json", ("tcp://h:1",)))
         registry.add_subscriber(member, SubscriberRecord(2, f"/s{n}", "json"))
@@ -69,7 +68,7 @@ def test_names_of_topics_that_nobody_uses_leave_nothing_behind() -> None:
 
 def test_a_topic_that_comes_again_between_two_looks_is_looked_at_again() -> None:
     registry = census_with_node()
-    member, viewer = registry.members["n"], Viewer(registry)
+    member, viewer = registry.members["n"], GraphViewer(registry)
     registry.add_publisher(member, PublisherRecord(1, "/t", "json", "json"))
     assert viewer.view(7).topics["/t"].msg_type == "json"
     registry.remove_publisher("n", 1)
@@ -183,10 +182,10 @@ CONTROLS = "Arm\x1b[2J\u202e\n\u2028"
 def test_names_of_originals_are_cleaned_and_cut_for_they_cannot_be_told_to_change_them() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     listing = Listing(lambda request: graph.apply(request, -1, 0.0, "")[-1].answer, 7)  # type: ignore[arg-type, return-value]
-    line = Line("t", "bare", "json", "many2many")
+    line = TopicLine("t", "bare", "json", "many2many")
     registration = Registration(line, CONTROLS, "publisher", "json", "A", None, None, None)
-    link = Link("t", "json", "json", "publisher")
-    listing.show((Program(registration.node_id, CONTROLS * 100, None, "A", "\x1b]0;x\x07", (link,)),))
+    link = TopicLink("t", "json", "json", "publisher")
+    listing.show((OriginalProgram(registration.node_id, CONTROLS * 100, None, "A", "\x1b]0;x\x07", (link,)),))
     (node,) = graph.view().nodes.values()
     assert not any(map(control_in, (node.id, node.name, node.language)))
     assert node.name.startswith("Arm\\x1b[2J\\u202e\\n\\u2028Arm")
@@ -202,7 +201,9 @@ def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
         told.append(len(alerts))
         shown.extend(each.sentence for each in alerts[-1:])  # type: ignore[attr-defined]
 
-    native = Native(lambda: pytest.fail("no node is needed"), Listing(lambda _request: None, 7), report)  # type: ignore[arg-type, return-value]
+    native = NativeNetwork(
+        lambda: pytest.fail("no node is needed"), Listing(lambda _request: None, 7), report
+    )  # type: ignore[arg-type, return-value]
     for n in range(1000):
         native.tell(f"topic:{n}", f"“{n}{CONTROLS}” stays")
     assert max(told) == 200
@@ -214,9 +215,9 @@ def test_alerts_about_originals_are_cleaned_and_bounded() -> None:
 
 def test_who_asked_and_never_came_makes_room() -> None:
     known = PortMap(None)
-    line = Line("t", "bare", "json", "many2many")
+    line = TopicLine("t", "bare", "json", "many2many")
     processes = SimpleNamespace(started=lambda _pid: None, is_joined=lambda *_a, **_k: None)
-    registry = GatewayCensus(known, processes, lambda _line: None)  # type: ignore[arg-type]
+    registry = ProgramTable(known, processes, lambda _line: None)  # type: ignore[arg-type]
     for n in range(3):
         known.add(Registration(line, f"n{n}", "publisher", "json", "A", None, None, None))
     registry.look()

@@ -5,13 +5,13 @@ import threading
 
 import pytest
 
-from nep.gateway.inbox import Inbox
+from nep.gateway.inbox import NativeInbox
 from nep.messages.message import Message
 
 
 @pytest.fixture
 def inbox():
-    made = Inbox(max_messages=3, max_bytes=100)
+    made = NativeInbox(max_messages=3, max_bytes=100)
     yield made
     made.close()
 

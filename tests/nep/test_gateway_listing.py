@@ -7,7 +7,7 @@ import pytest
 
 from nep.gateway.listing import Listing
 from nep.gateway.processes import load_of
-from nep.gateway.programs import Link, Program
+from nep.gateway.programs import OriginalProgram, TopicLink
 from nep.masters.graph import Graph
 from nep.protocol.requests import Look
 from nep.system.cpu import CpuLoad
@@ -15,7 +15,7 @@ from nep.system.cpu import CpuLoad
 EPOCH = 77
 
 
-class Desk:
+class RequestServer:
     """A graph that is asked without a master around it."""
 
     def __init__(self):
@@ -35,7 +35,7 @@ class Desk:
 
 @pytest.fixture
 def desk():
-    return Desk()
+    return RequestServer()
 
 
 @pytest.fixture
@@ -44,18 +44,18 @@ def listing(desk):
 
 
 def program(name, *links, pid=1, language="python"):
-    return Program(f"original:A:{name}:{pid}", name, pid, "A", language, links)
+    return OriginalProgram(f"original:A:{name}:{pid}", name, pid, "A", language, links)
 
 
 def publishes(topic, codec="json", msg_type="json"):
-    return Link(topic, msg_type, codec, "publisher")
+    return TopicLink(topic, msg_type, codec, "publisher")
 
 
 def test_originals_are_nodes_with_their_language_and_wire(desk, listing):
     listing.show(
         (
             program("a", publishes("t")),
-            program("b", Link("t", "json", "json", "subscriber"), language="javascript"),
+            program("b", TopicLink("t", "json", "json", "subscriber"), language="javascript"),
         )
     )
     view = desk.view()

@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 import nep
-from nep.gateway.inbox import Inbox
+from nep.gateway.attachment import NativeNetwork
+from nep.gateway.inbox import NativeInbox
 from nep.gateway.listing import Listing
-from nep.gateway.native import Native
 from nep.messages.message import Message
 from tests.nep.bad_pictures import BOMBS
 
@@ -16,8 +16,8 @@ class Scene:
     def __init__(self, master):
         self.alerts = ()
         self.made = 0
-        self.inbox = Inbox()
-        self.native = Native(self._node, Listing(master.submit, master.epoch), self._report)
+        self.inbox = NativeInbox()
+        self.native = NativeNetwork(self._node, Listing(master.submit, master.epoch), self._report)
         self.native.start(self.inbox)
         self.address = master.address
 

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from nep.gateway.portmap import FIRST_PORT, LAST_PORT, Line, PortMap, Registration, default_file
+from nep.gateway.portmap import FIRST_PORT, LAST_PORT, PortMap, Registration, TopicLine, default_file
 
-JSON_A = Line("t", "prefixed", "json", "many2many")
-JSON_B = Line("t", "bare", "json", "many2many")
+JSON_A = TopicLine("t", "prefixed", "json", "many2many")
+JSON_B = TopicLine("t", "bare", "json", "many2many")
 
 
 def registration(line=JSON_A, node="n", pid=7):
@@ -64,11 +64,11 @@ def test_ports_are_given_from_9000_up_in_even_steps():
 def test_a_line_that_nobody_uses_gives_its_port_away_only_when_all_are_given():
     known = PortMap(None)
     for number, port in enumerate(range(FIRST_PORT, LAST_PORT + 1, 2)):
-        known.give(Line(f"t{number}", "bare", "json", "many2many"), port)
+        known.give(TopicLine(f"t{number}", "bare", "json", "many2many"), port)
     assert list(known.candidates(lambda line: line.topic != "t3")) == [9006]
     known.give(JSON_A, 9006)
     assert known.port_of(JSON_A) == 9006
-    assert known.port_of(Line("t3", "bare", "json", "many2many")) is None
+    assert known.port_of(TopicLine("t3", "bare", "json", "many2many")) is None
     assert not list(known.candidates(lambda line: True))
 
 

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import pytest
 import zmq
 
-from nep.gateway.portmap import Line
-from nep.gateway.proxy_pair import MOST_KEPT_BYTES, Pair
+from nep.gateway.portmap import TopicLine
+from nep.gateway.proxy_pair import MOST_KEPT_BYTES, ProxyPair
 
 LONG_MS = 30_000
 Socket: TypeAlias = zmq.Socket[bytes]
@@ -37,14 +37,14 @@ def free_base() -> int:
 
 
 @pytest.fixture
-def pair(context: zmq.Context[zmq.Socket[bytes]]) -> Iterator[Pair]:
-    made = Pair(context, Line("t", "prefixed", "json", "many2many"), free_base())
+def pair(context: zmq.Context[zmq.Socket[bytes]]) -> Iterator[ProxyPair]:
+    made = ProxyPair(context, TopicLine("t", "prefixed", "json", "many2many"), free_base())
     yield made
     made.close()
 
 
 @pytest.fixture
-def subscriber(context: zmq.Context[zmq.Socket[bytes]], pair: Pair) -> Iterator[Callable[..., Socket]]:
+def subscriber(context: zmq.Context[zmq.Socket[bytes]], pair: ProxyPair) -> Iterator[Callable[..., Socket]]:
     """Makes subscribers: one that has room for so many messages itself, with a filter that no other has."""
     made: list[Socket] = []
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from nep.masters.graph import Graph
 from nep.masters.leases import read_renewal, renewed_body
 from nep.masters.master import Master
-from nep.masters.snapshot import Viewer
+from nep.masters.snapshot import GraphViewer
 from nep.messages.packing import pack
 from nep.protocol import encoding
 from nep.protocol.encoding import AnswerEncoder, write
@@ -78,7 +78,7 @@ def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
 
 def view(graph: Graph) -> GraphView:
     """What somebody sees who looks for the first time."""
-    return Viewer(graph._registry).view(EPOCH)
+    return GraphViewer(graph._registry).view(EPOCH)
 
 
 def test_a_quick_renewal_says_and_does_what_the_long_way_does() -> None:

@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from nep.gateway.portmap import Line, PortMap, Registration
-from nep.gateway.programs import Census, Link
+from nep.gateway.portmap import PortMap, Registration, TopicLine
+from nep.gateway.programs import ProgramTable, TopicLink
 from nep.gateway.proxy_pair import ends_of
 
-LINE = Line("t", "prefixed", "json", "many2many")
+LINE = TopicLine("t", "prefixed", "json", "many2many")
 
 
 class FakeProcesses:
@@ -35,8 +35,8 @@ def scene():
         ends=ends_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0, unserved={}
     )
     now = [0.0]
-    census = Census(known, processes, lambda line: pair if line == LINE else None, lambda: now[0])
-    return SimpleNamespace(known=known, processes=processes, pair=pair, census=census, now=now)
+    programs = ProgramTable(known, processes, lambda line: pair if line == LINE else None, lambda: now[0])
+    return SimpleNamespace(known=known, processes=processes, pair=pair, programs=programs, now=now)
 
 
 def register(scene, pid=7, socket="publisher", node="n", started=100.0):
@@ -48,14 +48,14 @@ def register(scene, pid=7, socket="publisher", node="n", started=100.0):
 
 
 def roles(scene):
-    scene.census.look()
-    return [link.role for program in scene.census.programs() for link in program.links]
+    scene.programs.look()
+    return [link.role for program in scene.programs.programs() for link in program.links]
 
 
 def test_a_program_has_no_role_before_it_is_connected(scene):
     register(scene)
     assert roles(scene) == []
-    assert [program.name for program in scene.census.programs()] == ["n"]
+    assert [program.name for program in scene.programs.programs()] == ["n"]
 
 
 def test_who_asked_as_publisher_and_connects_as_subscriber_is_a_subscriber(scene):
@@ -63,7 +63,7 @@ def test_who_asked_as_publisher_and_connects_as_subscriber_is_a_subscriber(scene
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}
     assert roles(scene) == ["subscriber"]
-    assert scene.census.programs()[0].links == (Link("t", "json", "json", "subscriber"),)
+    assert scene.programs.programs()[0].links == (TopicLink("t", "json", "json", "subscriber"),)
 
 
 def test_where_the_system_does_not_tell_the_request_is_believed(scene):
@@ -75,16 +75,16 @@ def test_where_the_system_does_not_tell_the_request_is_believed(scene):
 
 def test_a_program_is_gone_with_its_process(scene):
     register(scene)
-    assert not scene.census.forget_the_gone()
+    assert not scene.programs.forget_the_gone()
     del scene.processes.running[7]
-    assert scene.census.forget_the_gone()
-    assert not scene.census.programs()
+    assert scene.programs.forget_the_gone()
+    assert not scene.programs.programs()
 
 
 def test_a_number_that_another_process_has_now_is_not_the_program(scene):
     register(scene)
     scene.processes.running[7] = 5000.0
-    assert scene.census.forget_the_gone()
+    assert scene.programs.forget_the_gone()
 
 
 def test_a_program_is_gone_when_its_connections_are(scene):
@@ -92,43 +92,43 @@ def test_a_program_is_gone_when_its_connections_are(scene):
     scene.pair.connections["publisher"] = 1
     scene.processes.joined = {(7, 9000)}
     assert roles(scene) == ["publisher"]
-    assert not scene.census.forget_the_gone()
+    assert not scene.programs.forget_the_gone()
     scene.processes.joined = set()
-    scene.census.look()
-    assert scene.census.forget_the_gone()
+    scene.programs.look()
+    assert scene.programs.forget_the_gone()
 
 
 def test_a_program_without_a_process_number_lives_as_long_as_its_connection(scene):
     register(scene, pid=None, started=None, socket="subscriber")
-    assert not scene.census.forget_the_gone()
+    assert not scene.programs.forget_the_gone()
     scene.pair.connections["subscriber"] = 1
     assert roles(scene) == ["subscriber"]
     scene.pair.connections["subscriber"] = 0
-    scene.census.look()
-    assert scene.census.forget_the_gone()
+    scene.programs.look()
+    assert scene.programs.forget_the_gone()
 
 
 def test_a_program_that_left_before_anybody_looked_is_gone(scene):
     register(scene)
-    scene.census.look()
+    scene.programs.look()
     scene.pair.openings = 1
     scene.now[0] = 11.0
-    scene.census.look()
-    assert scene.census.forget_the_gone()
+    scene.programs.look()
+    assert scene.programs.forget_the_gone()
 
 
 def test_a_stranger_that_comes_and_goes_ends_no_program_that_is_about_to_come(scene):
     register(scene)
-    scene.census.look()
+    scene.programs.look()
     scene.pair.openings = 1
     scene.now[0] = 3.0
-    scene.census.look()
-    assert not scene.census.forget_the_gone()
+    scene.programs.look()
+    assert not scene.programs.forget_the_gone()
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}
     scene.now[0] = 11.0
     assert roles(scene) == ["subscriber"]
-    assert not scene.census.forget_the_gone()
+    assert not scene.programs.forget_the_gone()
 
 
 def test_one_program_that_publishes_and_subscribes_is_one_node_with_two_links(scene):
@@ -137,21 +137,21 @@ def test_one_program_that_publishes_and_subscribes_is_one_node_with_two_links(sc
     scene.pair.connections.update(publisher=1, subscriber=1)
     scene.processes.joined = {(7, 9000), (7, 9001)}
     assert sorted(roles(scene)) == ["publisher", "subscriber"]
-    assert len(scene.census.programs()) == 1
+    assert len(scene.programs.programs()) == 1
 
 
 def test_a_line_is_used_while_somebody_asked_for_it_or_is_connected(scene):
-    assert not scene.census.is_used(LINE)
+    assert not scene.programs.is_used(LINE)
     scene.pair.connections["publisher"] = 1
-    assert scene.census.is_used(LINE)
+    assert scene.programs.is_used(LINE)
     scene.pair.connections["publisher"] = 0
     register(scene)
-    assert scene.census.is_used(LINE)
+    assert scene.programs.is_used(LINE)
 
 
 def test_the_broadcast_is_told_who_asked_for_what(scene):
     register(scene)
-    (member,) = scene.census.members()
+    (member,) = scene.programs.members()
     assert (member.topic, member.node, member.port, member.socket, member.pid) == (
         "t",
         "n",
@@ -159,7 +159,7 @@ def test_the_broadcast_is_told_who_asked_for_what(scene):
         "publisher",
         7,
     )
-    assert scene.census.languages() == {LINE: frozenset({"python"})}
+    assert scene.programs.languages() == {LINE: frozenset({"python"})}
 
 
 def test_a_version_that_cannot_be_served_is_shown_when_one_program_alone_can_be_meant(scene):
@@ -167,11 +167,11 @@ def test_a_version_that_cannot_be_served_is_shown_when_one_program_alone_can_be_
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}
     scene.pair.unserved["subscriber"] = "0.5.4.6"
-    scene.census.look()
-    (program,) = scene.census.programs()
+    scene.programs.look()
+    (program,) = scene.programs.programs()
     assert program.generation == "0.5.4.6"
-    assert scene.census.names(LINE, "subscriber") == (program.name,)
+    assert scene.programs.names(LINE, "subscriber") == (program.name,)
     register(scene, pid=8, node="m")
     scene.processes.joined.add((8, 9001))
-    scene.census.look()
-    assert {program.generation for program in scene.census.programs()} == {"A"}
+    scene.programs.look()
+    assert {program.generation for program in scene.programs.programs()} == {"A"}
