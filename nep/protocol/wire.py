@@ -30,7 +30,6 @@ __all__ = [
     "Read",
     "apart",
     "check_node_name",
-    "check_size",
     "check_topic",
     "extension_part",
     "form_of",
@@ -42,6 +41,8 @@ __all__ = [
     "read_extension",
     "read_header",
     "read_part",
+    "split",
+    "split_rest",
     "topic_part",
     "unpack_at",
     "unpack_quickly",
@@ -217,12 +218,6 @@ def read_header(part: bytes) -> Header:
     return Header(codec, flags, seq, stamp_ns, publisher, size)
 
 
-def check_size(header: Header, size: int) -> None:
-    """Raises `WireError` when a payload of `size` bytes is not the one that `header` announced."""
-    if header.size and header.size != size:
-        raise WireError(f"its header tells of {header.size} bytes, its payload has {size}", size)
-
-
 def extension_part(extension: Mapping[str, object]) -> bytes:
     """The fourth part. Raises `WireError` when a value has no form in msgpack."""
     try:
@@ -274,21 +269,34 @@ class Parts(NamedTuple):
 
 def split(parts: Sequence[bytes | memoryview]) -> Parts:
     """The message in `parts`. Raises `WireError` for anything that the specification does not allow."""
-    if len(parts) == 1:
-        parts = apart(bytes(parts[0]))
-    if len(parts) < 3:
-        raise WireError(f"a message has 3 or 4 parts, this one has {len(parts)}")
-    name = bytes(parts[0])
-    header = read_header(bytes(parts[1]))
-    wanted = 4 if header.flags & EXTENSION else 3
-    if len(parts) != wanted:
-        raise WireError(f"its flags ask for {wanted} parts, there are {len(parts)}")
-    check_size(header, len(parts[2]))
+    first, *rest = apart(bytes(parts[0])) if len(parts) == 1 else parts
+    header, payload, extension = split_rest(rest)
+    return Parts(_topic_in(bytes(first)), header, payload, extension)
+
+
+def split_rest(
+    rest: Sequence[bytes | memoryview],
+) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
+    """Header, payload and extension of a message from what follows its first part. Raises `WireError`."""
+    if not rest:
+        raise WireError("a message has 3 or 4 parts, this one has 1")
+    header = read_header(bytes(rest[0]))
+    wanted, there = 4 if header.flags & EXTENSION else 3, len(rest) + 1
+    if there not in {3, 4}:
+        raise WireError(f"a message has 3 or 4 parts, this one has {there}")
+    if there != wanted:
+        raise WireError(f"its flags ask for {wanted} parts, there are {there}")
+    size = len(rest[1])
+    if header.size and header.size != size:
+        raise WireError(f"its header tells of {header.size} bytes, its payload has {size}", size)
+    return header, rest[1], read_extension(rest[2]) if header.flags & EXTENSION else {}
+
+
+def _topic_in(part: bytes) -> str:
+    """The topic in a first part."""
     try:
-        topic = name[:-1].decode("utf-8")
-        if name[-1:] != b"\0":
-            raise WireError("its topic does not end with a zero byte", len(name))
-        check_topic(topic)
+        if part[-1:] != b"\0":
+            raise WireError("its topic does not end with a zero byte", len(part))
+        return check_topic(part[:-1].decode("utf-8"))
     except (UnicodeDecodeError, BadTopicError) as error:
-        raise WireError(f"its topic is none: {error}", len(name)) from error
-    return Parts(topic, header, parts[2], read_extension(parts[3]) if wanted == 4 else {})
+        raise WireError(f"its topic is none: {error}", len(part)) from error

@@ -9,7 +9,7 @@ from __future__ import annotations
 import errno
 import logging
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import zmq
@@ -30,12 +30,11 @@ from nep.protocol.wire import (
     Header,
     Read,
     apart,
-    check_size,
     form_of,
     hello_part,
-    read_extension,
     read_header,
     read_part,
+    split_rest,
     topic_part,
     unpack_at,
     unpack_quickly,
@@ -90,16 +89,10 @@ class _CarefulParser:
             first, *rest = apart(first)
         if not is_alone and first != self._topic:
             raise WireError("a message begins with something else than its topic")
-        if not rest:
-            raise WireError("a message has 3 or 4 parts, this one has 1")
-        header = read_header(bytes(rest[0]))
         if is_alone and len(rest) == 1:
-            self._notice(header)
+            self._notice(read_header(bytes(rest[0])))
             return None
-        if len(rest) != (3 if header.flags & EXTENSION else 2):
-            raise WireError(f"a message has 3 or 4 parts, this one has {len(rest) + 1}")
-        check_size(header, len(rest[1]))
-        return self._message(header, rest, is_alone=is_alone)
+        return self._message(*split_rest(rest), is_alone=is_alone)
 
     def _notice(self, header: Header) -> None:
         """An echo, or the last word of a publisher that closes."""
@@ -115,20 +108,20 @@ class _CarefulParser:
         if not is_possible:
             raise WireError(f"its publisher's number leaps from {last} to {header.seq}")
 
-    def _message(self, header: Header, rest: Sequence[_Part], *, is_alone: bool) -> Message | None:
+    def _message(
+        self, header: Header, payload: _Part, extension: Mapping[str, object], *, is_alone: bool
+    ) -> Message | None:
         codec = codec_numbered(header.codec)
         if codec is None:
             raise WireError(
                 f"its codec has the number {header.codec}, which this nep does not know; update nep"
             )
-        extension = read_extension(rest[2]) if header.flags & EXTENSION else {}
         if not self._sources.arrived(header.publisher, header.seq, is_alone=is_alone):
             return None
         source = self._sources.get(header.publisher)
         msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
         source.kind = kind_of(self._name, codec.name, msg_type, is_latched=bool(header.flags & LATCHED))
         source.form = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags)
-        payload = rest[1]
         # A small view must not keep a large receive buffer alive.
         is_large = len(payload) >= _NO_COPY_BYTES
         data = memoryview(payload).toreadonly() if is_large else bytes(payload)
@@ -286,56 +279,9 @@ class SubSocket:
         return count
 
     def read(self, *, may_wait: bool = False) -> Message | None:
-        """The next message, waited for with `may_wait`; None when there is nothing more.
-
-        As `read_into` does it; a reader that waited has nothing of this in its processor's caches, so each
-        line counts.
-        """
-        recv, find = self._recv, self.sources.by_id.get
-        first: bytes | None = None
-        data: Any
-        try:
-            first = recv(0 if may_wait else _DONTWAIT)
-            if first == self._topic:
-                head = recv(_DONTWAIT)
-                if len(head) != HEADER_BYTES:
-                    return self._read_on(first, head)
-                form, size, seq, stamp_ns, publisher = unpack_quickly(head)
-                source = find(publisher)
-                if not source or source.form != form or source.last != seq - 1 or size in self._doubtful:
-                    return self._read_on(first, head)
-                data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
-                if len(data) != size:
-                    return self._read_on(first, head, data)
-                raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
-            else:
-                if len(first) < self._body or not first.startswith(self._topic):
-                    return self._read_on(first)
-                form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
-                source = find(publisher)
-                raw = first[self._body :]
-                if not source or source.form != form or source.last != seq - 1 or len(raw) != size:
-                    return self._read_on(first)
-        except zmq.Again:
-            if first is not None:
-                self.refusals.add(_TOO_SHORT)
-            return None
-        self.sources.received += 1
-        message = new_message(Message)
-        message.kind, message.raw = source.kind, raw
-        message.stamp_ns = stamp_ns
-        message.seq = source.last = seq
-        message.publisher, message.extension = publisher, NOTHING
-        message.decoded = UNDECODED
-        return message
-
-    def _read_on(self, first: bytes, *got: bytes | zmq.Frame | None) -> Message | None:
-        """The next message that can be understood, beginning with these parts."""
-        following, message = self._carefully(first, *got)
-        while message is None and following is not None:
-            following, message = self._in_parts(following)
+        """The next message, waited for with `may_wait`; None when there is nothing more."""
         one: list[Message] = []
-        return message or (one[0] if self.read_into(one, 1, 1) else None)
+        return one[0] if self.read_into(one, 1, 1, may_wait=may_wait) else None
 
     def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
         """A message that begins with `first`: what comes behind it, if that was read too, and the message.
