@@ -269,6 +269,8 @@ class Parts(NamedTuple):
 
 def split(parts: Sequence[bytes | memoryview]) -> Parts:
     """The message in `parts`. Raises `WireError` for anything that the specification does not allow."""
+    if not parts:
+        raise WireError("a message has 3 or 4 parts, this one has none")
     first, *rest = apart(bytes(parts[0])) if len(parts) == 1 else parts
     header, payload, extension = split_rest(rest)
     return Parts(_topic_in(bytes(first)), header, payload, extension)
