@@ -70,7 +70,7 @@ def test_it_is_one_alert_with_the_exact_count_and_no_dialog(
 
         def counted() -> bool:
             window.tick()
-            return [row.alert.count for row in panel.rows] == [SENT]
+            return [alert.count for alert in panel.shown] == [SENT]
 
         qtbot.waitUntil(counted)
         assert f"({SENT} messages)" in window.banner.banner.accessibleName()

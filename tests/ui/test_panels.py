@@ -23,6 +23,7 @@ from tests.ui.test_panel_behaviour import Editor
 BASES = {
     "base",
     "registry",
+    "one_robot_panel",
     "table_panel",
 }  # no panels themselves
 NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_on, camera_of
 from app.ui.pictures.view import SILENT_AFTER_S, PictureView, rate_sentence
 from app.ui.text.numbers import age_words
@@ -15,22 +16,19 @@ from app.ui.widgets import Chip, Elided, EmptyAction, EmptyState
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
-    from app.core.network.watches import Look, Watch
+    from app.core.network.watches import Look
     from app.core.robots.robot_link import RobotLink
 
 
-class CameraPanel(PanelWidget):
+class CameraPanel(OneRobotPanel):
     """The camera of the robot that was chosen, or of the first one that has a camera."""
 
     shows_pictures = True
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Camera")
-        self._robot = ""
         self._topic = ""
         self._stream: ImageStream | None = None
-        self._watch: Watch | None = None
-        self._revision = -1
         self.rate = Elided("body", "textSecondary", least=60)
         self.header = [self.rate]
         self.chip = Chip(self.theme)
@@ -53,12 +51,7 @@ class CameraPanel(PanelWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.pages)
 
-    def refresh(self) -> None:
-        fleet = self.session.fleet
-        if fleet.revision != self._revision:
-            self._revision = fleet.revision
-            self._choose(next((link for link in self._robots() if camera_of(link) is not None), None))
-        link = fleet.link(self._robot) if self._robot else None
+    def refresh_robot(self, link: RobotLink | None) -> None:
         if self._stream is None or link is None:
             return
         self.view.take(self._stream, boxes_on(link, self._topic))
@@ -70,24 +63,21 @@ class CameraPanel(PanelWidget):
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
 
-    def _robots(self) -> Sequence[RobotLink]:
-        """Those that are there, the one that a person chose to see first."""
+    def wanted_robot(self) -> RobotLink | None:
+        """The first that has a camera; the one that a person chose to see goes before the others."""
         fleet = self.session.fleet
         shown = fleet.shown
-        return [shown, *fleet.connected] if shown is not None and shown.connected else fleet.connected
+        there = [shown, *fleet.connected] if shown is not None and shown.connected else fleet.connected
+        return next((link for link in there if camera_of(link) is not None), None)
 
-    def _choose(self, link: RobotLink | None) -> None:
-        camera = camera_of(link) if link is not None else None
-        if link is None or camera is None:
-            return  # the last picture of a robot that has gone stays, grey
-        if (link.name, camera.topic) == (self._robot, self._topic) and self._stream is not None:
-            return
-        self.shut()
-        self._robot, self._topic = link.name, camera.topic
-        self._stream = self.session.images.stream(camera.topic)
-        self._watch = self.session.fleet.look_at(link.name)
+    def key_of(self, link: RobotLink) -> object:
+        return (link.name, _topic_of(link))
+
+    def show_robot(self, link: RobotLink) -> None:
+        self._topic = _topic_of(link)
+        self._stream = self.session.images.stream(self._topic)
         self.view.clear()
-        self.set_title("Camera", camera.topic)
+        self.set_title("Camera", self._topic)
         self.empty.say("No pictures yet", f"The next picture of {link.name} appears here.")
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
@@ -96,12 +86,16 @@ class CameraPanel(PanelWidget):
         return (self._stream, self._watch)
 
     def shut(self) -> None:
+        super().shut()
         if self._stream is not None:
             self._stream.close()
-        if self._watch is not None:
-            self._watch.close()
-        self._stream = self._watch = None
-        self._revision = -1
+            self._stream = None
+
+
+def _topic_of(link: RobotLink) -> str:
+    """Where the pictures of a robot's first camera come; empty when it has none."""
+    camera = camera_of(link)
+    return camera.topic if camera is not None else ""
 
 
 PANEL = Panel("camera", "Camera", "camera", (), CameraPanel)

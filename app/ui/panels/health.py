@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
@@ -11,14 +10,14 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.robots.health_facts import HealthFact, facts_of
-from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Scrolled, label, paint
 from app.ui.widgets.indicators import StatusIcon
 
 if TYPE_CHECKING:
-    from app.core.network.watches import Look, Watch
     from app.core.robots.robot_link import RobotLink
 
 TITLE_WIDTH = 96
@@ -73,14 +72,11 @@ class HealthRow(QWidget):
         self.setAccessibleDescription(fact.words)
 
 
-class HealthPanel(PanelWidget):
+class HealthPanel(OneRobotPanel):
     """The health of the robot that is shown."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Health")
-        self._robot = ""
-        self._revision = -1
-        self._watch: Watch | None = None
         self._facts: tuple[HealthFact, ...] = ()
         self.rows: list[HealthRow] = []
         self.chip = Chip(self.theme)
@@ -122,12 +118,13 @@ class HealthPanel(PanelWidget):
 
     # -- what it shows ------------------------------------------------------------------------------------
 
-    def refresh(self) -> None:
-        fleet = self.session.fleet
-        if fleet.revision != self._revision:
-            self._revision = fleet.revision
-            self._choose(fleet.shown or fleet.link(self._robot))
-        link = fleet.link(self._robot) if self._robot else None
+    def fleet_changed(self) -> None:
+        link = self.wanted_robot()
+        self.pages.setCurrentIndex(0 if link is None else 1)
+        if link is not None:
+            self.set_title("Health", link.name if len(self.session.fleet.links) > 1 else "")
+
+    def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
             self.chip.set("")
             return
@@ -157,18 +154,6 @@ class HealthPanel(PanelWidget):
             self._column.insertWidget(len(self.rows) + 1 if self.rows else 0, row)
             self.rows.append(row)
 
-    def _choose(self, link: RobotLink | None) -> None:
-        self.pages.setCurrentIndex(0 if link is None else 1)
-        if link is None:
-            return
-        several = len(self.session.fleet.links) > 1
-        self.set_title("Health", link.name if several else "")
-        if link.name == self._robot and self._watch is not None:
-            return
-        self.shut()
-        self._robot, self._revision = link.name, self.session.fleet.revision
-        self._watch = self.session.fleet.look_at(link.name)
-
     def _do_next_step(self) -> None:
         link = self.session.fleet.link(self._robot)
         if link is not None:
@@ -183,15 +168,6 @@ class HealthPanel(PanelWidget):
         super().theme_changed()
         self._make_rows(0)
         self._facts = ()
-
-    def looks(self) -> Iterable[Look | None]:
-        return (self._watch,)
-
-    def shut(self) -> None:
-        if self._watch is not None:
-            self._watch.close()
-            self._watch = None
-        self._revision = -1
 
 
 def _whole_age(age_s: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,8 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.robot_drawing.scene import RobotDrawing
 from app.ui.robot_drawing.state import RobotState
 from app.ui.text import plain
@@ -22,7 +23,6 @@ from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.menus import Menu, drop_below
 
 if TYPE_CHECKING:
-    from app.core.network.watches import Look, Watch
     from app.core.robots.robot_link import RobotLink
 
 TOUCHABLE = ("head", "left_hand", "right_hand")
@@ -129,14 +129,11 @@ class RoomView(QWidget):
             self.touched.emit(part, down)
 
 
-class RobotPanel(PanelWidget):
+class RobotPanel(OneRobotPanel):
     """The first virtual robot; its name is the title."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Robot")
-        self._robot = ""
-        self._revision = -1
-        self._watch: Watch | None = None
         self._told: Mapping[str, object] | None = None
         self._told_s = 0.0
         self.chip = Chip(self.theme)
@@ -164,13 +161,10 @@ class RobotPanel(PanelWidget):
         column.addWidget(self.pages)
         self._say_nothing(None)
 
-    def refresh(self) -> None:
-        fleet = self.session.fleet
-        if fleet.revision != self._revision:
-            self._revision = fleet.revision
-            self.choose.setVisible(len(fleet.links) > 1)
-            self._choose(fleet.shown or fleet.link(self._robot))
-        link = fleet.link(self._robot) if self._robot else None
+    def fleet_changed(self) -> None:
+        self.choose.setVisible(len(self.session.fleet.links) > 1)
+
+    def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
             return
         self.chip.set(link.chip, ROBOT_STATUS.get(link.state, "ok"))
@@ -192,12 +186,7 @@ class RobotPanel(PanelWidget):
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.choose)
 
-    def _choose(self, link: RobotLink | None) -> None:
-        if link is None or link.name == self._robot:
-            return
-        self.shut()
-        self._robot, self._revision = link.name, self.session.fleet.revision
-        self._watch = self.session.fleet.look_at(link.name)
+    def show_robot(self, link: RobotLink) -> None:
         self.set_title(link.name)
         self.reset.setVisible(link.virtual)
         self._say_nothing(link)
@@ -222,18 +211,10 @@ class RobotPanel(PanelWidget):
         if self._robot:
             self.session.fleet.world(self._robot, change)
 
-    def looks(self) -> Iterable[Look | None]:
-        return (self._watch,)
-
     def wake(self) -> None:
         if self._watch is not None and self._watch.resting:
             self._told_s = time.monotonic()  # it is not to blame that nobody looked
         super().wake()
-
-    def shut(self) -> None:
-        if self._watch is not None:
-            self._watch.close()
-            self._watch = None
 
 
 def _where_to_look(link: RobotLink) -> str:

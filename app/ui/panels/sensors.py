@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -11,7 +10,8 @@ from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description.description import Sensor
-from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_words
 from app.ui.text.sensor_values import Reading, reading_of
 from app.ui.theme.icons import paint_icon
@@ -19,7 +19,6 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState, paint
 
 if TYPE_CHECKING:
-    from app.core.network.watches import Look, Watch
     from app.core.robots.robot_link import RobotLink
 
 ROW = {"compact": 26, "comfortable": 28}
@@ -87,14 +86,11 @@ class SensorRow(QWidget):
             paint.box(painter, track, 3, self._theme.colour("accent"))
 
 
-class SensorsPanel(PanelWidget):
+class SensorsPanel(OneRobotPanel):
     """The sensors of the robot that is shown."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Sensors now")
-        self._robot = ""
-        self._watch: Watch | None = None
-        self._revision = -1
         self.rows: list[SensorRow] = []
         self._list = QWidget()
         self._list.setProperty("bare", "true")
@@ -119,31 +115,21 @@ class SensorsPanel(PanelWidget):
         self._frame.setContentsMargins(0, 0, 0, 0)
         self._frame.addWidget(self.pages)
 
-    def refresh(self) -> None:
-        fleet = self.session.fleet
-        if fleet.revision != self._revision:
-            self._revision = fleet.revision
-            self._choose(fleet.shown or fleet.link(self._robot))
-        link = fleet.link(self._robot) if self._robot else None
+    def key_of(self, link: RobotLink) -> object:
+        return (link.name, _shown(link))
+
+    def refresh_robot(self, link: RobotLink | None) -> None:
         if link is not None:
             now = time.monotonic()
             there = link.connected  # what it felt before it went is not true now
             for row in self.rows:
                 row.show_value(link.values.get(row.sensor.name) if there else None, now)
 
-    def _choose(self, link: RobotLink | None) -> None:
-        if link is None:
-            return
-        sensors = _shown(link)
-        if link.name == self._robot and sensors == [row.sensor for row in self.rows]:
-            return
-        self.shut()
-        self._robot, self._revision = link.name, self.session.fleet.revision
-        self._watch = self.session.fleet.look_at(link.name)
+    def show_robot(self, link: RobotLink) -> None:
         for row in self.rows:
             self._column.removeWidget(row)
             row.deleteLater()
-        self.rows = [SensorRow(self.theme, sensor) for sensor in sensors]
+        self.rows = [SensorRow(self.theme, sensor) for sensor in _shown(link)]
         for place, row in enumerate(self.rows):
             row.large = self.density == "comfortable"
             self._column.insertWidget(place, row)
@@ -177,15 +163,6 @@ class SensorsPanel(PanelWidget):
             row.large = density == "comfortable"
             row.updateGeometry()
         super().set_density(density)
-
-    def looks(self) -> Iterable[Look | None]:
-        return (self._watch,)
-
-    def shut(self) -> None:
-        if self._watch is not None:
-            self._watch.close()
-            self._watch = None
-        self._revision = -1
 
 
 def _shown(link: RobotLink) -> list[Sensor]:

@@ -20,7 +20,8 @@ from PySide6.QtWidgets import (
 from app.core.robots.motion_permission import MayNotMoveError
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, RobotInputError
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.list import LIST_WIDTH, RobotList
 from app.ui.text.numbers import plural
@@ -31,7 +32,7 @@ from app.ui.widgets.indicators import ROBOT_STATUS
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
-    from app.core.network.watches import Look, Watch
+    from app.core.network.watches import Look
     from app.core.robots.robot_link import RobotLink
     from app.core.session import Session
 
@@ -89,14 +90,12 @@ class SessionPictures:
         return made
 
 
-class RobotsPanel(PanelWidget):
+class RobotsPanel(OneRobotPanel):
     """The list of robots, and the actions of the chosen one."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Robots")
-        self._robot = ""
-        self._revision = -1
-        self._watch: Watch | None = None
+        self._names: list[str] = []  # of the robots in the list
         self.cards: dict[str, ActionCard] = {}
         self._cards_of = ""
         self._pictures = SessionPictures(self.session)
@@ -169,18 +168,26 @@ class RobotsPanel(PanelWidget):
 
     # -- what it shows ------------------------------------------------------------------------------------
 
-    def refresh(self) -> None:
-        fleet = self.session.fleet
-        if fleet.revision != self._revision:
-            self._revision = fleet.revision
-            self._show_robots()
+    def fleet_changed(self) -> None:
+        self._names = self.list.show_fleet(self.session.fleet)
+        self.pages.setCurrentIndex(1 if self._names else 0)
+        self._fit()
+
+    def wanted_robot(self) -> RobotLink | None:
+        """The one that was chosen here, while it is in the list."""
+        fleet, names = self.session.fleet, self._names
+        if self._robot in names:
+            return fleet.link(self._robot)
+        shown = fleet.shown
+        return shown if shown is not None and shown.name in names else fleet.link(names[0]) if names else None
+
+    def refresh_robot(self, link: RobotLink | None) -> None:
         for name, item in self.items.items():
-            link = fleet.link(name)
-            if link is not None and self._new(name, link.state):
-                item.show_link(link, self.list.seen(name))
-        chosen = fleet.link(self._robot) if self._robot else None
-        if chosen is not None:
-            self._show_link(chosen)
+            its = self.session.fleet.link(name)
+            if its is not None and self._new(name, its.state):
+                item.show_link(its, self.list.seen(name))
+        if link is not None:
+            self._show_link(link)
 
     def _new(self, what: str, *now: object) -> bool:
         """Whether this differs from what was shown."""
@@ -188,35 +195,24 @@ class RobotsPanel(PanelWidget):
         self._seen[what] = now
         return changed
 
-    def _show_robots(self) -> None:
-        fleet = self.session.fleet
-        names = self.list.show_fleet(fleet)
-        self.pages.setCurrentIndex(1 if names else 0)
-        self._fit()
-        if names and self._robot not in names:
-            shown = fleet.shown
-            self._show_robot(shown.name if shown is not None and shown.name in names else names[0])
-        elif names:
-            self._make_forms()
-
     def forget(self, name: str) -> None:
         """A person does not want to see a robot that is away; it is there again when it comes."""
         self.session.fleet.known.forget(name)
         self._seen.pop(name, None)
-        self._show_robots()
+        self._revision = -1
+        self.refresh()
 
     def choose(self, name: str) -> None:
         """A person chose another robot: its actions show here, and the panels of one robot show it too."""
         self.session.fleet.choose(name)
-        self._show_robot(name)
+        link = self.session.fleet.link(name)
+        if link is not None:
+            self.turn_to(link)
 
-    def _show_robot(self, name: str) -> None:
-        self.shut()
-        self._robot, self._revision = name, self.session.fleet.revision
-        self._watch = self.session.fleet.look_at(name)
+    def show_robot(self, link: RobotLink) -> None:
         self._seen.pop("cards", None)
-        if name in self.items:
-            self.items[name].setChecked(True)
+        if link.name in self.items:
+            self.items[link.name].setChecked(True)
         self._make_forms()
 
     def _make_forms(self) -> None:
@@ -349,9 +345,7 @@ class RobotsPanel(PanelWidget):
         return (self._watch, *self._pictures.streams)
 
     def shut(self) -> None:
-        if self._watch is not None:
-            self._watch.close()
-            self._watch = None
+        super().shut()
         for card in self.cards.values():
             card.form.shut()
 
