@@ -58,12 +58,12 @@ import app.core.session
 from app.ui import application as module
 from PySide6.QtCore import QEvent, QObject, QTimer
 at["imports"] = now()
-module.messages.listen()
+module.qt_log.listen()
 app = module.make_application()
 at["application"] = now()
 session = module.Session()
 at["session"] = now()
-window, commands = module.make_window(session, module.Options(new_window=True))
+window = module.make_window(session, module.Options(new_window=True))
 at["built"] = now()
 class Eyes(QObject):
     def eventFilter(self, watched, event):
@@ -77,7 +77,7 @@ def usable():
     at["usable"] = now()
     window.removeEventFilter(eyes)
     if sys.argv[1] == "editor":
-        commands.run("layout.behaviour")
+        window.commands.run("layout.behaviour")
 def look():
     if "master" not in at and session.master.kind == "connected":
         at["master"] = now()

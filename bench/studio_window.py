@@ -87,12 +87,12 @@ def studio(address: str, layout: str = "developer") -> Iterator[Studio]:
         session = Session(
             Settings(Path(home)), address=address, journal_folder=Path(home), start_companions=False
         )
-        window, commands = make_window(session, Options(theme="light", new_window=True))
+        window = make_window(session, Options(theme="light", new_window=True))
         window.show()
         window.begin()
-        commands.run(f"layout.{layout}")
+        window.commands.run(f"layout.{layout}")
         try:
-            yield Studio(window, commands, session)
+            yield Studio(window, window.commands, session)
         finally:
             window.close()
             run_for(0.05)

@@ -22,7 +22,6 @@ from PySide6.QtCore import QTimer
 from app.core.session import Session
 from app.ui.application import Options, make_application, make_window
 from app.ui.self_drive import SelfDrive, Step
-from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.command_palette import Palette
 from app.ui.shell.main_window import MainWindow
 from nep.masters.master import is_running
@@ -132,9 +131,9 @@ def write_behaviour(path: Path) -> None:
 class Pictures(SelfDrive):
     """The stations of the README."""
 
-    def __init__(self, window: MainWindow, commands: Commands, folder: Path, behaviour: Path) -> None:
+    def __init__(self, window: MainWindow, folder: Path, behaviour: Path) -> None:
         self._behaviour = behaviour
-        super().__init__(window, commands, folder)
+        super().__init__(window, folder)
 
     def _plan(self) -> list[Step]:
         run, session = self._commands.run, self._window.session
@@ -217,11 +216,11 @@ def take(folder: Path) -> int:
         write_behaviour(behaviour)
         application = make_application()
         application.setQuitOnLastWindowClosed(False)
-        window, commands = make_window(Session(), Options(theme="light", self_drive=folder))
+        window = make_window(Session(), Options(theme="light", self_drive=folder))
         window.on_shut = lambda: QTimer.singleShot(0, application.quit)
         window.show()
         window.begin()
-        pictures = Pictures(window, commands, folder, behaviour)
+        pictures = Pictures(window, folder, behaviour)
         application.exec()
     for picture in pictures.pictures:
         shrink(picture)

@@ -24,8 +24,7 @@ from app.core.storage.file_lock import Turn
 from app.core.storage.settings import home
 from app.ui.panels.registry import PanelShelf
 from app.ui.self_drive import SelfDrive
-from app.ui.shell.commands.commands import Commands
-from app.ui.shell.logo import LogoEngine
+from app.ui.shell.bars.logo import LogoEngine
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.shell.window_state import WindowState, fitting
@@ -88,8 +87,8 @@ def steps_after(window: MainWindow) -> list[Callable[[], object]]:
     return [*panels, *(partial(importlib.import_module, name) for name in SOON)]
 
 
-def make_window(session: Session, options: Options) -> tuple[MainWindow, Commands]:
-    """The window with its commands, as it was left; nothing runs yet."""
+def make_window(session: Session, options: Options) -> MainWindow:
+    """The window as it was left; nothing runs yet."""
     theme = Theme("light")
     # first of all: until Qt's event loop runs, it tells no widget that the application's font is another one
     WindowState(session.settings, _log.warning).apply_theme(theme)
@@ -98,30 +97,48 @@ def make_window(session: Session, options: Options) -> tuple[MainWindow, Command
         theme.set_mode(chosen)
     window = MainWindow(session, theme, PanelShelf(), read_examples(resources.folder() / "examples"))
     window.setWindowIcon(QIcon(LogoEngine(theme)))
-    commands = Commands(window)
     if not window.state.place(window):
         window.resize(fitting(window.size(), window.screen().availableSize()))
     if not options.alone:
-        commands.tabs.come_back(left_behind(), window.banner)
-    return window, commands
+        window.commands.behaviours.come_back(left_behind(), window.banner.offer)
+    return window
 
 
-def first_steps(window: MainWindow, commands: Commands, options: Options) -> list[Callable[[], object]]:
+def open_asked(window: MainWindow, asked: Asked) -> None:
+    """Do what a start asks, this one or a later one that found this window."""
+    if asked.files:
+        window.commands.files.open_all(asked.files)
+    elif asked.demo:
+        window.commands.behaviours.demo()
+    if window.isVisible():
+        window.setWindowState(window.windowState() & ~Qt.WindowState.WindowMinimized)
+        window.raise_()
+        window.activateWindow()
+
+
+def layout_left(window: MainWindow) -> str:
+    """The layout that a person worked in last, if there is something in it; "" for the start page."""
+    last = window.state.layout
+    there = {"developer": True, "behaviour": any(not each.blank for each in window.session.documents)}
+    return last if there.get(last, False) else ""
+
+
+def first_steps(window: MainWindow, options: Options) -> list[Callable[[], object]]:
     """Let the window say what comes (what was asked, or left); what brings it after the first paint."""
-    left = "" if options.alone else commands.left
+    left = "" if options.alone else layout_left(window)
     asked = bool(options.files or options.demo)
     if options.self_drive is not None:
         window.begin()
-        commands.do_asked(Asked(options.files, options.demo))
+        open_asked(window, Asked(options.files, options.demo))
         return []
     if not asked and not left:
         return [window.begin]
 
     def show() -> None:
         if asked:
-            commands.do_asked(Asked(options.files, options.demo))
+            open_asked(window, Asked(options.files, options.demo))
         else:
-            commands.habits.show_layout(left)
+            window.commands.view.show_layout(left)
         if window.bench is None:  # what was asked can't be opened; an alert says so
             window.show_start()
 
@@ -164,7 +181,7 @@ def run(options: Options) -> int:
     qt_log.quiet_chromium(os.environ)
     application = make_application()
     session = Session()
-    window, commands = make_window(session, options)
+    window = make_window(session, options)
     application.setQuitOnLastWindowClosed(False)
     window.on_shut = lambda: QTimer.singleShot(0, application.quit)
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -175,15 +192,15 @@ def run(options: Options) -> int:
     soon = AfterFirstPaint(window, steps_after(window))
     window.show()
     window.activateWindow()  # keys go there at once, also where no window manager sees to it
-    first = first_steps(window, commands, options)
+    first = first_steps(window, options)
     if not options.alone:
-        first.append(lambda: single_instance.Meeting(meeting_place, commands.do_asked, window))
+        first.append(lambda: single_instance.Meeting(meeting_place, partial(open_asked, window), window))
         first.append(turn.leave)
     soon.put_first(first)
-    IncomingFiles(window, commands.files.open_all)
+    IncomingFiles(window, window.commands.files.open_all)
     if isinstance(application, Application):
-        application.open_files_with(commands.files.open_all)
-    driver = SelfDrive(window, commands, options.self_drive) if options.self_drive is not None else None
+        application.open_files_with(window.commands.files.open_all)
+    driver = SelfDrive(window, options.self_drive) if options.self_drive is not None else None
     code = application.exec()
     if driver is not None and not driver.well:
         return 1

@@ -14,7 +14,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
-from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import FIRST_SIZE, MainWindow
 
 LOOK_MS = 100
@@ -36,12 +35,10 @@ class Step:
 class SelfDrive(QObject):
     """Does the steps one after the other, then closes the window; ``well`` tells whether all were seen."""
 
-    def __init__(
-        self, window: MainWindow, commands: Commands, folder: Path, steps: Sequence[Step] | None = None
-    ) -> None:
+    def __init__(self, window: MainWindow, folder: Path, steps: Sequence[Step] | None = None) -> None:
         """Begin at once; ``steps`` replace the main job."""
         super().__init__(window)
-        self._window, self._commands, self._folder = window, commands, folder
+        self._window, self._commands, self._folder = window, window.commands, folder
         self.well = False
         self.pictures: list[Path] = []
         self._steps = iter(steps if steps is not None else self._plan())
@@ -92,7 +89,7 @@ class SelfDrive(QObject):
 
     def _begin(self) -> None:
         self._commands.run("theme.light")
-        self._commands.demo()
+        self._commands.behaviours.demo()
 
     def _has_topics(self) -> bool:
         return len(self._window.session.topics) > 3

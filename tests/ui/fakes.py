@@ -519,7 +519,7 @@ class Session:
             session.console.add(level, origin, text)
         session.alerts.put(
             "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
-            "1 204 messages could not be read.", button="Look at the raw bytes", action="topic.open:/faces",
+            "1 204 messages could not be read.", button="Look at the raw bytes", action="inspect:/faces",
         )  # fmt: skip
         return session
 

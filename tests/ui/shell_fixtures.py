@@ -44,8 +44,8 @@ def answers() -> Answers:
 
 
 @pytest.fixture
-def window(qtbot, theme: Theme, session: Session) -> Iterator[MainWindow]:
-    made = MainWindow(session, theme, PANELS, [])
+def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[MainWindow]:
+    made = MainWindow(session, theme, PANELS, [], asks=answers)
     qtbot.addWidget(made)
     theme.apply()
     made.resize(1440, 900)
@@ -54,5 +54,5 @@ def window(qtbot, theme: Theme, session: Session) -> Iterator[MainWindow]:
 
 
 @pytest.fixture
-def commands(window: MainWindow, answers: Answers) -> Commands:
-    return Commands(window, answers)
+def commands(window: MainWindow) -> Commands:
+    return window.commands

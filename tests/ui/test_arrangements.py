@@ -13,7 +13,7 @@ from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.name import NameSheet
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
-from tests.ui.shell_parts import PANELS, Answers
+from tests.ui.shell_parts import PANELS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -43,14 +43,14 @@ def keep_as(window: MainWindow, commands: Commands, name: str) -> NameSheet:
 
 
 def menu(window: MainWindow, commands: Commands) -> dict[str, bool]:
-    commands.habits._lists._refresh("View")
-    entries = commands.habits._lists._layouts.actions()
+    commands.menus._refresh("View")
+    entries = commands.menus._layouts.actions()
     return {entry.text(): entry.isChecked() for entry in entries if not entry.isSeparator()}
 
 
 def use(window: MainWindow, commands: Commands, name: str) -> None:
     menu(window, commands)
-    next(e for e in commands.habits._lists._layouts.actions() if e.text() == name).trigger()
+    next(e for e in commands.menus._layouts.actions() if e.text() == name).trigger()
 
 
 def test_a_layout_gets_a_name_and_the_built_in_one_stays(shown: MainWindow, commands: Commands) -> None:
@@ -115,7 +115,7 @@ def test_the_next_start_shows_the_same_layout(
     shown.close()
     other = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(other)
-    again = Commands(other, Answers())
+    again = other.commands
     again.run("layout.developer")
     assert other.arrangements.own("developer") == "Mine"
     assert opened(other) == left
@@ -139,7 +139,7 @@ def test_a_damaged_layout_is_as_at_first_and_said_in_the_console(
     session.settings.set("layouts", {"developer": damaged, "own:": 3, "own:Old": {"base": "gone"}})
     window = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(window)
-    Commands(window, Answers()).run("layout.developer")
+    window.commands.run("layout.developer")
     assert {"topics", "inspector", "image", "console"} <= opened(window)
     said = [record.text for record in session.console.records]
     assert "The layout “developer” could not be put back; it is as at first." in said
@@ -152,13 +152,13 @@ def test_settings_of_another_kind_change_nothing(qtbot, session: Session, theme:
     session.settings.set("chosen_layouts", {"developer": 5})
     window = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(window)
-    Commands(window, Answers()).run("layout.developer")
+    window.commands.run("layout.developer")
     assert "topics" in opened(window)
     window.close()
 
 
 def test_what_does_not_apply_is_grey_in_the_menu(shown: MainWindow, commands: Commands) -> None:
-    lists = commands.habits._lists
+    lists = commands.menus
     lists._refresh("View")
     assert not commands.actions["layout.delete"].isEnabled()
     assert not commands.actions["text.smaller"].isEnabled()
@@ -173,8 +173,8 @@ def test_what_does_not_apply_is_grey_in_the_menu(shown: MainWindow, commands: Co
 def test_the_palette_shows_own_layouts(shown: MainWindow, commands: Commands) -> None:
     keep_as(shown, commands, "Two cameras")
     use(shown, commands, "Developer")
-    found = {entry.words: entry for entry in commands.habits._offers.all()}
-    commands.habits.do(found["Two cameras"])
+    found = {entry.words: entry for entry in commands.entries.all()}
+    commands.view.do(found["Two cameras"])
     assert shown.arrangements.own("developer") == "Two cameras"
 
 
@@ -191,7 +191,7 @@ def test_what_can_not_be_written_is_not_said_to_be_kept(shown: MainWindow, comma
     assert alert.title == "What you choose now is forgotten when Studio ends."
     commands.run("layout.delete")
     assert shown.toast.text == "“Two” is gone until Studio ends"
-    commands.habits._forget_recent()
+    commands.behaviours.forget_recent()
     assert shown.toast.text == "The list of recent files is empty until Studio ends"
     commands.run("robots.ask")
     assert shown.toast.text == "Studio asks again before a real robot moves, until Studio ends"

@@ -7,10 +7,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu, QPushButton, QWidget
 
+from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.commands import menus
-from app.ui.shell.commands.availability import why_not
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.layout_tools import DeveloperTools
 from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -20,7 +19,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 def tools(qtbot, window: MainWindow, commands: Commands) -> DeveloperTools:
     window.show()
     commands.run("layout.developer")
-    return commands.habits.tools
+    return window.tools
 
 
 def live(window: MainWindow, name: str) -> QPushButton:
@@ -52,11 +51,11 @@ def test_where_nothing_is_live_nothing_freezes(tools, window) -> None:
     live(window, "inspector").hide()
     tools.refresh()
     assert not tools.freeze.isEnabled()
-    assert why_not(window, "view.freeze") == "Nothing here can be frozen"
+    assert window.commands.actions.why_not("view.freeze") == "Nothing here can be frozen"
     live(window, "image")
     tools.refresh()
     assert tools.freeze.isEnabled()
-    assert why_not(window, "view.freeze") == ""
+    assert window.commands.actions.why_not("view.freeze") == ""
 
 
 @pytest.fixture

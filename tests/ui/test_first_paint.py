@@ -141,7 +141,7 @@ def test_everything_that_shows_first_has_our_fonts(
     journal.write("Walk", None, {"blocks": {"blocks": [{"type": "x", "id": "a"}]}}, {})
     monkeypatch.setattr("app.core.documents.journal._alive", lambda _pid, _born_s: False)
     (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
-    window, _commands = make_window(Session(Settings(tmp_path), start_companions=False), Options())
+    window = make_window(Session(Settings(tmp_path), start_companions=False), Options())
     qtbot.addWidget(window)
     window.show()
     assert window.banner.isVisible(), "unsaved work is offered"

@@ -17,7 +17,7 @@ from app.blocks import Problem
 from app.blocks.toolbox.catalogue import Catalogue
 from app.core.documents.problems import Listed
 from app.ui.panels.problems import ProblemRow
-from app.ui.shell.actions.table import TABLE
+from app.ui.shell.commands.table import COMMANDS
 from app.ui.theme import icons
 from app.ui.theme import tokens as theme_tokens
 from app.ui.theme.theme import Theme
@@ -41,7 +41,7 @@ def test_every_icon_of_the_design_is_shipped() -> None:
     tokens = theme_tokens.load()
     wanted = {*tokens.icons.values(), *tokens.block_icons.values()}
     wanted |= {status.icon for status in tokens.status.values() if status.icon != "dot"}
-    wanted |= {row.icon for row in TABLE if row.icon is not None}
+    wanted |= {row.icon for row in COMMANDS if row.icon is not None}
     assert wanted <= icons.names()
 
 

@@ -17,9 +17,9 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
-from app.ui.application import Options, first_steps
-from app.ui.shell.actions.table import TABLE, shortcuts
+from app.ui.application import Options, first_steps, layout_left
 from app.ui.shell.commands.commands import Commands
+from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.main_window import MainWindow, Placeholder
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
@@ -295,7 +295,7 @@ def test_what_was_closed_in_a_narrow_window_stays_closed_in_a_wide_one(
 def test_everything_comes_back_at_the_next_start(qtbot, theme: Theme, session: Session, home: Path) -> None:
     first = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(first)
-    commands = Commands(first)
+    commands = first.commands
     show(qtbot, first)
     bench = first.show_layout("developer")
     bench.docks["alerts"].close()
@@ -346,9 +346,9 @@ def test_commands_are_done_by_name(qtbot, window: MainWindow, commands: Commands
     assert panel(window, "behaviour", "behaviour").blocks == ["b7"]
     assert commands.run("edit.undo")
     assert panel(window, "behaviour", "behaviour").undone == ["undo"]
-    assert commands.run("panel.topics")
-    assert not commands.run("nonsense")
-    assert not commands.run("panel.nonsense")
+    assert commands.run("panel:topics")
+    assert not commands.run("panel:nonsense")
+    assert not commands.run("tab:nobody")
 
 
 def test_an_alert_is_a_banner_until_it_is_cured(qtbot, window: MainWindow, commands: Commands) -> None:
@@ -382,7 +382,7 @@ def test_what_a_dead_studio_left_is_offered_without_a_dialog(
         entry = json.loads(file.read_text("utf-8"))
         file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
     show(qtbot, window)
-    commands.tabs.come_back(left_behind(home / "journal"), window.banner)
+    commands.behaviours.come_back(left_behind(home / "journal"), window.banner.offer)
     assert window.banner.isVisible()
     assert "“Song” and 2 others were not saved" in window.banner.banner.accessibleName()
     assert QApplication.activeModalWidget() is None
@@ -452,10 +452,12 @@ def test_closing_is_orderly(qtbot, window: MainWindow, commands: Commands) -> No
 
 
 def test_every_command_has_words_and_no_two_share_a_key() -> None:
-    assert len({row.name for row in TABLE}) == len(TABLE)
-    keys = [row.shortcut for row in TABLE if row.shortcut]
+    assert len({row.id for row in COMMANDS}) == len(COMMANDS)
+    keys = [key for row in COMMANDS for key in row.keys]
     assert len(set(keys)) == len(keys)
-    assert ("Stop the program and all robots", "F12") in shortcuts()
+    assert all(row.text for row in COMMANDS)
+    stop = next(row for row in COMMANDS if row.id == "run.stop")
+    assert (stop.text, stop.keys_at_first()[0]) == ("Stop the program and all robots", "F12")
 
 
 def test_no_button_of_qts_own_looks_is_left(qtbot, window: MainWindow, commands: Commands) -> None:
@@ -584,15 +586,15 @@ def test_files_are_asked_for_without_covering_stop(qtbot, window: MainWindow, co
 
 
 def test_the_next_start_shows_what_was_worked_on_last(window: MainWindow, commands: Commands) -> None:
-    assert commands.left == "", "a first start"
+    assert layout_left(window) == "", "a first start"
     commands.run("layout.developer")
-    assert commands.left == "developer"
+    assert layout_left(window) == "developer"
     commands.run("layout.behaviour")
-    assert commands.left == "", "no behaviour is open"
+    assert layout_left(window) == "", "no behaviour is open"
     window.session.document.edited({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "a"}]}})
-    assert commands.left == "behaviour"
+    assert layout_left(window) == "behaviour"
     commands.run("file.start_page")
-    assert commands.left == "", "a person went to the start page"
+    assert layout_left(window) == "", "a person went to the start page"
 
 
 def test_a_layout_that_comes_shows_its_bars_and_then_itself(
@@ -618,7 +620,7 @@ def test_a_start_shows_the_file_that_was_asked_for(
     monkeypatch.setattr(window, "begin", lambda: None)
     path = tmp_path / "Mine.nepb"
     path.write_text('{"format": "nep-behaviour", "version": 1, "workspace": {}}' if kind == "good" else "?")
-    steps = first_steps(window, commands, Options((path,) if kind != "none" else ()))
+    steps = first_steps(window, Options((path,) if kind != "none" else ()))
     for step in steps:
         step()
     assert window.showing == ("behaviour" if kind == "good" else "start")
@@ -630,9 +632,9 @@ def test_a_start_shows_what_was_left(
 ) -> None:
     monkeypatch.setattr(window, "begin", lambda: None)
     window.state.keep_layout("developer")
-    steps = first_steps(window, commands, Options())
+    steps = first_steps(window, Options())
     assert window.findChild(Placeholder).accessibleName() == "Getting the panels ready."
     for step in steps:
         step()
     assert window.showing == "developer"
-    assert [step.__name__ for step in first_steps(window, commands, Options(new_window=True))] == ["<lambda>"]
+    assert [step.__name__ for step in first_steps(window, Options(new_window=True))] == ["<lambda>"]

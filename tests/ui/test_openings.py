@@ -18,7 +18,6 @@ from app.robots.description.description import parse, td_for
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.registry import PanelShelf
-from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.main_window import MainWindow
@@ -50,7 +49,7 @@ def window(qtbot, theme: Theme, home: Path) -> Iterator[MainWindow]:
     session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Anna")), "/Anna/description")
     shelf = PanelShelf()
     behaviour = Panel("behaviour", "Behaviour", "blocks", (), lambda ctx: BehaviourPanel(ctx, Editor))
-    made = MainWindow(session, theme, {**shelf, "behaviour": behaviour})
+    made = MainWindow(session, theme, {**shelf, "behaviour": behaviour}, asks=Answers())
     qtbot.addWidget(made)
     theme.apply()
     theme.set_motion(True)
@@ -166,7 +165,6 @@ def test_the_columns_of_a_table(window: MainWindow) -> None:
 
 
 def test_the_menus_of_the_bar_and_what_they_list(window: MainWindow) -> None:
-    commands = Commands(window, Answers())
     window.show()
     opened(window, "topics")
 
@@ -186,15 +184,13 @@ def test_the_menus_of_the_bar_and_what_they_list(window: MainWindow) -> None:
             close_what_is_open(window)
 
     leaves_nothing(window, open_all)
-    assert commands is not None
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_what_a_command_opens(window: MainWindow, name: str) -> None:
-    commands = Commands(window, Answers())
     window.show()
     opened(window, "behaviour")
-    leaves_nothing(window, lambda: commands.run(name))
+    leaves_nothing(window, lambda: window.commands.run(name))
 
 
 def test_toasts_and_banners(window: MainWindow) -> None:

@@ -137,7 +137,7 @@ def test_stop_stays_bright_and_can_be_pressed(palette: Palette, window: MainWind
     beside = stop.mapTo(window, QPoint(-30, stop.height() // 2))
     assert window.childAt(beside) is palette._scrim
     pressed: list[str] = []
-    window.tool_bar.stop_pressed.connect(lambda: pressed.append("stop"))
+    window.commands.actions["run.stop"].triggered.connect(lambda: pressed.append("stop"))
     QTest.mouseClick(stop, Qt.MouseButton.LeftButton)
     assert pressed == ["stop"]
 

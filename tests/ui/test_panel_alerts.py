@@ -25,7 +25,7 @@ def panel(qtbot, window) -> AlertsPanel:
 def test_each_alert_with_its_next_step(panel, window) -> None:
     assert panel.rows[0].accessibleName().startswith("error: /faces sends text that is not JSON")
     press(panel.rows[0].button)
-    assert window.commands == ["topic.open:/faces"]
+    assert window.commands == ["inspect:/faces"]
     assert (panel.chip.text, panel.chip.status) == ("1", "error")
 
 

@@ -47,7 +47,7 @@ def test_with_nothing_chosen_it_says_so_and_leads_to_the_topics(panel, window) -
     assert panel.body.page == NOTHING
     assert window.session.watched == []
     press(button(panel.body.empty, "Choose a topic"))
-    assert window.commands == ["panel.topics"]
+    assert window.commands == ["panel:topics"]
 
 
 def test_it_subscribes_exactly_what_it_shows(panel, window) -> None:

@@ -144,7 +144,7 @@ def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> No
     assert isinstance(panel, RobotPanel)
     assert not panel.reset.isVisibleTo(panel)
     press(button(panel, "Show its actions"))
-    assert window.commands == ["panel.robots"]
+    assert window.commands == ["panel:robots"]
     panel.shut()
     assert window.session.fleet.looked_at == []
 

@@ -13,10 +13,9 @@ from PySide6.QtWidgets import QMenu, QMenuBar
 
 from app.core.session import Session
 from app.ui.panels.registry import PanelShelf
-from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
-from tests.ui.shell_parts import PANELS, Answers
+from tests.ui.shell_parts import PANELS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -70,7 +69,6 @@ def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
 def test_a_panel(qtbot, plug_in: None, theme: Theme, session: Session) -> None:
     window = MainWindow(session, theme, {**PANELS, "counter": PanelShelf()["counter"]}, [])
     qtbot.addWidget(window)
-    Commands(window, Answers())
     window.show_layout("developer")
     window.show()
     view = menu_named(window.bar.menus, "View")

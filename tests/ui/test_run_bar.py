@@ -7,7 +7,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.core.run.view import RunView
-from app.ui.shell.bars.run_bar import RunBar, ToolBar
+from app.ui.shell.actions.actions import Actions
+from app.ui.shell.actions.command import Command
+from app.ui.shell.bars.run_bar import PACES, RunBar, ToolBar
 from app.ui.theme.theme import Theme
 from app.ui.widgets import StopButton, paint
 
@@ -98,18 +100,21 @@ def test_paused_says_go_on(bar: RunBar) -> None:
     assert bar.run.text() == "Run"
 
 
-def test_the_buttons_tell_what_was_pressed(qtbot, bar: RunBar) -> None:
+def test_the_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     told: list[str] = []
-    bar.run_pressed.connect(lambda: told.append("run"))
-    bar.stop_pressed.connect(lambda: told.append("stop"))
-    bar.confirm_pressed.connect(lambda: told.append("confirm"))
+    names = ("run.run", "run.pause", "run.step", "run.stop", "run.confirm", *PACES)
+
+    def row(name: str) -> Command[None]:
+        return Command(name, name, lambda _do: told.append(name))
+
+    bar.use(Actions(bar, theme, [row(name) for name in names], None))
     bar.show_view(VIEWS["ready"])
     QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
     bar.show_view(VIEWS["unanswered"])
     QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
     QTest.mouseClick(bar.confirm, Qt.MouseButton.LeftButton)
     QTest.mouseClick(bar.stop, Qt.MouseButton.LeftButton)
-    assert told == ["run", "confirm", "stop"]
+    assert told == ["run.run", "run.confirm", "run.stop"]
 
 
 @pytest.mark.parametrize(

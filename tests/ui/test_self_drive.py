@@ -18,7 +18,7 @@ def drive(qtbot, window: MainWindow, commands: Commands, folder: Path, steps: li
     window.show()
     done: list[str] = []
     window.on_shut = lambda: done.append("shut")
-    driver = SelfDrive(window, commands, folder, steps)
+    driver = SelfDrive(window, folder, steps)
     qtbot.waitUntil(lambda: bool(done))
     return driver
 

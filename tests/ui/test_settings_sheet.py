@@ -98,7 +98,7 @@ def test_recent_files_that_are_gone_say_so_and_the_list_can_be_cleared(
     there.write_text("{}", "utf-8")
     settings = window.session.settings
     settings.set_recent([RecentFile(there, "there", 0.0), RecentFile(tmp_path / "gone.nepb", "gone", 0.0)])
-    lists = commands.habits._lists
+    lists = commands.menus
     lists._list_recent()
     entries = {entry.text(): entry.isEnabled() for entry in lists._recent.actions() if entry.text()}
     assert entries == {

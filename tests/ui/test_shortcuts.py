@@ -14,9 +14,9 @@ from app.robots.description.description import Parameter
 from app.ui.panels.console.list import FindWords
 from app.ui.panels.robots.controls.number import OpenNumber
 from app.ui.shell.actions.shortcuts import FIXED, Shortcuts
-from app.ui.shell.actions.table import TABLE
 from app.ui.shell.bars.app_bar import AppBar
 from app.ui.shell.commands.commands import Commands
+from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.dialogs.command_palette import Palette
 from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.docking.layouts import LAYOUTS
@@ -34,11 +34,11 @@ NONE = Qt.KeyboardModifier.NoModifier
 
 @pytest.fixture
 def keys(qapp: object, tmp_path: Path) -> Shortcuts:
-    return Shortcuts(Settings(tmp_path), lambda _sentence: None)
+    return Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS)
 
 
 def test_no_two_commands_have_the_same_key_at_first(keys: Shortcuts) -> None:
-    given = [key for row in TABLE for key in keys.of(row.name)]
+    given = [key for row in COMMANDS for key in keys.of(row.id)]
     assert sorted(given) == sorted(set(given))
     assert all(key == QKeySequence(key).toString() for key in given)
 
@@ -51,8 +51,8 @@ def test_ctrl_y_does_again_what_was_undone(window: MainWindow, commands: Command
 
 def test_on_a_mac_no_key_is_the_systems_or_types_a_sign(qapp: object, tmp_path: Path) -> None:
     """Ctrl is Cmd there, Meta the key that says Ctrl; Option types signs, Cmd+Tab changes the program."""
-    keys = Shortcuts(Settings(tmp_path), lambda _sentence: None, platform="darwin")
-    given = [key for row in TABLE for key in keys.of(row.name)]
+    keys = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS, platform="darwin")
+    given = [key for row in COMMANDS for key in keys.of(row.id)]
     assert sorted(given) == sorted(set(given))
     assert not {"Ctrl+Tab", "Ctrl+Shift+Tab", "Ctrl+H", "Ctrl+M", "Ctrl+Space"} & set(given)
     assert not [key for key in given if key.startswith("Alt+")]
@@ -109,7 +109,7 @@ def test_keys_that_move_in_a_text_are_left_to_it(qtbot, theme: Theme, held: Qt.K
 
 def test_a_new_key_is_kept(keys: Shortcuts, tmp_path: Path) -> None:
     keys.give("file.save", "Ctrl+Alt+S")
-    again = Shortcuts(Settings(tmp_path), lambda _sentence: None)
+    again = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS)
     assert again.of("file.save") == ("Ctrl+Alt+S",)
     assert again.own("file.save")
     assert not again.own("file.open")
@@ -155,7 +155,7 @@ def test_stop_keeps_f12_and_may_have_a_second_key(keys: Shortcuts) -> None:
 def test_stops_second_key_is_left_to_whom_a_person_gave_it(tmp_path: Path, qapp: object) -> None:
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.step": ["Ctrl+."]})
-    keys = Shortcuts(settings, print)
+    keys = Shortcuts(settings, print, COMMANDS)
     assert keys.of("run.stop") == ("F12",)
     assert keys.holder("Ctrl+.") == "run.step"
     keys.reset("run.step")
@@ -165,7 +165,7 @@ def test_stops_second_key_is_left_to_whom_a_person_gave_it(tmp_path: Path, qapp:
 def test_nobody_else_gets_f12_not_even_from_the_settings(tmp_path: Path, qapp: object) -> None:
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.run": ["F12"], "run.stop": [], "no.such": ["F2"], "file.open": 7})
-    keys = Shortcuts(settings, lambda _sentence: None)
+    keys = Shortcuts(settings, lambda _sentence: None, COMMANDS)
     assert keys.of("run.run") == ()
     assert keys.of("run.stop") == ("F12",)
     assert keys.of("file.open") == ("Ctrl+O",)
@@ -220,7 +220,7 @@ def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -
 def test_the_sheet_lists_every_command_and_every_fixed_key(sheet: ShortcutSheet) -> None:
     shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Found)]
     assert shown == list(dict.fromkeys(shown))
-    assert set(shown) == {f"command:{row.name}" for row in TABLE} | {
+    assert set(shown) == {f"command:{row.id}" for row in COMMANDS if row.in_shortcuts} | {
         f"fixed:{number}" for number in range(len(FIXED))
     }
     headings = [line.words for line in sheet.rows.lines.lines if isinstance(line, Heading)]
@@ -244,7 +244,7 @@ def test_a_new_key_works_at_once_everywhere(
     QTest.keyClick(window, Qt.Key.Key_F4)
     QTest.keyClick(window, Qt.Key.Key_F8)
     assert paused == ["pause"]
-    commands.habits.open_palette()
+    commands.view.open_palette()
     palette = window.findChild(Palette)
     assert palette is not None
     palette.field.setText("pause")
@@ -257,11 +257,11 @@ def test_a_conflict_names_the_other_and_swaps(sheet: ShortcutSheet, commands: Co
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_S, CTRL)
     assert "“Save”" in sheet.said.text()
-    assert commands.habits.shortcuts.of("file.open") == ("Ctrl+O",)
+    assert commands.shortcuts.of("file.open") == ("Ctrl+O",)
     assert sheet.swap.isVisible()
     QTest.mouseClick(sheet.swap, Qt.MouseButton.LeftButton)
-    assert commands.habits.shortcuts.of("file.open") == ("Ctrl+S",)
-    assert commands.habits.shortcuts.of("file.save") == ("Ctrl+O",)
+    assert commands.shortcuts.of("file.open") == ("Ctrl+S",)
+    assert commands.shortcuts.of("file.save") == ("Ctrl+O",)
     assert not sheet.swap.isVisible()
 
 
@@ -270,7 +270,7 @@ def test_esc_leaves_a_key_as_it_is(sheet: ShortcutSheet, commands: Commands) -> 
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_Escape)
     assert sheet.isVisible()
-    assert commands.habits.shortcuts.of("file.save") == ("Ctrl+S",)
+    assert commands.shortcuts.of("file.save") == ("Ctrl+S",)
 
 
 def test_f12_stops_while_a_key_is_awaited(sheet: ShortcutSheet, commands: Commands) -> None:
@@ -280,7 +280,7 @@ def test_f12_stops_while_a_key_is_awaited(sheet: ShortcutSheet, commands: Comman
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_F12)
     assert stops == ["stop"]
-    assert commands.habits.shortcuts.of("file.save") == ("Ctrl+S",)
+    assert commands.shortcuts.of("file.save") == ("Ctrl+S",)
 
 
 def test_no_command_is_done_by_the_key_that_is_recorded(sheet: ShortcutSheet, commands: Commands) -> None:
@@ -294,7 +294,7 @@ def test_no_command_is_done_by_the_key_that_is_recorded(sheet: ShortcutSheet, co
 
 
 def test_keys_are_taken_away_and_reset(sheet: ShortcutSheet, commands: Commands) -> None:
-    keys = commands.habits.shortcuts
+    keys = commands.shortcuts
     choose(sheet, "Save")
     sheet.rows.setFocus()
     sheet.field.setFocus()
@@ -318,7 +318,7 @@ def test_ctrl_enter_in_the_palette_leads_here(
     sheet: ShortcutSheet, window: MainWindow, commands: Commands
 ) -> None:
     sheet.shut()
-    commands.habits.open_palette()
+    commands.view.open_palette()
     palette = window.findChild(Palette)
     assert palette is not None
     palette.field.setText("save as")
@@ -328,7 +328,7 @@ def test_ctrl_enter_in_the_palette_leads_here(
     assert sheet.rows.entry is not None
     assert sheet.rows.entry.name == "file.save_as"
     press(sheet, Qt.Key.Key_F4)
-    assert commands.habits.shortcuts.of("file.save_as") == ("F4",)
+    assert commands.shortcuts.of("file.save_as") == ("F4",)
 
 
 def test_ctrl_f_finds_blocks_in_the_behaviour_layout_only(

@@ -75,7 +75,7 @@ def a_list_of_choices(window: MainWindow) -> None:
 
 
 def a_file_dialog(window: MainWindow) -> None:
-    window.run("file.open")
+    window.commands.run("file.open")
 
 
 def the_dialog_of_a_picture(window: MainWindow) -> None:
@@ -98,7 +98,7 @@ def a_field_in_which_one_types(window: MainWindow) -> None:
 
 def a_command(name: str) -> Callable[[MainWindow], None]:
     def run(window: MainWindow) -> None:
-        window.run(name)
+        window.commands.run(name)
 
     run.__name__ = name
     return run

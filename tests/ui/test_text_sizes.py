@@ -153,10 +153,12 @@ def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tup
     file = tmp_path / "Story with emotions.nepb"
     file.write_text("{}", "utf-8")
     session.settings.add_recent(file)
-    window = MainWindow(session, theme, PANELS, read_examples(resources.folder() / "examples"))
+    window = MainWindow(
+        session, theme, PANELS, read_examples(resources.folder() / "examples"), asks=Answers()
+    )
     qtbot.addWidget(window)
     theme.set_motion("on")
-    yield window, Commands(window, Answers())
+    yield window, window.commands
     window.close()
 
 

@@ -204,7 +204,7 @@ class RobotPanel(OneRobotPanel):
             self.empty.set_actions([])
         else:
             self.empty.say(link.name, _where_to_look(link))
-            show = EmptyAction("Show its actions", lambda: self.context.run("panel.robots"), "bot")
+            show = EmptyAction("Show its actions", lambda: self.context.run("panel:robots"), "bot")
             self.empty.set_actions([show])
 
     def _change(self, change: Mapping[str, object]) -> None:

@@ -7,17 +7,21 @@ from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.faults import survived
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.base import Toast as Says
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
 from app.ui.shell.bars.banner import BannerPlace, BannerRoom
+from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
 from app.ui.shell.bars.status_bar import Facts, StatusBar
 from app.ui.shell.bars.toast import Toast
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.commands.shell import START
 from app.ui.shell.dialogs.motion_permission import MoveQuestion
 from app.ui.shell.docking.dock import Dock, fitting
 from app.ui.shell.docking.layouts import LAYOUTS, layout_named
@@ -31,18 +35,18 @@ from app.ui.shell.window_state import WindowState
 from app.ui.startup.interpreter import GcFreezeTimer
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
+from app.ui.widgets.file_dialogs import Asks, SystemDialogs
 
 TICK_MS = 33
 SMALLEST = QSize(1100, 700)
 FIRST_SIZE = QSize(1440, 900)
-START = "start"
 FACTS_EVERY = 8  # ticks
 SOON_WORDS = {"behaviour": "Getting the blocks ready."}
 OTHER_SOON_WORDS = "Getting the panels ready."
 
 
 class MainWindow(QMainWindow):
-    """One session in one window. `run` is set by the commands (`app.ui.shell.commands.commands`)."""
+    """One session in one window, and what is in it; for its commands it is a `Shell`."""
 
     bench_made = Signal()
 
@@ -53,18 +57,20 @@ class MainWindow(QMainWindow):
         panels: Mapping[str, Panel],
         examples: Sequence[Example] = (),
         *,
+        asks: Asks | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``clock`` gives monotonic seconds: how long a panel has not been seen."""
+        """``asks`` asks for files, by dialogs if it is None.
+
+        ``clock`` gives monotonic seconds: how long a panel has not been seen.
+        """
         super().__init__()
         self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
         self.state = WindowState(session.settings, self.complain)
         self.arrangements = Arrangements(self.state, self.complain)
-        self.layouts = LAYOUTS
-        self.run: Callable[[str], object] = lambda _name: None
         self.on_shut: Callable[[], object] = lambda: None
-        self.showing = ""
+        self._showing = ""
         self.benches: dict[str, Workbench] = {}
         self._facts = Facts(session)
         self._alerts_seen = -1
@@ -73,7 +79,7 @@ class MainWindow(QMainWindow):
         self._shut = False
         self._leaving = Leaving(self, self.editor, self.close)
         self._build(examples)
-        self.context = PanelContext(session, theme, self.open_topic, self.toast.say, self._run)
+        self.context = PanelContext(session, theme, self.open_topic, self.say, self._run)
         self.ring = FocusRing(theme, self)
         self.enter = EnterKey(self)
         self.timer = QTimer(self)
@@ -81,6 +87,8 @@ class MainWindow(QMainWindow):
         self.timer.timeout.connect(self._half_tick)
         self.gc_freeze = GcFreezeTimer(self)
         self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
+        self.commands = Commands(self, session, asks if asks is not None else SystemDialogs(self))
+        self._connect()
         self.show_start()
 
     def _build(self, examples: Sequence[Example]) -> None:
@@ -113,11 +121,74 @@ class MainWindow(QMainWindow):
         self.toast = Toast(theme, self)
         self.question = MoveQuestion(theme, self, self.session.fleet.moving, self.complain)
 
+    def _connect(self) -> None:
+        commands, start, run = self.commands, self.start, self._run
+        actions, files, shortcuts = commands.actions, commands.files, commands.shortcuts
+        for bar in (self.bar, self.run_bar, self.tool_bar):
+            bar.use(actions)
+        self.tools = DeveloperTools(self, self.tool_bar, commands)
+        self.bar.layout_chosen.connect(lambda layout: run(f"layout.{layout}"))
+        self.use_robot.clicked.connect(actions["robots.start"].trigger)
+        self.status.opened.connect(actions["network.others"].trigger)
+        start.virtual_robot.connect(actions["robots.virtual"].trigger)
+        start.new_behaviour.connect(actions["file.new"].trigger)
+        start.open_pressed.connect(actions["file.open"].trigger)
+        start.developer_pressed.connect(actions["layout.developer"].trigger)
+        start.example_chosen.connect(files.example)
+        start.file_chosen.connect(files.open)
+        self.banner.on_action = run
+        self.banner.on_dismiss = self.session.alerts.dismiss
+        self.banner.on_more = self._show_all_alerts
+        self.pages.currentChanged.connect(self._page_changed)
+        self.bench_made.connect(shortcuts.tell)
+        shortcuts.changed.connect(self._show_keys)
+        self._show_keys()
+
+    def _show_keys(self) -> None:
+        shortcuts = self.commands.shortcuts
+        self.bar.search.show_key(shortcuts.first("palette.open"))
+        shortcuts.tell()
+
+    def _page_changed(self) -> None:
+        self.commands.view.show_keys()
+        self.tools.refresh()
+
+    def _show_all_alerts(self) -> None:
+        self._run("layout.developer")
+        self.open_panel("alerts")
+
+    # -- what its commands may use ----------------------------------------------------------------
+
+    @property
+    def showing(self) -> str:
+        """The name of the layout that shows, or `START`."""
+        return self._showing
+
+    @property
+    def surface(self) -> QWidget:
+        """The widget over which sheets and menus open, and in which keys work."""
+        return self
+
+    @property
+    def menu_bar(self) -> QMenuBar:
+        """Where the menus are."""
+        return self.bar.menus
+
+    @property
+    def say(self) -> Says:
+        """Says for some seconds what the person just did."""
+        return self.toast.say
+
+    @property
+    def examples(self) -> Sequence[Example]:
+        """The examples of the start page."""
+        return self.start.examples
+
     # -- what shows -------------------------------------------------------------------------------
 
     def show_start(self) -> None:
         """Show the start page."""
-        self.showing = START
+        self._showing = START
         self.pages.setCurrentWidget(self.start)
         self.show_recent()
         self._show_bars(None)
@@ -145,7 +216,7 @@ class MainWindow(QMainWindow):
         bench = self.benches[layout.name]
         focus = QApplication.focusWidget()
         inside = focus is None or self.pages.isAncestorOf(focus)
-        self.showing = layout.name
+        self._showing = layout.name
         self.pages.setCurrentWidget(bench)
         if inside:  # not from the switch or a menu, which people go on using
             bench.focus_home()
@@ -155,7 +226,7 @@ class MainWindow(QMainWindow):
 
     def expect(self, layout: str) -> None:
         """Show the bars of a layout, and in its place that it is made in a moment."""
-        self.showing = layout
+        self._showing = layout
         placeholder = Placeholder(layout)
         self.pages.addWidget(placeholder)
         self.pages.setCurrentWidget(placeholder)
@@ -202,7 +273,7 @@ class MainWindow(QMainWindow):
             dock.panel.show_topic(topic)
 
     def _run(self, name: str) -> None:
-        self.run(name)
+        self.commands.run(name)
 
     # -- the tick ---------------------------------------------------------------------------------
 
@@ -216,6 +287,7 @@ class MainWindow(QMainWindow):
             self.tick()
         elif self.bench is not None:
             self.bench.refresh(pictures=True)
+        self.tools.follow()
 
     def _follow_panels(self) -> None:
         """Let panels that nobody can see rest, and the timer run no faster than they need."""

@@ -51,11 +51,9 @@ _MEASURES: dict[str, _Measure] = {
 }
 
 
-def name_command(widget: QWidget, command: str, tip: str, key: str = "") -> None:
-    """Say which command a button does; its tooltip follows the key that a person gives the command."""
+def name_command(widget: QWidget, command: str) -> None:
+    """Say which command a button does: its tooltip is the command's, with the keys of the moment."""
     widget.setProperty("command", command)
-    widget.setProperty("tip", tip)
-    widget.setToolTip(plain.tip(tip_with_key(tip, key)))
 
 
 class PaintedButton(QAbstractButton):
@@ -365,7 +363,7 @@ class StopButton(PaintedButton):
         self._place: Place = place
         self._ring = False
         self.filled = True
-        name_command(self, "run.stop", "Stops the program and every robot", "F12")
+        name_command(self, "run.stop")
         self.setProperty("focusInset", RING)
 
     def show_state(self, word: str, *, ring: bool = False, filled: bool = True) -> None:

@@ -220,7 +220,7 @@ class InspectorPanel(PanelWidget):
         self.own.set_enabled(page == TREE)
 
     def _say_nothing(self) -> None:
-        self.body.say_nothing(self._topic, lambda: self.context.run("panel.topics"))
+        self.body.say_nothing(self._topic, lambda: self.context.run("panel:topics"))
         if not self._topic:
             self.live.set("")
         for button in (self.freeze, self.pin):

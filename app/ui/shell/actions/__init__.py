@@ -1,1 +1,4 @@
-"""The table of commands with their keys, and the keys as a person changed them."""
+"""What a command is, its QAction, and its keys as a person changed them.
+
+It knows no window: `app.ui.shell.commands` is what the commands do.
+"""

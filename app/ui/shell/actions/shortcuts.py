@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from PySide6.QtCore import QKeyCombination, QObject, Qt, Signal
 from PySide6.QtGui import QKeySequence
@@ -16,11 +17,13 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
-from app.ui.shell.actions.table import TABLE, Row
+from app.ui.shell.actions.actions import STOP
+from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.text import plain
 from app.ui.text.numbers import spoken_key
+from app.ui.widgets import IconButton
 
-STOP, STOP_KEY = "run.stop", "F12"
+STOP_KEY = "F12"
 NEEDS_WITH = "A key alone is for typing. Hold Ctrl or Alt with it, or use a function key."
 ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
 HOLDS = (
@@ -81,14 +84,14 @@ class Shortcuts(QObject):
         self,
         settings: Settings,
         complain: Callable[[str], object],
-        rows: Sequence[Row] = TABLE,
+        commands: Sequence[Command[Any]],
         *,
         platform: str = sys.platform,
     ) -> None:
         """``complain`` is told, in a sentence, what can't be kept; ``platform`` as `sys.platform` says it."""
         super().__init__()
         self._settings, self._complain, self._platform = settings, complain, platform
-        self.rows: Mapping[str, Row] = {row.name: row for row in rows}
+        self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
         self._own = self._read()
 
     def _read(self) -> dict[str, tuple[str, ...]]:
@@ -96,7 +99,7 @@ class Shortcuts(QObject):
         kept: dict[str, object] = self._settings.get("shortcuts", {})
         found: dict[str, tuple[str, ...]] = {}
         for name, keys in kept.items():
-            if name in self.rows and isinstance(keys, list):
+            if name in self.commands and isinstance(keys, list):
                 good = tuple(normal(key) for key in keys if isinstance(key, str) and normal(key))
                 found[name] = good
         return found
@@ -104,9 +107,11 @@ class Shortcuts(QObject):
     # -- asking -----------------------------------------------------------------------------------
 
     def default(self, name: str) -> tuple[str, ...]:
-        """The keys that the table gives a command."""
-        row = self.rows.get(name)
-        return tuple(normal(key) for key in row.keys_at_first(self._platform)) if row is not None else ()
+        """The keys that the table gives a command. Raises UnknownCommandError."""
+        command = self.commands.get(name)
+        if command is None:
+            raise UnknownCommandError(name)
+        return tuple(normal(key) for key in command.keys_at_first(self._platform))
 
     def of(self, name: str) -> tuple[str, ...]:
         """The keys of a command now, the first of them in menus and tooltips."""
@@ -126,7 +131,7 @@ class Shortcuts(QObject):
 
     def holder(self, key: str) -> str:
         """The command that has a key; "" when none has."""
-        return next((name for name in self.rows if normal(key) in self.of(name)), "")
+        return next((name for name in self.commands if normal(key) in self.of(name)), "")
 
     def refusal(self, name: str, pressed: QKeyCombination) -> str:
         """Why a key can't be a command's, in a sentence; "" when it can."""
@@ -194,6 +199,8 @@ class Shortcuts(QObject):
         for widget in QApplication.allWidgets():
             command = widget.property("command")
             if isinstance(command, str):
-                said = widget.property("tip") or widget.accessibleName()
+                said = self.commands[command].tip
+                if not said or isinstance(widget, IconButton):  # nothing else says what it is
+                    said = widget.accessibleName()
                 key = ", ".join(spoken_key(each) for each in self.of(command))
-                widget.setToolTip(plain.tip(f"{said} ({key})" if key else str(said)))
+                widget.setToolTip(plain.tip(f"{said} ({key})" if key else said))

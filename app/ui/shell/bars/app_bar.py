@@ -10,8 +10,9 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
 from app.core.session import Session
+from app.ui.shell.actions.actions import Actions
+from app.ui.shell.bars.logo import Logo
 from app.ui.shell.docking.layouts import Layout
-from app.ui.shell.logo import Logo
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -28,7 +29,6 @@ class AppBar(QWidget):
     """Menus at the left, the layouts in the middle, the robots at the right."""
 
     layout_chosen = Signal(str)
-    stop_pressed = Signal()
 
     def __init__(self, theme: Theme, layouts: Sequence[Layout], platform: str = sys.platform) -> None:
         """``platform`` as `sys.platform` says it."""
@@ -48,7 +48,6 @@ class AppBar(QWidget):
         self.search = PaletteField(theme)
         self.chip = Chip(theme, "", "off", large=True)
         self.stop = StopButton(theme, "appBar")
-        self.stop.clicked.connect(self.stop_pressed)
         self._build()
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -83,6 +82,11 @@ class AppBar(QWidget):
         font.setWeight(font.Weight.Medium)
         self.menus.setFont(font)
 
+    def use(self, actions: Actions) -> None:
+        """Let its buttons trigger these."""
+        actions.bind(self.search, "palette.open")
+        actions.bind(self.stop, "run.stop")
+
     def show_layout(self, name: str | None) -> None:
         """Mark the layout that shows; None is the start page, which has no switch but a Stop."""
         if name is not None:
@@ -111,7 +115,6 @@ class PaletteField(PaintedButton):
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(theme, FIELD_WORDS, radius="control", parent=parent)
         self._key = ""
-        self.setProperty("command", "palette.open")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def show_key(self, key: str) -> None:

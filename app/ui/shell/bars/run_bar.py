@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from PySide6.QtCore import Signal
-from PySide6.QtGui import QAction, QResizeEvent
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.core.run.view import RunView
+from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.run_status import Bar, Mark, Result, Sentence
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, name_command, paint
+from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, paint
 from app.ui.widgets.menus import Menu, drop_below
 
 ROOM_PX = 960  # what the bar needs at 100 % text
+PACES = ("run.full_speed", "run.slow", "run.very_slow")
 LEAST_ROOM_PX = 600  # below that even Run is an icon, so that nothing of a stop's result is cut
 
 
 class RunBar(Bar):
     """60 px: three large buttons, what happens now, what the last stop brought, and Stop."""
-
-    run_pressed = Signal()
-    pause_pressed = Signal()
-    step_pressed = Signal()
-    stop_pressed = Signal()
-    confirm_pressed = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
@@ -33,9 +26,6 @@ class RunBar(Bar):
         self.run = RunButton(theme, "Run", "play", widest="Go on")
         self.pause = RunButton(theme, "Pause", "pause")
         self.step = RunButton(theme, "Step", "step-forward")
-        name_command(self.run, "run.run", "Runs the behaviour", "F5")
-        name_command(self.pause, "run.pause", "Holds the program; robots hold still", "F8")
-        name_command(self.step, "run.step", "Runs one block", "F10")
         self.pace = IconButton(theme, "gauge", "Speed", checkable=True, size=36)
         self._paces = Menu(theme, self, "Speed")
         self.mark = Mark(theme)
@@ -46,12 +36,7 @@ class RunBar(Bar):
         self.confirm.let_shrink(96)
         self.stop = StopButton(theme)
         self._build(theme)
-        self.run.clicked.connect(self.run_pressed)
-        self.pause.clicked.connect(self.pause_pressed)
-        self.step.clicked.connect(self.step_pressed)
         self.pace.clicked.connect(lambda: drop_below(self._paces, self.pace))
-        self.stop.clicked.connect(self.stop_pressed)
-        self.confirm.clicked.connect(self.confirm_pressed)
         theme.changed.connect(self._fit)
 
     def _build(self, theme: Theme) -> None:
@@ -72,9 +57,10 @@ class RunBar(Bar):
         row.addSpacing(-4)
         row.addWidget(self.stop)
 
-    def offer_paces(self, actions: Sequence[QAction]) -> None:
-        """What the button for the speed offers: full, slow motion."""
-        self._paces.addActions(list(actions))
+    def use(self, actions: Actions) -> None:
+        """Let its buttons trigger these; the button for the speed offers full speed and slow motion."""
+        bind(self, actions)
+        self._paces.addActions([actions[name] for name in PACES])
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -106,12 +92,6 @@ class RunBar(Bar):
 class ToolBar(Bar):
     """40 px: the same states, small, at the right end."""
 
-    run_pressed = Signal()
-    pause_pressed = Signal()
-    step_pressed = Signal()
-    stop_pressed = Signal()
-    confirm_pressed = Signal()
-
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("toolBar"))
         self.setAccessibleName("Tools, run and stop")
@@ -123,19 +103,11 @@ class ToolBar(Bar):
         self.confirm.let_shrink(96)
         self.run = Button(theme, "Run", "play", kind="run", size="small")
         self.run.fill_icon = True
-        self.pause = IconButton(theme, "pause", "Pause", "F8")
-        self.step = IconButton(theme, "step-forward", "Step", "F10")
-        name_command(self.run, "run.run", "Runs the behaviour", "F5")
-        name_command(self.pause, "run.pause", "Pause", "F8")
-        name_command(self.step, "run.step", "Step", "F10")
+        self.pause = IconButton(theme, "pause", "Pause")
+        self.step = IconButton(theme, "step-forward", "Step")
         self.stop = StopButton(theme, "toolBar")
         self.tools = QHBoxLayout()
         self._build()
-        self.run.clicked.connect(self.run_pressed)
-        self.pause.clicked.connect(self.pause_pressed)
-        self.step.clicked.connect(self.step_pressed)
-        self.stop.clicked.connect(self.stop_pressed)
-        self.confirm.clicked.connect(self.confirm_pressed)
 
     def _build(self) -> None:
         row = QHBoxLayout(self)
@@ -152,6 +124,10 @@ class ToolBar(Bar):
             row.addWidget(button)
         row.addSpacing(-4)
         row.addWidget(self.stop)
+
+    def use(self, actions: Actions) -> None:
+        """Let its buttons trigger these."""
+        bind(self, actions)
 
     def add_tool(self, tool: QWidget, place: int = -1) -> None:
         """Put a button at the left end, at that place among those there, else after them."""
@@ -172,3 +148,12 @@ class ToolBar(Bar):
         self.confirm.set_word(view.confirm or "")
         paint.show_when(self.confirm, view.confirm is not None)
         self.stop.show_state(view.stop_word, ring=view.state == "stopping")
+
+
+def bind(bar: RunBar | ToolBar, actions: Actions) -> None:
+    """Run, Pause, Step, Stop and the button that confirms: in both bars they are the same commands."""
+    actions.bind(bar.run, "run.run")
+    actions.bind(bar.pause, "run.pause")
+    actions.bind(bar.step, "run.step")
+    actions.bind(bar.stop, "run.stop")
+    bar.confirm.clicked.connect(actions["run.confirm"].trigger)

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.ui.shell.actions.table import Actions
-from app.ui.shell.commands.availability import why_not
-from app.ui.shell.main_window import MainWindow
+from app.core.session import Session
+from app.ui.shell.actions.actions import Actions
+from app.ui.shell.commands.shell import Shell
+from app.ui.shell.commands.view import ViewCommands
+from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.text import plain
 from app.ui.widgets.menus import Menu, drop_below
 
@@ -17,34 +19,36 @@ ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.reset")
 
 
 class MenuLists:
-    """Fills them anew at each opening. ``built_in`` and ``own`` show a layout by its name."""
+    """Fills them anew at each opening."""
 
     def __init__(
         self,
-        window: MainWindow,
+        shell: Shell,
+        session: Session,
         actions: Actions,
         menus: Mapping[str, Menu],
+        view: ViewCommands,
         open_file: Callable[[Path], object],
     ) -> None:
         """Put the three lists into the File and the View menu."""
-        self._window, self.actions, self._open_file = window, actions, open_file
-        self.built_in: Callable[[str], object] = lambda _name: None
-        self.own: Callable[[str], object] = lambda _name: None
-        self._recent = Menu(window.theme, window, "Recent")
+        self._shell, self._session, self.actions = shell, session, actions
+        self._view, self._open_file = view, open_file
+        theme, surface = shell.theme, shell.surface
+        self._recent = Menu(theme, surface, "Recent")
         menus["File"].insertMenu(actions["file.save"], self._recent)
-        self._panels = Menu(window.theme, window, "Panels")
-        self._layouts = Menu(window.theme, window, "Layouts")
+        self._panels = Menu(theme, surface, "Panels")
+        self._layouts = Menu(theme, surface, "Layouts")
         menus["View"].insertMenu(actions["layout.keep"], self._panels)
         menus["View"].insertMenu(actions["layout.keep"], self._layouts)
         for name, menu in menus.items():
             menu.aboutToShow.connect(lambda name=name: self._refresh(name))
             menu.aboutToHide.connect(actions.enable_all)
-        self._arranging = Menu(window.theme, window, "Layouts")
+        self._arranging = Menu(theme, surface, "Layouts")
         self._arranging.aboutToHide.connect(actions.enable_all)
 
     def drop_layouts(self, anchor: QWidget) -> None:
         """Open below a button which layouts there are, and what can be done with this one."""
-        self.actions.disable(lambda name: why_not(self._window, name))
+        self.actions.disable()
         self._list_layouts(self._arranging)
         self._arranging.addSeparator()
         for name in ARRANGING:
@@ -57,7 +61,7 @@ class MenuLists:
         drop_below(self._panels, anchor)
 
     def _refresh(self, menu: str) -> None:
-        self.actions.disable(lambda name: why_not(self._window, name))
+        self.actions.disable()
         if menu == "File":
             self._list_recent()
         elif menu == "View":
@@ -66,7 +70,7 @@ class MenuLists:
 
     def _list_recent(self) -> None:
         self._recent.clear()
-        recent = self._window.session.settings.recent_known
+        recent = self._session.settings.recent_known
         self._recent.menuAction().setVisible(bool(recent))
         for file in recent:
             words = file.name if file.there else f"{file.name} (not there any more)"
@@ -79,13 +83,12 @@ class MenuLists:
 
     def _list_layouts(self, menu: Menu) -> None:
         menu.clear()
-        window = self._window
-        arrangements, shown = window.arrangements, window.showing
-        for layout in window.layouts:
-            entry = menu.addAction(window.theme.icon(layout.icon), layout.title)
+        arrangements, shown = self._shell.arrangements, self._shell.showing
+        for layout in LAYOUTS:
+            entry = menu.addAction(self._shell.theme.icon(layout.icon), layout.title)
             entry.setCheckable(True)
             entry.setChecked(shown == layout.name and not arrangements.own(layout.name))
-            entry.triggered.connect(lambda _on=False, name=layout.name: self.built_in(name))
+            entry.triggered.connect(lambda _on=False, name=layout.name: self._view.show_built_in_layout(name))
         own = arrangements.all()
         if own:
             menu.addSeparator()
@@ -93,26 +96,26 @@ class MenuLists:
             entry = menu.addAction(plain.entry(each.name))
             entry.setCheckable(True)
             entry.setChecked(shown == each.base and arrangements.own(each.base) == each.name)
-            entry.triggered.connect(lambda _on=False, name=each.name: self.own(name))
+            entry.triggered.connect(lambda _on=False, name=each.name: self._view.show_own_layout(name))
 
     def _list_panels(self) -> None:
         self._panels.clear()
-        window = self._window
-        self._panels.menuAction().setVisible(window.bench is not None)
-        if window.bench is None:
+        shell = self._shell
+        self._panels.menuAction().setVisible(shell.bench is not None)
+        if shell.bench is None:
             return
-        self.actions.choose(f"layout.{window.showing}")
-        opened = window.bench.open_names()
-        for panel in sorted(window.panels.values(), key=lambda panel: panel.title):
-            if panel.name == "behaviour" and window.showing != "behaviour":
+        self.actions.choose(f"layout.{shell.showing}")
+        opened = shell.bench.open_names()
+        for panel in sorted(shell.panels.values(), key=lambda panel: panel.title):
+            if panel.name == "behaviour" and shell.showing != "behaviour":
                 continue
-            entry = self._panels.addAction(window.theme.icon(panel.icon), panel.title)
+            entry = self._panels.addAction(shell.theme.icon(panel.icon), panel.title)
             entry.setCheckable(True)
             entry.setChecked(panel.name in opened)
             entry.triggered.connect(lambda on=False, name=panel.name: self._toggle(name, on))
 
     def _toggle(self, name: str, on: bool) -> None:
-        bench = self._window.bench
+        bench = self._shell.bench
         if bench is None:
             return
         if on:

@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
+from app.core.session import Session
+from app.ui.shell.actions.command import Command
 from app.ui.shell.actions.shortcuts import Shortcuts
-from app.ui.shell.actions.table import TABLE
-from app.ui.shell.commands.availability import why_not
-from app.ui.shell.main_window import MainWindow
+from app.ui.shell.commands.shell import Shell
 from app.ui.text.dates import day_words
 from app.ui.widgets.lists.fuzzy import Entry
 
 TOPIC_ICONS = {"json": "braces", "string": "type", "bytes": "binary", "image": "image"}
-HIDDEN = {"palette.open", *(f"panel.{number}" for number in range(1, 10))}
 
 
-class Offers:
+class PaletteEntries:
     """Makes the entries for a window; those of topics only when the topics changed."""
 
-    def __init__(self, window: MainWindow, shortcuts: Shortcuts) -> None:
-        self._window, self._shortcuts = window, shortcuts
+    def __init__(
+        self,
+        shell: Shell,
+        session: Session,
+        commands: Sequence[Command[Any]],
+        why_not: Callable[[str], str],
+        shortcuts: Shortcuts,
+    ) -> None:
+        """``why_not`` says why a command can't be done now, "" when it can."""
+        self._shell, self._session, self._shortcuts = shell, session, shortcuts
+        self._shown = [command for command in commands if command.in_palette]
+        self._why_not = why_not
         self._topics: list[Entry] = []
         self._topics_seen = -1
 
@@ -38,47 +48,45 @@ class Offers:
 
     def _commands(self) -> list[Entry]:
         made = []
-        for row in TABLE:
-            if row.name not in HIDDEN:
-                key = self._shortcuts.first(row.name)
-                reason = why_not(self._window, row.name)
-                icon = row.icon or "chevrons-right"
-                made.append(Entry(f"command:{row.name}", row.text, icon, row.menu, key, reason))
+        for each in self._shown:
+            key, reason = self._shortcuts.first(each.id), self._why_not(each.id)
+            icon = each.icon or "chevrons-right"
+            made.append(Entry(f"command:{each.id}", each.text, icon, each.menu, key, reason))
         return made
 
     def _panels(self) -> list[Entry]:
-        bench = self._window.bench
+        bench = self._shell.bench
         opened: Sequence[str] = bench.open_names() if bench is not None else ()
         made = []
-        for panel in sorted(self._window.panels.values(), key=lambda panel: panel.title):
+        for panel in sorted(self._shell.panels.values(), key=lambda panel: panel.title):
             place = opened.index(panel.name) + 1 if panel.name in opened else 0
             key = self._shortcuts.first(f"panel.{place}") if 0 < place < 10 else ""
             made.append(Entry(f"panel:{panel.name}", panel.title, panel.icon, "", key))
         return made
 
     def _robots(self) -> list[Entry]:
-        links = self._window.session.fleet.links
+        links = self._session.fleet.links
         return [Entry(f"robot:{link.name}", link.name, "bot", link.chip) for link in links]
 
     def _layouts(self) -> list[Entry]:
-        own = self._window.arrangements.all()
+        own = self._shell.arrangements.all()
         return [Entry(f"layout:{each.name}", each.name, "panel-left", each.base.title()) for each in own]
 
     def _files(self) -> list[Entry]:
         now = dt.datetime.now().astimezone()
         made = []
-        for file in self._window.session.settings.recent_known:
+        for file in self._session.settings.recent_known:
             when = day_words(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
             reason = "" if file.there else f"Not in {file.path.parent.name} any more"
             made.append(Entry(f"file:{file.path}", file.name, "file", when, reason=reason))
         return made
 
     def _examples(self) -> list[Entry]:
-        examples = self._window.start.examples
+        examples = self._shell.examples
         return [Entry(f"example:{each.path}", each.name, "blocks", each.text) for each in examples]
 
     def _of_topics(self) -> list[Entry]:
-        topics = self._window.session.topics
+        topics = self._session.topics
         if topics.revision != self._topics_seen:
             self._topics_seen = topics.revision
             self._topics = [

@@ -8,7 +8,8 @@ from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.ui.shell.actions.shortcuts import FIXED, STOP, Shortcuts, key_of
+from app.ui.shell.actions.actions import STOP
+from app.ui.shell.actions.shortcuts import FIXED, Shortcuts, key_of
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.theme import Theme
@@ -125,11 +126,13 @@ class ShortcutSheet(Overlay):
 
     def _all(self) -> list[tuple[str, Entry]]:
         groups: dict[str, list[Entry]] = {}
-        for row in self._shortcuts.rows.values():
-            keys = "\n".join(self._shortcuts.of(row.name))
-            note = "yours" if self._shortcuts.own(row.name) else ""
-            group = groups.setdefault(row.menu or PLACES.get(row.name.partition(".")[0], "View"), [])
-            group.append(Entry(f"command:{row.name}", row.text, "", note, keys))
+        for row in self._shortcuts.commands.values():
+            if not row.in_shortcuts:
+                continue
+            keys = "\n".join(self._shortcuts.of(row.id))
+            note = "yours" if self._shortcuts.own(row.id) else ""
+            group = groups.setdefault(row.menu or PLACES.get(row.id.partition(".")[0], "View"), [])
+            group.append(Entry(f"command:{row.id}", row.text, "", note, keys))
         for number, fixed in enumerate(FIXED):
             keys = "\n".join(fixed.key.split(", "))
             groups.setdefault(fixed.place, []).append(
@@ -141,7 +144,7 @@ class ShortcutSheet(Overlay):
         entry = self.rows.entry
         command = entry is not None and entry.kind == "command"
         self.reset.setEnabled(command and entry is not None and self._shortcuts.own(entry.name))
-        self.reset_all.setEnabled(any(self._shortcuts.own(name) for name in self._shortcuts.rows))
+        self.reset_all.setEnabled(any(self._shortcuts.own(name) for name in self._shortcuts.commands))
         if entry is not None and self.isVisible() and not self._waiting:
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
 
@@ -210,10 +213,10 @@ class ShortcutSheet(Overlay):
         if refusal:
             self._tell(refusal)
             return
-        words = self._shortcuts.rows[name].text
+        words = self._shortcuts.commands[name].text
         holder = self._shortcuts.holder(key)
         if holder and holder != name:
-            other = self._shortcuts.rows[holder].text
+            other = self._shortcuts.commands[holder].text
             self._stop_waiting(f"{spoken_key(key)} is “{other}” now. Swap the two, or press Enter again.")
             self._offer = (name, key)
             paint.show_when(self.swap, True)
@@ -224,7 +227,7 @@ class ShortcutSheet(Overlay):
     def _swap(self) -> None:
         if self._offer is not None:
             name, key = self._offer
-            self._stop_waiting(f"“{self._shortcuts.rows[name].text}” has {spoken_key(key)} now.")
+            self._stop_waiting(f"“{self._shortcuts.commands[name].text}” has {spoken_key(key)} now.")
             self._shortcuts.swap(name, key)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject, QRectF, QSize
 from PySide6.QtGui import QColor, QPainter
 
-from app.ui.shell.actions.table import Actions
+from app.ui.shell.bars.run_bar import ToolBar
+from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
-from app.ui.shell.commands.menus import MenuLists
-from app.ui.shell.main_window import MainWindow
+from app.ui.shell.commands.shell import Shell
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Line, name_command, paint
+from app.ui.widgets import Button, Line, paint
 
 FREEZE = "view.freeze"
 EVERY = 8  # half ticks
@@ -53,39 +53,37 @@ class ToggleButton(Button):
 
 
 class DeveloperTools(QObject):
-    """Puts the tools into a window's tool bar and keeps them true while the bar can be seen."""
+    """Puts the tools into the tool bar; `follow` keeps them true."""
 
-    def __init__(self, window: MainWindow, lists: MenuLists, actions: Actions) -> None:
-        super().__init__(window)
-        self._window, self._actions = window, actions
+    def __init__(self, shell: Shell, bar: ToolBar, commands: Commands) -> None:
+        super().__init__(bar)
+        self._shell, self._bar, self._actions = shell, bar, commands.actions
         self._ticks = 0
-        theme = window.theme
+        theme, menus = shell.theme, commands.menus
         self.freeze = ToggleButton(theme, "Freeze", "snowflake")
-        name_command(self.freeze, FREEZE, "Holds the Inspector and the pictures as they are")
         self.layout = MenuButton(theme, "Developer", "panel-left", size="small")
         self.panels = MenuButton(theme, "Panels", size="small")
         self.panels.setToolTip("Opens and closes panels")
-        self.freeze.clicked.connect(lambda: actions.run(FREEZE))
-        self.layout.clicked.connect(lambda: lists.drop_layouts(self.layout))
-        self.panels.clicked.connect(lambda: lists.drop_panels(self.panels))
+        self._actions.bind(self.freeze, FREEZE)
+        self._actions[FREEZE].triggered.connect(self.refresh)
+        self.layout.clicked.connect(lambda: menus.drop_layouts(self.layout))
+        self.panels.clicked.connect(lambda: menus.drop_panels(self.panels))
         self._wide_only = (Line(theme, upright=True, length=24), self.layout, self.panels)
         tools = (self.freeze, *self._wide_only)
         for place, tool in enumerate(tools):
-            window.tool_bar.add_tool(tool, place)
+            bar.add_tool(tool, place)
         for button in (self.freeze, self.layout, self.panels):
             button.let_shrink()
-        window.tool_bar.installEventFilter(self)
+        bar.installEventFilter(self)
         theme.changed.connect(self._fit)
-        window.timer.timeout.connect(self._tick)
-        window.pages.currentChanged.connect(lambda _page: self.refresh())
 
     def refresh(self) -> None:
         """Say what is so now."""
-        window, frozen = self._window, all_frozen(self._window.bench)
+        shell, frozen = self._shell, all_frozen(self._shell.bench)
         self._actions[FREEZE].setChecked(frozen)
         self.freeze.setChecked(frozen)
-        self.freeze.setEnabled(bool(freezable(window.bench)))
-        own = window.arrangements.own("developer")
+        self.freeze.setEnabled(bool(freezable(shell.bench)))
+        own = shell.arrangements.own("developer")
         name = own or "Developer"
         self.layout.set_word(name)
         self.layout.setAccessibleName(f"Layout {name}")
@@ -97,11 +95,12 @@ class DeveloperTools(QObject):
 
     def _fit(self) -> None:
         """Large text in a narrow window: layouts and panels are in the View menu."""
-        room = self._window.tool_bar.width() >= self._window.theme.scaled(ROOM_PX)
+        room = self._bar.width() >= self._shell.theme.scaled(ROOM_PX)
         for tool in self._wide_only:
             paint.show_when(tool, room)
 
-    def _tick(self) -> None:
+    def follow(self) -> None:
+        """Called with every half tick: say what is so, while it can be seen."""
         self._ticks += 1
-        if self._ticks % EVERY == 0 and self._window.tool_bar.isVisible():
+        if self._ticks % EVERY == 0 and self._bar.isVisible():
             self.refresh()

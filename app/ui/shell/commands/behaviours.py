@@ -1,0 +1,236 @@
+"""What the commands about the open behaviours do: tabs, blocks, run and step; and how tabs come back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from app.core.documents.document import Document
+from app.core.documents.journal import Unsaved
+from app.core.session import Session
+from app.core.storage.settings import RecentFile
+from app.errors import SettingsError
+from app.ui.shell.commands.shell import UNTIL_END, Shell
+from app.ui.shell.documents.controller import Files
+from nep.system.lazy_import import later
+
+if TYPE_CHECKING:
+    from app.ui.shell.dialogs import version_history
+else:
+    version_history = later("app.ui.shell.dialogs.version_history")
+
+Answer = tuple[str, Callable[[], object]]
+
+
+class Offers(Protocol):
+    """Offers something once, with two answers: their words, and what they do."""
+
+    def __call__(self, title: str, detail: str, yes: Answer, no: Answer) -> None: ...
+
+
+@runtime_checkable
+class Undoes(Protocol):
+    """A panel whose edits can be undone."""
+
+    def undo(self) -> None:
+        """Take back the last edit."""
+
+    def redo(self) -> None:
+        """Do it again."""
+
+
+@runtime_checkable
+class ShowsBlocks(Protocol):
+    """A panel that can bring a block into view."""
+
+    def show_block(self, block: str) -> None:
+        """Scroll to a block by its id."""
+
+
+@runtime_checkable
+class FindsBlocks(Protocol):
+    """A panel that finds blocks by words."""
+
+    def find_blocks(self, *, to_add: bool) -> None:
+        """Ask for the words: of blocks in the behaviour, or of blocks to add."""
+
+
+@dataclass(frozen=True, slots=True)
+class TabPlace:
+    """A tab, by its document's key, and the place it is to have, from 0."""
+
+    key: str
+    place: int
+
+    @classmethod
+    def parse(cls, text: str) -> TabPlace:
+        """Of ``KEY:2``; ValueError for a place that is no number."""
+        key, _, place = text.rpartition(":")
+        return cls(key, int(place))
+
+
+def bring_into_view(shell: Shell) -> None:
+    """The blocks, in front of whatever shares their place."""
+    shell.show_layout("behaviour")
+    shell.open_panel("behaviour")
+
+
+class BehaviourCommands:
+    """What a person does with behaviours and their tabs."""
+
+    def __init__(self, shell: Shell, session: Session, files: Files) -> None:
+        self._shell, self._session, self._files = shell, session, files
+        self._versions: version_history.EarlierSheet | None = None
+
+    # -- run --------------------------------------------------------------------------------------
+
+    def run_or_go_on(self) -> None:
+        """Run with the editor's newest edit, or go on where the program is paused."""
+        runs = self._session.runs
+        if runs.view().state == "paused":
+            runs.go_on()
+        else:
+            self._files.with_newest(runs.run)
+
+    def run_step(self) -> None:
+        """Run one block, with the editor's newest edit."""
+        self._files.with_newest(self._session.runs.step)
+
+    def demo(self) -> None:
+        """Begin with the virtual Pepper and the first example."""
+        self._session.companions.start_virtual_robot()
+        self._shell.show_layout("behaviour")
+        if self._shell.examples:
+            self._files.example(self._shell.examples[0].path)
+
+    # -- tabs -------------------------------------------------------------------------------------
+
+    def next_tab(self, step: int) -> None:
+        """Show the tab that many places further, round the ends."""
+        self._files.show(self._session.documents.neighbour(step))
+        bring_into_view(self._shell)
+
+    def close(self) -> None:
+        """Close the tab that shows."""
+        self._files.close(self._session.document)
+
+    def show_tab(self, key: str) -> bool:
+        """Show the tab of that key; this and those below: False when there is none."""
+        return self._with(key, self._files.show)
+
+    def close_tab(self, key: str) -> bool:
+        """Close it."""
+        return self._with(key, self._files.close)
+
+    def close_other_tabs(self, key: str) -> bool:
+        """Close all others."""
+        documents = self._session.documents
+        return self._with(
+            key, lambda document: self._files.close(*(other for other in documents if other is not document))
+        )
+
+    def save_tab_as(self, key: str) -> bool:
+        """Show it, and ask where to save it."""
+
+        def save_as(document: Document) -> None:
+            self._files.show(document)
+            self._files.save_as()
+
+        return self._with(key, save_as)
+
+    def move_tab(self, to: TabPlace) -> bool:
+        """Put it to another place."""
+        return self._with(to.key, lambda document: self._files.move(document, to.place))
+
+    def _with(self, key: str, act: Callable[[Document], object]) -> bool:
+        document = self._session.documents.with_key(key)
+        if document is not None:
+            act(document)
+        return document is not None
+
+    # -- blocks -----------------------------------------------------------------------------------
+
+    def undo(self) -> None:
+        """Take back the last edit of the blocks."""
+        editor = self._shell.editor()
+        if isinstance(editor, Undoes):
+            editor.undo()
+
+    def redo(self) -> None:
+        """Do it again."""
+        editor = self._shell.editor()
+        if isinstance(editor, Undoes):
+            editor.redo()
+
+    def show_block(self, block: str) -> None:
+        """Scroll to a block by its id."""
+        self._shell.show_layout("behaviour")
+        editor = self._shell.editor()
+        if isinstance(editor, ShowsBlocks):
+            editor.show_block(block)
+
+    def find_blocks(self, *, to_add: bool) -> None:
+        """Ask for the words of blocks in the behaviour, or of blocks to add."""
+        self._shell.show_layout("behaviour")
+        editor = self._shell.editor()
+        if isinstance(editor, FindsBlocks):
+            editor.find_blocks(to_add=to_add)
+
+    # -- files of before --------------------------------------------------------------------------
+
+    def earlier_versions(self) -> None:
+        """Show what the file said before, once the newest edit is in it."""
+        self._files.with_newest(self._show_versions)
+
+    def _show_versions(self) -> None:
+        if self._versions is None:
+            self._versions = version_history.EarlierSheet(
+                self._shell.theme, self._shell.surface, self._files.copy, self._files.save
+            )
+        document = self._session.document
+        self._versions.show_for(document.name, document.path, document.workspace)
+
+    def forget_recent(self) -> None:
+        """Clear the list of recent files; it can be taken back."""
+        before: list[RecentFile] = self._session.settings.recent_known
+        words = "Cleared the list of recent files"
+        if not self._set_recent([]):
+            words = f"The list of recent files is empty {UNTIL_END}"
+        self._shell.say(words, "Undo", lambda: self._set_recent(before))
+
+    def _set_recent(self, files: list[RecentFile]) -> bool:
+        kept = True
+        try:
+            self._session.settings.set_recent(files)
+        except SettingsError as error:
+            self._shell.complain(str(error))
+            kept = False
+        self._shell.show_recent()
+        return kept
+
+    def come_back(self, left: Sequence[Unsaved], offer: Offers) -> None:
+        """Open the tabs of the last start; offer what a Studio that died left behind."""
+        rest = self._session.tabs.come_back(left)
+        if not rest:
+            return
+
+        def throw_away() -> None:
+            for unsaved in rest:
+                unsaved.journal.unlink(missing_ok=True)
+
+        offer(
+            "Put back the unsaved work?",
+            unsaved_words(rest),
+            ("Put it back", lambda: self._files.recover(rest)),
+            ("Throw it away", throw_away),
+        )
+
+
+def unsaved_words(left: Sequence[Unsaved]) -> str:
+    """Which behaviours were not saved."""
+    first = f"“{left[0].name}”"
+    if len(left) == 1:
+        return f"{first} was not saved when Studio ended last time."
+    others = f"“{left[1].name}”" if len(left) == 2 else f"{len(left) - 1} others"
+    return f"{first} and {others} were not saved when Studio ended last time."

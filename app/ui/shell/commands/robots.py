@@ -1,0 +1,120 @@
+"""What the commands about robots and other computers do; and a problem's button about a missing robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
+from app.core.session import Session
+from app.errors import SettingsError
+from app.ui.shell.commands.shell import UNTIL_END, Shell
+from app.ui.shell.dialogs.network_access import OthersSheet
+from app.ui.shell.documents.controller import Files
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSwap:
+    """A robot that is missing, and another one that is to do what it was asked to do."""
+
+    missing: str
+    other: str
+
+    @classmethod
+    def parse(cls, text: str) -> RobotSwap:
+        """Of ``MISSING:OTHER``."""
+        missing, _, other = text.partition(":")
+        return cls(missing, other)
+
+
+class RobotCommands:
+    """Starts virtual robots, connects missing ones, and asks who may connect."""
+
+    def __init__(self, shell: Shell, session: Session, files: Files, undo: Callable[[], object]) -> None:
+        """``undo`` takes back the last edit of the blocks."""
+        self._shell, self._session, self._files, self._undo = shell, session, files, undo
+        self._network_access: OthersSheet | None = None
+
+    # -- virtual robots ---------------------------------------------------------------------------
+
+    def start_pepper(self) -> None:
+        """Start the virtual Pepper; what shows stays."""
+        self._session.companions.start_virtual_robot()
+
+    def virtual_pepper(self) -> None:
+        """Start the virtual Pepper and show the Behaviour layout."""
+        self.start_pepper()
+        self._shell.show_layout("behaviour")
+
+    def virtual_turtle(self) -> None:
+        """Start the virtual Turtle."""
+        self._session.companions.start_virtual_robot("Turtle", "diffdrive")
+        if self._shell.bench is None:
+            self._shell.show_layout("behaviour")
+        self._shell.say("The virtual Turtle is coming")
+
+    # -- robots that are missing ------------------------------------------------------------------
+
+    def connect(self, name: str) -> None:
+        """A virtual robot starts; for a real one the list of robots shows."""
+        link = self._session.fleet.link(name)
+        described = link.robot.source if link is not None else self._session.document.robots.get(name, {})
+        kind = described.get("rb:robot")
+        model = _model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
+        if model is not None:
+            self._session.companions.restart_virtual_robot(name, model)
+        else:
+            self._shell.open_panel("robots")
+
+    def start_for(self, missing: str) -> bool:
+        """Start the virtual robot of a missing one's model; False when there is none. It can be undone."""
+        model = _model(self._session.document.robots.get(missing, {}).get("rb:robot"))
+        if model is None:
+            return False
+        companions = self._session.companions
+        companions.restart_virtual_robot(missing, model)
+        self._shell.say(
+            f"The virtual {missing} is coming", "Undo", lambda: companions.stop_virtual_robot(missing)
+        )
+        return True
+
+    def use(self, swap: RobotSwap) -> bool:
+        """Let another robot do what a missing one was asked to do; False when it is away.
+
+        It can be undone.
+        """
+        link = self._session.fleet.link(swap.other)
+        if link is None:
+            return False
+        document, robot = self._session.document, link.robot
+
+        def change() -> None:
+            if document.use_robot(swap.missing, robot):
+                self._shell.say(f"{swap.other} does what {swap.missing} was asked to do", "Undo", self._undo)
+
+        self._files.with_newest(change)
+        return True
+
+    # -- who may --------------------------------------------------------------------------------
+
+    def ask_before_moving(self) -> None:
+        """Ask again before a real robot moves."""
+        words = "Studio asks again before a real robot moves"
+        try:
+            self._session.fleet.moving.forget()
+        except SettingsError as error:
+            self._shell.complain(str(error))
+            words += f", {UNTIL_END}"
+        self._shell.say(words)
+
+    def ask_about_others(self) -> None:
+        """Ask whether other computers may connect."""
+        if self._network_access is None:
+            self._network_access = OthersSheet(self._shell.theme, self._shell.surface, self._session.reach)
+        self._network_access.open()
+
+
+def _model(kind: object) -> str | None:
+    """The model of a robot's description, if there is a virtual robot of it."""
+    model = str(kind.get("model")) if isinstance(kind, Mapping) else ""
+    return model if model in VIRTUAL_ROBOTS else None

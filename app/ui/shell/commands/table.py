@@ -1,0 +1,450 @@
+"""The one table of commands: what menus, palette, shortcuts, tooltips and buttons offer, and what each does.
+
+Panels, alerts and problems ask for a command by its id: ``help.doctor``, or ``inspect:/faces`` for one that
+is about something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from app.core.session import Session
+from app.ui.shell.actions.command import ArgumentCommand, Command
+from app.ui.shell.commands.behaviours import BehaviourCommands, TabPlace
+from app.ui.shell.commands.freeze import freezable
+from app.ui.shell.commands.robots import RobotCommands, RobotSwap
+from app.ui.shell.commands.shell import Shell
+from app.ui.shell.commands.view import TEXT_STEP, ViewCommands
+from app.ui.shell.documents.controller import Files
+from app.ui.theme.theme import TEXT_PERCENT
+
+A = TypeVar("A")
+MENUS = ("File", "Edit", "View", "Run", "Robots", "Help")
+WHY_NO_RUN = {
+    "running": "A program runs already",
+    "stopping": "Robots are being stopped",
+    "unanswered": "A robot has not confirmed Stop",
+}
+NO_PANELS = "The start page has no panels"
+
+
+@dataclass(frozen=True)
+class Handlers:
+    """What the commands are run with."""
+
+    session: Session
+    shell: Shell
+    files: Files
+    behaviours: BehaviourCommands
+    robots: RobotCommands
+    view: ViewCommands
+
+
+# ---- why a command can't be done now: menus grey it, the palette says the sentence ------------------
+
+
+def _no_run(do: Handlers) -> str:
+    view = do.session.runs.view()
+    return "" if view.can_run else WHY_NO_RUN.get(view.state, "There is nothing to run")
+
+
+def _no_pause(do: Handlers) -> str:
+    view = do.session.runs.view()
+    if view.can_pause:
+        return ""
+    return "It is paused already" if view.state == "paused" else "Nothing runs"
+
+
+def _no_step(do: Handlers) -> str:
+    view = do.session.runs.view()
+    return "" if view.can_step else WHY_NO_RUN.get(view.state, "There is nothing to run")
+
+
+def _no_editor(do: Handlers) -> str:
+    return "" if do.shell.showing == "behaviour" else "Only in the Behaviour layout"
+
+
+def _no_panels(do: Handlers) -> str:
+    return NO_PANELS if do.shell.bench is None else ""
+
+
+def _no_own_layout(do: Handlers) -> str:
+    if do.shell.arrangements.own(do.shell.showing):
+        return ""
+    return _no_panels(do) or "This layout came with Studio"
+
+
+def _nothing_to_freeze(do: Handlers) -> str:
+    return "" if freezable(do.shell.bench) else "Nothing here can be frozen"
+
+
+def _no_recent(do: Handlers) -> str:
+    return "" if do.session.settings.recent_known else "The list is empty"
+
+
+def _largest_text(do: Handlers) -> str:
+    return "Text is as large as it gets" if do.shell.theme.text_percent >= TEXT_PERCENT[1] else ""
+
+
+def _smallest_text(do: Handlers) -> str:
+    return "Text is as small as it gets" if do.shell.theme.text_percent <= TEXT_PERCENT[0] else ""
+
+
+# ---- the tables -------------------------------------------------------------------------------------
+
+C = Command[Handlers]
+
+
+def _go_to_panel(number: int) -> C:
+    return C(
+        f"panel.{number}",
+        f"Go to panel {number}",
+        lambda do: do.shell.panel_focus.number(number),
+        keys=(f"Ctrl+{number}",),
+        in_palette=False,
+    )
+
+
+COMMANDS: tuple[C, ...] = (
+    C("file.new", "New behaviour", lambda do: do.files.new(), "File", ("Ctrl+N",), "file-plus"),
+    C("file.open", "Open a file", lambda do: do.files.ask_open(), "File", ("Ctrl+O",), "folder-open"),
+    C("file.save", "Save", lambda do: do.files.save(), "File", ("Ctrl+S",), "save", above=True),
+    C("file.save_as", "Save as", lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",)),
+    C("file.earlier", "Earlier versions", lambda do: do.behaviours.earlier_versions(), "File"),
+    C("tab.close", "Close the behaviour", lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
+    C(
+        "tab.reopen",
+        "Open the closed one again",
+        lambda do: do.files.reopen(),
+        "File",
+        ("Ctrl+Shift+T",),
+        "history",
+    ),
+    C(
+        "file.forget_recent",
+        "Clear the list of recent files",
+        lambda do: do.behaviours.forget_recent(),
+        why_not=_no_recent,
+    ),
+    C("file.start_page", "Start page", lambda do: do.view.start_page(), "File", icon="house", above=True),
+    C("settings.open", "Settings", lambda do: do.view.open_settings(), "File", ("Ctrl+,",), "settings"),
+    C("file.quit", "Quit", lambda do: do.shell.close(), "File", ("Ctrl+Q",), above=True),
+    C(
+        "edit.undo",
+        "Undo",
+        lambda do: do.behaviours.undo(),
+        "Edit",
+        ("Ctrl+Z",),
+        "rotate-ccw",
+        why_not=_no_editor,
+    ),
+    C(
+        "edit.redo",
+        "Redo",
+        lambda do: do.behaviours.redo(),
+        "Edit",
+        ("Ctrl+Shift+Z", "Ctrl+Y"),
+        "rotate-cw",
+        why_not=_no_editor,
+    ),
+    C(
+        "blocks.find",
+        "Find in the blocks",
+        lambda do: do.behaviours.find_blocks(to_add=False),
+        "Edit",
+        ("Ctrl+F",),
+        "search",
+        above=True,
+    ),
+    C("blocks.search", "Find a block to add", lambda do: do.behaviours.find_blocks(to_add=True), "Edit"),
+    C(
+        "palette.open",
+        "Find a command or panel",
+        lambda do: do.view.open_palette(),
+        "View",
+        ("Ctrl+K",),
+        "search",
+        in_palette=False,
+    ),
+    # with Option (Alt) a Mac types signs, and Cmd+Tab is the system's
+    C(
+        "layout.behaviour",
+        "Behaviour layout",
+        lambda do: do.view.show_layout("behaviour"),
+        "View",
+        ("Alt+1",),
+        "blocks",
+        group="layout",
+        above=True,
+        mac=("Ctrl+Alt+1",),
+    ),
+    C(
+        "layout.developer",
+        "Developer layout",
+        lambda do: do.view.show_layout("developer"),
+        "View",
+        ("Alt+2",),
+        "activity",
+        group="layout",
+        mac=("Ctrl+Alt+2",),
+    ),
+    C("layout.keep", "Keep this layout as", lambda do: do.view.keep_layout(), "View", why_not=_no_panels),
+    C(
+        "layout.rename",
+        "Rename this layout",
+        lambda do: do.view.rename_layout(),
+        "View",
+        why_not=_no_own_layout,
+    ),
+    C(
+        "layout.delete",
+        "Delete this layout",
+        lambda do: do.view.delete_layout(),
+        "View",
+        icon="trash-2",
+        why_not=_no_own_layout,
+    ),
+    C("layout.reset", "Put the panels back", lambda do: do.view.reset_layout(), "View", why_not=_no_panels),
+    C(
+        "panel.next",
+        "Next panel",
+        lambda do: do.shell.panel_focus.next(1),
+        "View",
+        ("F6",),
+        why_not=_no_panels,
+    ),
+    C(
+        "panel.previous",
+        "Previous panel",
+        lambda do: do.shell.panel_focus.next(-1),
+        "View",
+        ("Shift+F6",),
+        why_not=_no_panels,
+    ),
+    *map(_go_to_panel, range(1, 10)),
+    C(
+        "tab.next",
+        "Next behaviour",
+        lambda do: do.behaviours.next_tab(1),
+        "View",
+        ("Ctrl+Tab",),
+        above=True,
+        mac=("Meta+Tab", "Ctrl+Shift+]"),
+    ),
+    C(
+        "tab.previous",
+        "Previous behaviour",
+        lambda do: do.behaviours.next_tab(-1),
+        "View",
+        ("Ctrl+Shift+Tab",),
+        mac=("Meta+Shift+Tab", "Ctrl+Shift+["),
+    ),
+    C(
+        "view.freeze",
+        "Freeze what shows",
+        lambda do: do.view.freeze(),
+        "View",
+        icon="snowflake",
+        tip="Holds the Inspector and the pictures as they are",
+        check=True,
+        above=True,
+        why_not=_nothing_to_freeze,
+    ),
+    C(
+        "theme.light",
+        "Light",
+        lambda do: do.view.set_theme("light"),
+        "View",
+        icon="sun",
+        group="theme",
+        above=True,
+    ),
+    C("theme.dark", "Dark", lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme"),
+    C(
+        "theme.system",
+        "As the system",
+        lambda do: do.view.set_theme("system"),
+        "View",
+        icon="monitor",
+        group="theme",
+    ),
+    C(
+        "text.larger",
+        "Larger text",
+        lambda do: do.view.set_text(do.shell.theme.text_percent + TEXT_STEP),
+        "View",
+        ("Ctrl++",),
+        "zoom-in",
+        above=True,
+        why_not=_largest_text,
+    ),
+    C(
+        "text.smaller",
+        "Smaller text",
+        lambda do: do.view.set_text(do.shell.theme.text_percent - TEXT_STEP),
+        "View",
+        ("Ctrl+-",),
+        "zoom-out",
+        why_not=_smallest_text,
+    ),
+    C("text.normal", "Normal text", lambda do: do.view.set_text(100), "View", ("Ctrl+0",)),
+    C(
+        "theme.contrast",
+        "High contrast",
+        lambda do: do.view.choose_contrast(),
+        "View",
+        check=True,
+        above=True,
+    ),
+    C("theme.motion", "Less motion", lambda do: do.view.choose_motion(), "View", check=True),
+    C(
+        "run.run",
+        "Run",
+        lambda do: do.behaviours.run_or_go_on(),
+        "Run",
+        ("F5",),
+        "play",
+        "Runs the behaviour",
+        why_not=_no_run,
+    ),
+    C(
+        "run.pause",
+        "Pause",
+        lambda do: do.session.runs.pause(),
+        "Run",
+        ("F8",),
+        "pause",
+        "Holds the program; robots hold still",
+        why_not=_no_pause,
+    ),
+    C(
+        "run.step",
+        "Step",
+        lambda do: do.behaviours.run_step(),
+        "Run",
+        ("F10",),
+        "step-forward",
+        "Runs one block",
+        why_not=_no_step,
+    ),
+    C(
+        "run.full_speed",
+        "Full speed",
+        lambda do: do.session.runs.set_pace(0.0),
+        "Run",
+        group="pace",
+        above=True,
+    ),
+    C(
+        "run.slow",
+        "Slow motion: 0.5 s a block",
+        lambda do: do.session.runs.set_pace(0.5),
+        "Run",
+        group="pace",
+    ),
+    C(
+        "run.very_slow",
+        "Very slow: 1.5 s a block",
+        lambda do: do.session.runs.set_pace(1.5),
+        "Run",
+        group="pace",
+    ),
+    C(
+        "run.stop",
+        "Stop the program and all robots",
+        lambda do: do.session.runs.stop(),
+        "Run",
+        ("F12", "Ctrl+."),  # F12 is a key for sound on Macs and many laptops
+        "square",
+        "Stops the program and every robot",
+        above=True,
+        everywhere=True,
+    ),
+    C(
+        "run.confirm",
+        "It stands still",
+        lambda do: do.session.runs.confirm_still(),
+        in_palette=False,
+        in_shortcuts=False,
+    ),
+    C(
+        "robots.virtual",
+        "Use the virtual Pepper",
+        lambda do: do.robots.virtual_pepper(),
+        "Robots",
+        icon="bot",
+    ),
+    C("robots.turtle", "Use the virtual Turtle", lambda do: do.robots.virtual_turtle(), "Robots", icon="bot"),
+    C(
+        "robots.start",
+        "Start the virtual Pepper",  # and stay in this layout
+        lambda do: do.robots.start_pepper(),
+        in_palette=False,
+        in_shortcuts=False,
+    ),
+    C(
+        "robots.show",
+        "Try what a robot can do",
+        lambda do: do.shell.open_panel("robots"),
+        "Robots",
+        icon="eye",
+        above=True,
+    ),
+    C(
+        "robots.ask",
+        "Ask again before real robots move",
+        lambda do: do.robots.ask_before_moving(),
+        "Robots",
+        icon="footprints",
+    ),
+    C(
+        "network.others",
+        "Let other computers connect",
+        lambda do: do.robots.ask_about_others(),
+        "Robots",
+        icon="wifi",
+        above=True,
+    ),
+    C(
+        "help.shortcuts",
+        "Keyboard shortcuts",
+        lambda do: do.view.open_shortcuts(),
+        "Help",
+        ("F1",),
+        "keyboard",
+    ),
+    C("help.doctor", "Connection doctor", lambda do: do.view.open_doctor(), "Help", icon="stethoscope"),
+    C("help.log", "Show the log", lambda do: do.view.show_log(), "Help", icon="folder-open"),
+    C("help.about", "About NEP Studio", lambda do: do.view.about(), "Help", icon="info"),
+)
+
+
+def _about(
+    id: str, parse: Callable[[str], A], run: Callable[[Handlers, A], object]
+) -> ArgumentCommand[Handlers]:
+    """A command about one thing: ``run`` gives False when there is no such thing now."""
+    return ArgumentCommand(id, lambda do, text: run(do, parse(text)) is not False)
+
+
+def _fix_blocks(verb: str) -> ArgumentCommand[Handlers]:
+    return _about(verb, str, lambda do, what: do.files.mend(f"{verb}:{what}"))
+
+
+ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
+    _about("panel", str, lambda do, name: do.shell.open_panel(name) is not None),
+    _about("inspect", str, lambda do, topic: do.view.inspect(topic)),
+    _about("key", str, lambda do, key: do.view.press(key)),
+    _about("block", str, lambda do, block: do.behaviours.show_block(block)),
+    _about("tab", str, lambda do, key: do.behaviours.show_tab(key)),
+    _about("tab.close", str, lambda do, key: do.behaviours.close_tab(key)),
+    _about("tab.close_others", str, lambda do, key: do.behaviours.close_other_tabs(key)),
+    _about("tab.save_as", str, lambda do, key: do.behaviours.save_tab_as(key)),
+    _about("tab.move", TabPlace.parse, lambda do, place: do.behaviours.move_tab(place)),
+    _about("connect", str, lambda do, robot: do.robots.connect(robot)),
+    _about("robot.use", RobotSwap.parse, lambda do, swap: do.robots.use(swap)),
+    _about("robot.virtual", str, lambda do, missing: do.robots.start_for(missing)),
+    *map(_fix_blocks, ("limit", "define", "add")),  # what a problem's button does (`app.blocks.fixes.fixes`)
+)
+"""Asked for as ``id:argument``; a tab goes by its document's key."""

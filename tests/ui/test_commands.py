@@ -1,0 +1,153 @@
+"""The table of commands: whoever names a command names one that is there, and its argument is typed."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+
+import app
+from app.ui.shell.actions.command import UnknownCommandError
+from app.ui.shell.commands.behaviours import TabPlace
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.commands.robots import RobotSwap
+from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS
+from app.ui.shell.main_window import MainWindow
+from tests.ui import fakes
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+IDS = {command.id for command in COMMANDS}
+ABOUT = {command.id for command in ARGUMENT_COMMANDS}
+CALLS = {"run": 0, "_run": 0, "bind": 1, "name_command": 1, "Mend": 1}
+"""Calls that are given a command, and the place of it; `setProperty` is one with "command" before it."""
+KEYWORDS = {"action", "mend_action"}
+
+
+Constants = dict[str, str]
+
+
+def said(node: ast.expr, constants: Constants) -> Iterator[str]:
+    """The commands that an expression may be; a hole is "{}"."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.Name) and node.id in constants:
+        yield constants[node.id]
+    elif isinstance(node, ast.JoinedStr):
+        parts = [part.value if isinstance(part, ast.FormattedValue) else part for part in node.values]
+        yield "".join(next(said(part, constants), "{}") for part in parts)
+    elif isinstance(node, ast.IfExp):
+        yield from said(node.body, constants)
+        yield from said(node.orelse, constants)
+
+
+def named(path: Path) -> Iterator[tuple[str, int]]:
+    """What a module names as a command, and its line."""
+    tree = ast.parse(path.read_text("utf-8"))
+    constants = {
+        target.id: node.value.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
+        for target in node.targets
+        if isinstance(target, ast.Name) and isinstance(node.value.value, str)
+    }
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        given = [keyword.value for keyword in node.keywords if keyword.arg in KEYWORDS]
+        if called == "add_argument":  # the command line's
+            continue
+        if called == "setProperty" and list(said(node.args[0], constants)) == ["command"]:
+            given.append(node.args[1])
+        elif called in CALLS and len(node.args) > CALLS[called]:
+            given.append(node.args[CALLS[called]])
+        for each in given:
+            for words in said(each, constants):
+                yield words, node.lineno
+
+
+def modules() -> list[Path]:
+    """Everything of ours that can name a command; robots have actions of their own."""
+    root = Path(app.__file__).parent
+    outside = {root / "robots", root / "blocks" / "runtime"}
+    return [path for path in root.rglob("*.py") if not outside & set(path.parents)]
+
+
+def is_known(words: str) -> bool:
+    """Whether the table has it."""
+    id, colon, argument = words.partition(":")
+    if id == "{}" and colon:  # the menu of a tab: its commands are looked at where they are listed
+        return True
+    if not colon and "{}" in id:
+        return bool([known for known in IDS if fnmatch(known, id.replace("{}", "*"))])
+    return id in ABOUT and bool(argument) if colon else id in IDS
+
+
+FOUND = [(path, words, line) for path in modules() for words, line in named(path)]
+
+
+def test_everybody_who_names_a_command_is_found() -> None:
+    words = {words for _, words, _ in FOUND}
+    assert {
+        "network.others",  # an alert of the core
+        "connect:{}",  # an alert, and a problem of the compiler
+        "limit:{}",
+        "robot.use:{}:{}",
+        "robot.virtual:{}",
+        "tab.move:{}:{}",  # panels
+        "inspect:{}",
+        "panel:console",
+        "edit.undo",  # buttons
+        "run.stop",
+    } <= words
+    assert len(words) > 30
+
+
+@pytest.mark.parametrize(("path", "words", "line"), FOUND, ids=[f"{p.stem}-{n}-{w}" for p, w, n in FOUND])
+def test_whoever_names_a_command_names_one_that_is_there(path: Path, words: str, line: int) -> None:
+    assert is_known(words), f"{path}:{line} names no command: {words!r}"
+
+
+def test_the_menu_of_a_tab_names_commands_about_a_tab() -> None:
+    source = (Path(app.__file__).parent / "ui" / "panels" / "behaviour" / "tabs.py").read_text("utf-8")
+    listed = set(re.findall(r'"(tab\.[a-z_]+)"', source))
+    assert len(listed) == 3
+    assert listed <= ABOUT
+
+
+def test_the_alerts_of_the_tests_name_commands_too() -> None:
+    source = Path(fakes.__file__)
+    assert all(is_known(words) for words, _ in named(source) if "." in words or ":" in words)
+
+
+@pytest.mark.parametrize("name", ["nonsense", "nonsense:x", "panel.nonsense", "run.run:x", ""])
+def test_a_command_that_is_not_there_is_an_error_at_once(commands: Commands, name: str) -> None:
+    with pytest.raises(UnknownCommandError, match="no command"):
+        commands.run(name)
+    with pytest.raises(UnknownCommandError):
+        commands.actions[name]
+
+
+def test_a_panel_that_names_none_is_an_error_at_once(window: MainWindow) -> None:
+    with pytest.raises(UnknownCommandError, match=r"help\.nobody"):
+        window.context.run("help.nobody")
+    with pytest.raises(UnknownCommandError):
+        window.commands.shortcuts.of("help.nobody")
+
+
+def test_arguments_are_typed() -> None:
+    assert TabPlace.parse("a:b:2") == TabPlace("a:b", 2)
+    assert RobotSwap.parse("NAO:Pepper:2") == RobotSwap("NAO", "Pepper:2")
+    with pytest.raises(ValueError, match="invalid literal"):
+        TabPlace.parse("key:first")
+
+
+def test_no_command_is_twice_in_the_table_and_each_menu_is_one_of_the_bar() -> None:
+    assert len(IDS) == len(COMMANDS)
+    assert len(ABOUT) == len(ARGUMENT_COMMANDS)
+    assert {command.menu for command in COMMANDS} <= {*MENUS, ""}
