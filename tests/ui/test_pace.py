@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from app.ui.shell.commands.commands import PACES, Commands
+from app.ui.shell.bars.run_bar import PACES
+from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]

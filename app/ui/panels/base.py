@@ -37,7 +37,7 @@ class PanelContext:
     """What a panel may use of the window.
 
     ``open_topic`` shows a topic in the panel that fits its type, ``toast`` says what was just done, ``run``
-    does one of the window's commands by its name (`app.ui.shell.actions.table`).
+    does one of the window's commands by its name (`app.ui.shell.commands.table`).
     """
 
     session: Session
