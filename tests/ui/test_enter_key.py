@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QVBoxLayout, QWidget
 
-from app.ui.shell.keyboard import EnterKey
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 
@@ -22,7 +22,6 @@ def window(qtbot) -> QWidget:
     made.pressed = []
     made.button.clicked.connect(lambda: made.pressed.append("button"))
     made.field.returnPressed.connect(lambda: made.pressed.append("field"))
-    made.enter = EnterKey(made)
     qtbot.addWidget(made)
     made.show()
     made.activateWindow()
@@ -46,3 +45,13 @@ def test_fields_and_other_keys_are_left_alone(qtbot, window):
     QTest.keyClick(window.windowHandle(), Qt.Key_Return)
     qtbot.waitUntil(lambda: bool(window.pressed))
     assert window.pressed == ["field"]
+
+
+def test_holding_enter_down_presses_once(qtbot, window):
+    window.button.setFocus()
+    held = QKeyEvent(QEvent.Type.KeyPress, Qt.Key_Return, Qt.NoModifier, "\r", True)
+    QTest.keyPress(window.windowHandle(), Qt.Key_Return)
+    for _ in range(3):
+        QApplication.sendEvent(window.button, held)
+    QTest.keyRelease(window.windowHandle(), Qt.Key_Return)
+    assert window.pressed == ["button"]

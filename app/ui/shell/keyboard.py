@@ -1,19 +1,14 @@
-"""Which panel has the keyboard, and how it goes from one to the next; and Enter, which presses a button."""
+"""Which panel has the keyboard, and how it goes from one to the next."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QAbstractButton, QApplication, QPushButton, QWidget
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.docking.workbench import Workbench
-from app.ui.shell.stop_keys import EveryWindow
-
-_ENTER = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter})
-_PLAIN = frozenset({Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier})
 
 
 class PanelFocus(QObject):
@@ -61,30 +56,3 @@ class PanelFocus(QObject):
 
 def _has(dock: Dock, widget: QWidget) -> bool:
     return dock is widget or dock.isAncestorOf(widget)
-
-
-class EnterKey(EveryWindow):
-    """Enter presses the button that has the keyboard, as Space does: on Linux and Windows Qt leaves it out.
-
-    The system's own buttons know Enter.
-    """
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Give the button under the keyboard a Space instead; holding Enter down does not repeat it."""
-        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and _plain_enter(event):
-            button = QApplication.focusWidget()
-            if isinstance(button, QAbstractButton) and not isinstance(button, QPushButton):
-                if not event.isAutoRepeat():
-                    _space(button)
-                return True
-        return super().eventFilter(watched, event)
-
-
-def _plain_enter(event: QKeyEvent) -> bool:
-    menu_is_open = QApplication.activePopupWidget() is not None
-    return event.key() in _ENTER and event.modifiers() in _PLAIN and not menu_is_open
-
-
-def _space(button: QWidget) -> None:
-    for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
-        QApplication.sendEvent(button, QKeyEvent(kind, Qt.Key.Key_Space, Qt.KeyboardModifier.NoModifier, " "))

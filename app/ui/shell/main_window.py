@@ -29,7 +29,7 @@ from app.ui.shell.docking.saved_layouts import Arrangements
 from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.documents.flush import Leaving
 from app.ui.shell.focus_ring import FocusRing
-from app.ui.shell.keyboard import EnterKey, PanelFocus
+from app.ui.shell.keyboard import PanelFocus
 from app.ui.shell.start_page.page import Example, StartPage
 from app.ui.shell.window_state import WindowState
 from app.ui.startup.interpreter import GcFreezeTimer
@@ -81,7 +81,6 @@ class MainWindow(QMainWindow):
         self._build(examples)
         self.context = PanelContext(session, theme, self.open_topic, self.say, self._run)
         self.ring = FocusRing(theme, self)
-        self.enter = EnterKey(self)
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
         self.timer.timeout.connect(self._half_tick)

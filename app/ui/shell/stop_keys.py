@@ -13,23 +13,6 @@ from app.ui.widgets import Button, StopButton
 _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
 
 
-class EveryWindow(QObject):
-    """Its `eventFilter` sees what each window gets that has had the keyboard, before anything in it does."""
-
-    def __init__(self, parent: QObject) -> None:
-        """It lives as long as ``parent``."""
-        super().__init__(parent)
-        application = QApplication.instance()
-        if isinstance(application, QGuiApplication):
-            application.focusWindowChanged.connect(self._listen_to)
-        self._listen_to(QGuiApplication.focusWindow())
-
-    def _listen_to(self, window: QWindow | None) -> None:
-        if window is not None:
-            window.removeEventFilter(self)
-            window.installEventFilter(self)
-
-
 def stop_at(place: QPoint) -> QAbstractButton | None:
     """The button that stops, all robots or one, at a place of the screen that nothing popped up over."""
     windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
@@ -49,8 +32,8 @@ def shut_popups() -> None:
         continue
 
 
-class StopKeys(EveryWindow):
-    """Hears the keys of every window of ours before anything in it does.
+class StopKeys(QObject):
+    """Hears the keys of every window of ours that has had the keyboard, before anything in it does.
 
     A shortcut is not enough: an open menu or list, a page or a field that claims the key would have it.
     A button is not enough either: while a menu or a list is open, the press beside it only closes it.
@@ -60,8 +43,18 @@ class StopKeys(EveryWindow):
         self, parent: QObject, keys: Callable[[], Collection[str]], stop: Callable[[], object]
     ) -> None:
         """``keys`` are Stop's keys of the moment, as `QKeySequence` spells them; ``stop`` is done at once."""
-        self._keys, self._stop = keys, stop
         super().__init__(parent)
+        self._keys, self._stop = keys, stop
+        application = QApplication.instance()
+        if isinstance(application, QGuiApplication):
+            application.focusWindowChanged.connect(self._listen_to)
+        self._listen_to(QGuiApplication.focusWindow())
+
+    def _listen_to(self, window: QWindow | None) -> None:
+        """Also to those that open later: menus, dialogs, and panels that float."""
+        if window is not None:
+            window.removeEventFilter(self)
+            window.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in _KINDS and isinstance(event, QKeyEvent):

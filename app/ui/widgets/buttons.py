@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QColor, QFont, QKeyEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from app.ui.text import plain
@@ -16,6 +16,7 @@ from app.ui.text.numbers import tip_with_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.keyboard import is_plain
 
 Kind = Literal["plain", "primary", "ghost", "run", "stop"]
 Size = Literal["small", "normal", "form", "large"]
@@ -105,6 +106,16 @@ class PaintedButton(QAbstractButton):
         super().resizeEvent(event)
         if self.shortens:
             paint.tell_whole(self, self.text())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Enter presses it as Space does, once while it is held down.
+
+        Qt's `autoDefault` would do so only for a QPushButton, and again and again while Enter is held.
+        """
+        if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not is_plain(event):
+            super().keyPressEvent(event)
+        elif not event.isAutoRepeat():
+            self.click()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
