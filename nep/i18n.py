@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DOMAIN",
+    "EDITOR_WORDS",
     "ENGLISH",
     "LANG_VARIABLE",
     "LEAST_SHARE",
@@ -42,6 +43,7 @@ __all__ = [
     "begin",
     "best_match",
     "day_text",
+    "editor_words",
     "gettext",
     "holes",
     "install",
@@ -61,13 +63,14 @@ DOMAIN = "nep-studio"
 ENGLISH = "en"
 PSEUDO = "qps"
 """The pseudo-language, made by ``tools/words.py compile``: every string longer, in brackets."""
+EDITOR_WORDS = "editor.json"
 LANG_VARIABLE = "NEP_LANG"
 LEAST_SHARE = 0.9
 """How much of a language is translated when it can be chosen."""
 LOCALE = Path(__file__).with_name("locale")
 
 _BLOCK_HOLE = re.compile(r"%[A-Z][A-Z0-9_]*")
-_PRINTF_HOLE = re.compile(r"%(?:\(\w+\))?[sdr]")
+_PRINTF_HOLE = re.compile(r"%(?:(?:\(\w+\))?[sdr]|\d)")
 _LISTS = {
     "and": {"2": "{0} and {1}", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "{0} and {1}"},
     "or": {"2": "{0} or {1}", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "{0} or {1}"},
@@ -168,6 +171,14 @@ def begin(chosen: str = "") -> None:
         os.environ["LANGUAGE"] = language()
         _standard().bindtextdomain(DOMAIN, str(LOCALE))
         _standard().textdomain(DOMAIN)
+
+
+def editor_words(folder: Path = LOCALE) -> Mapping[str, str]:
+    """The words of the block editor's page, by their English; empty for English."""
+    file = folder / language() / "LC_MESSAGES" / EDITOR_WORDS
+    if language() == ENGLISH or not file.is_file():
+        return {}
+    return {str(english): str(told) for english, told in json.loads(file.read_text(encoding="utf-8")).items()}
 
 
 def offered(folder: Path = LOCALE) -> list[tuple[str, str]]:

@@ -200,11 +200,11 @@ def test_nep_lang_comes_before_what_was_chosen(monkeypatch) -> None:
     assert i18n.language() == "en"
 
 
-def test_the_pseudo_language_is_offered_only_while_it_is_used() -> None:
+def test_the_pseudo_language_is_offered_only_while_it_is_used(pseudo, tmp_path) -> None:
     install("en")
     assert "qps" not in dict(i18n.offered())
     assert dict(i18n.offered())["en"] == "English"
-    install("qps")
+    install("qps", tmp_path)
     assert "qps" in dict(i18n.offered())
 
 

@@ -16,6 +16,7 @@ import datetime as dt
 import io
 import json
 import math
+import os
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,7 +35,7 @@ sys.path.insert(0, str(ROOT))
 from app.blocks.categories.robot import GROUPS  # noqa: E402 - this file is started by its path
 from app.blocks.toolbox.catalogue import english_categories, has_words  # noqa: E402
 from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap  # noqa: E402
-from nep.i18n import DOMAIN, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402
+from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402
 
 KEYWORDS = {
     "_": None,
@@ -62,7 +63,7 @@ _MADE = dt.datetime(2026, 11, 22, tzinfo=dt.timezone.utc)
 """In every header: a real date would make a new file of the same words."""
 _HEADER = "# All sentences of NEP Studio; made by tools/words.py (docs/translate.md)."
 _MARKUP = re.compile(r"\[/?[a-z][a-z ]*\]|</?[a-z]+>|`[^`]*`")
-_KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Z][A-Z0-9_]*|%(?:\(\w+\))?[sdr]|{_MARKUP.pattern}")
+_KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Z][A-Z0-9_]*|%(?:(?:\(\w+\))?[sdr]|\d)|{_MARKUP.pattern}")
 _ACCENTS = str.maketrans(
     "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
     "áƀçđéƒğĥíĵķłḿñóþǫřšťúṽŵẋýžÁƁÇĐÉƑĞĤÍĴĶŁḾÑÓÞǪŘŠŤÚṼŴẊÝŽ",
@@ -201,15 +202,17 @@ def add(language: str, folder: Path = LOCALE) -> None:
 def compile_all(folder: Path = LOCALE) -> None:
     """Write what programs read: each language, the pseudo-language, and what is known of them."""
     known: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
-    pot = read(pot_file(folder))
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
         known[language] = facts(language, catalog)
         _write_mo(catalog, po_file(folder, language).with_suffix(".mo"))
-    _write_mo(pseudo_catalog(pot), po_file(folder, PSEUDO).with_suffix(".mo"))
-    (folder / "languages.json").write_text(
-        json.dumps(known, ensure_ascii=False, indent=1, sort_keys=True) + "\n", encoding="utf-8"
-    )
+    compile_pseudo(folder)
+    (folder / "languages.json").write_text(_json(known), encoding="utf-8")
+
+
+def compile_pseudo(folder: Path = LOCALE) -> None:
+    """Write the pseudo-language, which is on no other computer than a developer's."""
+    _write_mo(pseudo_catalog(read(pot_file(folder))), po_file(folder, PSEUDO).with_suffix(".mo"))
 
 
 def _write_mo(catalog: Catalog, path: Path) -> None:
@@ -217,7 +220,25 @@ def _write_mo(catalog: Catalog, path: Path) -> None:
     held = io.BytesIO()
     write_mo(held, catalog)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(held.getvalue())
+    beside = path.with_name(
+        f"{path.name}.{os.getpid()}"
+    )  # a program that starts now reads the one or the other
+    beside.write_bytes(held.getvalue())
+    beside.replace(path)
+    path.with_name(EDITOR_WORDS).write_text(_json(_for_editor(catalog)), encoding="utf-8")
+
+
+def _for_editor(catalog: Catalog) -> dict[str, str]:
+    """What the page of the block editor says, which can't read a .mo."""
+    return {
+        str(each.id): str(each.string)
+        for each in catalog
+        if each.string and any(place.endswith(".ts") for place, _line in each.locations)
+    }
+
+
+def _json(value: Mapping[str, object]) -> str:
+    return json.dumps(value, ensure_ascii=False, indent=1, sort_keys=True) + "\n"
 
 
 def facts(language: str, catalog: Catalog) -> dict[str, object]:
@@ -268,7 +289,7 @@ def pseudo_catalog(pot: Catalog) -> Catalog:
     for entry in pot:
         if entry.id:
             forms = tuple(pseudo(each) for each in _ids(entry.id))
-            made.add(entry.id, _id(forms), context=entry.context)
+            made.add(entry.id, _id(forms), locations=entry.locations, context=entry.context)
     return made
 
 
@@ -306,9 +327,9 @@ def check(folder: Path = LOCALE) -> list[str]:
         wrong += [f"{language}: {sentence}" for sentence in _wrong_entries(catalog)]
         if keys(catalog) != keys(pot):
             wrong.append(f"{language}: its sentences are not those of the .pot; run 'tools/words.py update'")
-        if _told(catalog) != _compiled(path.with_suffix(".mo")) or known.get(language) != facts(
-            language, catalog
-        ):
+        made_of_it = (_told(catalog), _for_editor(catalog), facts(language, catalog))
+        there = (_compiled(path), _read_json(path.with_name(EDITOR_WORDS)), known.get(language))
+        if made_of_it != there:
             wrong.append(f"{language}: compiled from other words; run 'python tools/words.py compile'")
     return wrong
 
@@ -335,7 +356,8 @@ def _told(catalog: Catalog) -> dict[Key, tuple[str, ...]]:
     }
 
 
-def _compiled(path: Path) -> dict[Key, tuple[str, ...]]:
+def _compiled(po: Path) -> dict[Key, tuple[str, ...]]:
+    path = po.with_suffix(".mo")
     if not path.is_file():
         return {}
     with path.open("rb") as stream:

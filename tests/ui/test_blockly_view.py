@@ -183,6 +183,25 @@ def test_blockly_speaks_the_language_or_english(qtbot, language, words):
     them.wait_for(f"!!document.querySelector('.blocklyContextMenu')?.textContent.includes({words!r})")
 
 
+def test_the_pages_own_words_come_from_the_window(qtbot, monkeypatch):
+    monkeypatch.setattr(
+        "nep.i18n.editor_words", lambda: {"Find a block": "Buscar un bloque", "Duplicate": "Otra vez"}
+    )
+    view = BlocklyView(language="es")
+    qtbot.addWidget(view)
+    view.set_definitions(DEFINITIONS)
+    view.resize(1031, 586)
+    view.load(workspace(START))
+    with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+        view.show()
+    them = Person(qtbot, view)
+    them.wait_for("document.querySelector('.nepSearch input')?.placeholder === 'Buscar un bloque'")
+    assert (
+        them.ask("document.querySelector('.nepZoom button').title") == "Zoom in"
+    )  # nobody has translated it
+    assert them.ask("document.querySelector('.nepFind input').placeholder") == "Find in the blocks"
+
+
 ENDING = """
 import sys
 from PySide6.QtWidgets import QApplication

@@ -129,3 +129,20 @@ def test_a_disk_that_keeps_nothing_is_told_once_until_it_keeps_again(tmp_path: P
     (tmp_path / "home").write_text("no folder")
     state.keep("key", 2)
     assert len(told) == 2
+
+
+def test_the_language_is_kept_for_the_next_start(
+    monkeypatch, window: MainWindow, commands: Commands, home: Path
+) -> None:
+    monkeypatch.setattr("nep.i18n.offered", lambda: [("en", "English"), ("es", "Español")])
+    window.show()
+    commands.run("settings.open")
+    sheet = window.findChild(SettingsSheet)
+    assert sheet is not None
+    assert sheet.language.value == "en"
+    assert not sheet.from_next_start.isVisible()
+    press(sheet.language, "es")
+    assert sheet.from_next_start.isVisible()
+    assert Settings(home).get("language", "") == "es"
+    press(sheet.language, "en")
+    assert not sheet.from_next_start.isVisible()

@@ -22,6 +22,7 @@ from app import resources
 from app.ui.blockly.bridge import BlocklyBridge, Json
 from app.ui.blockly.scheme import PAGE, SCHEME, Fence, SchemeHandler, register_scheme
 from app.ui.widgets.keyboard import proxy_of
+from nep import i18n
 
 _log = logging.getLogger(__name__)
 _RESTART_MS = (0, 500, 2000, 5000)
@@ -224,7 +225,12 @@ class BlocklyHost(QWidget):
         if not self._theme:
             tokens = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
             self._theme = {"tokens": tokens, "dark": False}
-        return {"language": self._language, "reduced": self._reduced_motion, "theme": self._theme}
+        return {
+            "language": self._language,
+            "words": dict(i18n.editor_words()),
+            "reduced": self._reduced_motion,
+            "theme": self._theme,
+        }
 
     def _background(self) -> QColor:
         tokens = cast("Mapping[str, Mapping[str, object]]", self._beginning()["theme"])["tokens"]

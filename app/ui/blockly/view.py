@@ -17,6 +17,7 @@ from app.ui.blockly.bridge import Json
 from app.ui.blockly.host import BlocklyHost
 from app.ui.blockly.scheme import register_scheme as register_scheme
 from app.ui.blockly.tabs import Tabs
+from nep import i18n
 
 
 class BlocklyView(BlocklyHost):
@@ -31,8 +32,8 @@ class BlocklyView(BlocklyHost):
     block_selected = Signal(str)  # a block's id; "" when nothing is selected
     sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
 
-    def __init__(self, parent: QWidget | None = None, *, language: str = "en") -> None:
-        super().__init__(parent, language)
+    def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
+        super().__init__(parent, language or i18n.language())
         self._tabs = Tabs()
         self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
         self._live: Json = {"values": {}, "old": []}

@@ -1,5 +1,6 @@
 // Drop-downs whose options come from outside (robots, topics) and which never drop a value they do not know.
 import * as Blockly from 'blockly/core';
+import {t} from './words';
 
 export type Option = [string, string];
 
@@ -52,7 +53,7 @@ export class FieldChoice extends Blockly.FieldDropdown {
     const options: Option[] = [...((this.source && sources.get(this.source)) || this.given)];
     const kept = this.kept;
     if (kept !== null && !options.some((each) => each[1] === kept)) options.push([kept, kept]);
-    if (this.typed) options.push([`other ${this.typed}…`, OTHER]);
+    if (this.typed) options.push([this.typed === 'topic' ? t('other topic…') : t('other field…'), OTHER]);
     return options.length ? options : [['–', '']];
   }
 
@@ -85,7 +86,7 @@ export class FieldChoice extends Blockly.FieldDropdown {
       super.onItemSelected_(menu, item);
       return;
     }
-    Blockly.dialog.prompt(`Name of the ${this.typed}`, this.value_ ?? '', (words) => {
+    Blockly.dialog.prompt(this.typed === 'topic' ? t('Name of the topic') : t('Name of the field'), this.value_ ?? '', (words) => {
       const name = words?.trim();
       if (name) this.setValue(name);
     });

@@ -1,6 +1,7 @@
 // The fields that Blockly does not have: icon, live value, colour chip.
 import * as Blockly from 'blockly/core';
 import {drawIcon, iconName} from './icons';
+import {lazy, t} from './words';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const BUTTON = 24;
@@ -102,9 +103,9 @@ interface ColourConfig extends Blockly.FieldConfig {
 }
 
 const PALETTE: readonly [string, string][] = [
-  ['white', '#ffffff'], ['red', '#ff3b30'], ['orange', '#ff9500'], ['yellow', '#ffd60a'],
-  ['green', '#34c759'], ['cyan', '#3db8ff'], ['blue', '#0a5cff'], ['purple', '#af52de'],
-  ['pink', '#ff5fa2'], ['off', '#000000'],
+  [lazy('white'), '#ffffff'], [lazy('red'), '#ff3b30'], [lazy('orange'), '#ff9500'], [lazy('yellow'), '#ffd60a'],
+  [lazy('green'), '#34c759'], [lazy('cyan'), '#3db8ff'], [lazy('blue'), '#0a5cff'], [lazy('purple'), '#af52de'],
+  [lazy('pink'), '#ff5fa2'], [lazy('off'), '#000000'],
 ];
 const COLUMNS = 5;
 const CHIP = {width: 39, height: 23};
@@ -173,7 +174,8 @@ export class FieldColourChip extends Blockly.Field {
   }
 
   protected override getText_(): string {
-    return PALETTE.find(([, value]) => value === this.value_)?.[0] ?? this.value_ ?? '';
+    const known = PALETTE.find(([, value]) => value === this.value_);
+    return known ? t(known[0]) : this.value_ ?? '';
   }
 
   protected override showEditor_(): void {
@@ -185,8 +187,8 @@ export class FieldColourChip extends Blockly.Field {
     for (const [name, value] of PALETTE) {
       const swatch = document.createElement('button');
       swatch.type = 'button';
-      swatch.title = name;
-      swatch.setAttribute('aria-label', name);
+      swatch.title = t(name);
+      swatch.setAttribute('aria-label', t(name));
       swatch.setAttribute('aria-pressed', String(value === this.value_));
       swatch.style.background = value;
       swatch.onclick = () => this.choose(value);
@@ -196,7 +198,7 @@ export class FieldColourChip extends Blockly.Field {
     other.value = this.value_ ?? '';
     other.spellcheck = false;
     other.maxLength = 7;
-    other.setAttribute('aria-label', 'other colour, # and six digits');
+    other.setAttribute('aria-label', t('other colour, # and six digits'));
     other.oninput = () => other.classList.toggle('wrong', this.doClassValidation_(other.value) === null);
     other.onkeydown = (event) => {
       if (event.key === 'Enter' && this.doClassValidation_(other.value) !== null) this.choose(other.value);

@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {iconElement, iconName} from './icons';
 import {isKept} from './unknown_blocks';
 import {definitionOf} from './definitions';
+import {t} from './words';
 
 export interface BlockHelp {
   title: string;
@@ -62,7 +63,7 @@ export class HelpCard {
   private make(help: BlockHelp, block: Blockly.BlockSvg): HTMLElement {
     const card = element('aside', 'nepHelp');
     card.setAttribute('role', 'dialog');
-    card.setAttribute('aria-label', `Help: ${help.title}`);
+    card.setAttribute('aria-label', t('Help: {block}', {block: help.title}));
     const head = element('header', '');
     const tile = element('span', 'nepTile');
     tile.style.background = block.getColour();
@@ -71,8 +72,8 @@ export class HelpCard {
     tile.append(iconElement(iconName(first?.[0]?.icon ?? '', style), 16));
     const close = document.createElement('button');
     close.type = 'button';
-    close.title = 'Close (Esc)';
-    close.setAttribute('aria-label', 'Close the help');
+    close.title = t('Close (Esc)');
+    close.setAttribute('aria-label', t('Close the help'));
     close.append(iconElement('x', 16));
     close.onclick = () => this.close();
     head.append(tile, element('h2', '', help.title), close);
@@ -93,9 +94,9 @@ export class HelpCard {
 }
 
 function keptHelp(block: Blockly.BlockSvg): BlockHelp {
-  return {title: 'A block that is not known here', does: String(block.getTooltip()), more: 'It may belong to a robot ' +
-    'that was never seen here, or to a newer Studio. It stays in the file as it is.', gaps: [],
-    example: 'For example: connect the robot whose block it is.', words: ''};
+  return {title: t('A block that is not known here'), does: String(block.getTooltip()),
+    more: t('It may belong to a robot that was never seen here, or to a newer Studio. It stays in the file as it is.'),
+    gaps: [], example: t('For example: connect the robot whose block it is.'), words: ''};
 }
 
 function element(tag: string, name: string, words = ''): HTMLElement {
@@ -111,7 +112,7 @@ export function offerHelp(show: (block: Blockly.BlockSvg) => void): void {
     id: 'nepHelp',
     weight: 7,
     scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK,
-    displayText: 'Help',
+    displayText: () => t('Help'),
     preconditionFn: ({block}) => block && (isKept(block) || helpFor(block.type)) ? 'enabled' : 'hidden',
     callback: ({block}) => block && show(block),
   });

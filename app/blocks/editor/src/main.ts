@@ -12,6 +12,7 @@ import {type Definitions, type Shown, Tabs} from './tabs';
 import {putVariables} from './theme';
 import {type Tokens, useTokens} from './tokens';
 import {type Alarm, showAlarms} from './toolbox';
+import {t, useWords} from './words';
 
 interface Bridge {
   told: {connect(slot: (name: string, payload: string) => void): void};
@@ -125,9 +126,9 @@ class Editor {
     const box = document.createElement('div');
     box.className = 'nepZoom';
     const buttons: [string, string, () => void][] = [
-      ['zoom-in', 'Zoom in', () => this.shown.workspace.zoomCenter(1)],
-      ['zoom-out', 'Zoom out', () => this.shown.workspace.zoomCenter(-1)],
-      ['maximize', 'Show everything', () => this.shown.fit()],
+      ['zoom-in', t('Zoom in'), () => this.shown.workspace.zoomCenter(1)],
+      ['zoom-out', t('Zoom out'), () => this.shown.workspace.zoomCenter(-1)],
+      ['maximize', t('Show everything'), () => this.shown.fit()],
     ];
     for (const [icon, name, action] of buttons) {
       const button = document.createElement('button');
@@ -144,6 +145,7 @@ class Editor {
 
 interface Beginning {
   language: string;
+  words: Record<string, string>;
   reduced: boolean;
   theme: {tokens: Tokens; dark: boolean};
 }
@@ -165,6 +167,7 @@ async function start(bridge: Bridge): Promise<void> {
   useTokens(beginning.theme.tokens, beginning.theme.dark);
   putVariables(beginning.theme.dark);
   document.documentElement.classList.toggle('reduced', beginning.reduced);
+  useWords(beginning.words ?? {});
   const language = await useLanguage(beginning.language);
   trimMenu(language);
   // Blockly measures text once; the font has to be there before.

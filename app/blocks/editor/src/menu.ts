@@ -1,22 +1,23 @@
 // Fewer entries, plain words.
 import * as Blockly from 'blockly/core';
 import {offerRemoving} from './remove_menu';
+import {lazy, t} from './words';
 
 const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockCollapseExpand', 'blockDisable',
   'blockHelp', 'commentCreate', 'commentDelete', 'commentDuplicate'];
 
 const WORDS: Readonly<Record<string, string>> = {
-  CLEAN_UP: 'Tidy up',
-  DUPLICATE_BLOCK: 'Duplicate',
-  ADD_COMMENT: 'Add a note',
-  REMOVE_COMMENT: 'Remove the note',
-  DELETE_BLOCK: 'Delete',
-  DELETE_X_BLOCKS: 'Delete %1 blocks',
-  DIALOG_OK: 'Use it',
-  DIALOG_CANCEL: 'Not now',
-  NEW_VARIABLE_TITLE: 'Name of the variable',
-  UNDO: 'Undo',
-  REDO: 'Redo',
+  CLEAN_UP: lazy('Tidy up'),
+  DUPLICATE_BLOCK: lazy('Duplicate'),
+  ADD_COMMENT: lazy('Add a note'),
+  REMOVE_COMMENT: lazy('Remove the note'),
+  DELETE_BLOCK: lazy('Delete'),
+  DELETE_X_BLOCKS: lazy('Delete %1 blocks'),
+  DIALOG_OK: lazy('Use it'),
+  DIALOG_CANCEL: lazy('Not now'),
+  NEW_VARIABLE_TITLE: lazy('Name of the variable'),
+  UNDO: lazy('Undo'),
+  REDO: lazy('Redo'),
 };
 
 export function trimMenu(language: string): void {
@@ -26,5 +27,8 @@ export function trimMenu(language: string): void {
   }
   // Nothing asks: deleting can be undone.
   Blockly.dialog.setConfirm((_message, callback) => callback(true));
-  if (language === 'en') Object.assign(Blockly.Msg, WORDS);
+  // Blockly's own words stay where nobody has translated ours.
+  for (const [key, english] of Object.entries(WORDS)) {
+    if (language === 'en' || t(english) !== english) Blockly.Msg[key] = t(english);
+  }
 }

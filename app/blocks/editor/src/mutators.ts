@@ -1,6 +1,7 @@
 // Blocks whose gaps people make themselves: items of a list, inputs of a function.
 import * as Blockly from 'blockly/core';
 import {FieldButton} from './fields';
+import {t} from './words';
 
 const MOST_ITEMS = 50;
 export const MOST_INPUTS = 12;
@@ -27,11 +28,11 @@ function reshape(block: Blockly.Block, change: () => void): void {
   if (!group) Blockly.Events.setGroup(false);
 }
 
-function buttons(block: Blockly.Block, input: Blockly.Input, what: string, change: (by: number) => void): void {
+function buttons(block: Blockly.Block, input: Blockly.Input, take: string, add: string, change: (by: number) => void): void {
   const button = (icon: string, words: string, by: number) =>
     new FieldButton(icon, words, () => reshape(block, () => change(by)));
-  input.appendField(button('minus', `take the last ${what} away`, -1), 'LESS');
-  input.appendField(button('plus', `add one ${what}`, 1), 'MORE');
+  input.appendField(button('minus', take, -1), 'LESS');
+  input.appendField(button('plus', add, 1), 'MORE');
 }
 
 // ---- a list of n items
@@ -65,7 +66,7 @@ const ITEMS = {
 function startItems(this: ItemsBlock): void {
   this.items = 0;
   const row = this.appendDummyInput('BUTTONS');
-  buttons(this, row, 'gap', (by) => this.showItems(this.items + by));
+  buttons(this, row, t('take the last gap away'), t('add one gap'), (by) => this.showItems(this.items + by));
   const recording = Blockly.Events.isEnabled();
   if (recording) Blockly.Events.disable();
   this.showItems(3);
@@ -117,9 +118,9 @@ const FUNCTION = {
     if (!row) return;
     for (const field of [...row.fieldRow]) if (/^(WITH|INPUT\d+|LESS|MORE)$/.test(field.name ?? '')) row.removeField(field.name!);
     this.own = inputs.map((each) => ({...each}));
-    if (inputs.length) row.appendField('with', 'WITH');
+    if (inputs.length) row.appendField(t('with'), 'WITH');
     this.own.forEach((each, number) => row.appendField(nameField(this, each), `INPUT${number}`));
-    buttons(this, row, 'input', (by) => shapeInputs(this, by, this.own.length - 1));
+    buttons(this, row, t('take the last input away'), t('add one input'), (by) => shapeInputs(this, by, this.own.length - 1));
   },
 };
 
@@ -131,7 +132,7 @@ function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field 
     if (own) own.name = name;
     return name;
   });
-  field.setTooltip('the name of this input');
+  field.setTooltip(t('the name of this input'));
   return field;
 }
 
@@ -144,7 +145,7 @@ function shapeInputs(block: DefinitionBlock, by: number, place: number): void {
   if (by < 0) {
     block.showInputs(block.own.filter((_each, number) => number !== place));
   } else if (block.own.length < MOST_INPUTS) {
-    const name = freshName('input', block.own.map((each) => each.name));
+    const name = freshName(t('input'), block.own.map((each) => each.name));
     block.showInputs([...block.own, {id: Blockly.utils.idGenerator.genUid(), name}]);
   }
 }

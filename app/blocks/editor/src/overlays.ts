@@ -5,6 +5,7 @@ import {FieldLive} from './fields';
 import {drawIcon} from './icons';
 import {isKept} from './unknown_blocks';
 import {type BlockState, pathOf} from './renderer';
+import {t} from './words';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const BUBBLE_WIDTH = 300;
@@ -220,5 +221,6 @@ function sensorKey(block: Blockly.Block): string {
 
 function absentSentence(block: Blockly.Block): string {
   const robot = block.getField('ROBOT')?.getText();
-  return `${robot ?? 'The robot'} is not connected. The block is kept and skipped.`;
+  return robot ? t('{robot} is not connected. The block is kept and skipped.', {robot}) :
+    t('The robot is not connected. The block is kept and skipped.');
 }

@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {leniently} from './checker';
 import {definitionOf} from './definitions';
 import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, changeInputs} from './mutators';
+import {t} from './words';
 
 interface Item {
   list: Blockly.BlockSvg;
@@ -82,7 +83,7 @@ export function offerRemoving(): void {
   const scopeType = Blockly.ContextMenuRegistry.ScopeType.BLOCK;
   Blockly.ContextMenuRegistry.registry.register({
     id: 'nepRemoveItem', weight: 5, scopeType,
-    displayText: () => `Take item ${(found?.number ?? 0) + 1} out of the list`,
+    displayText: () => t('Take item {number} out of the list', {number: (found?.number ?? 0) + 1}),
     preconditionFn: ({block}, event) => {
       found = block && !block.isInFlyout ? wanted(block, event) : null;
       return found ? 'enabled' : 'hidden';
@@ -94,7 +95,7 @@ export function offerRemoving(): void {
       block && DEFINITIONS.includes(block.type) && !block.isInFlyout ? (block as unknown as DefinitionBlock).own[place] : undefined;
     Blockly.ContextMenuRegistry.registry.register({
       id: `nepRemoveInput${place}`, weight: 5 + place / 100, scopeType,
-      displayText: ({block}) => `Take the input “${inputOf(block)?.name ?? ''}” away`,
+      displayText: ({block}) => t('Take the input “{input}” away', {input: inputOf(block)?.name ?? ''}),
       preconditionFn: ({block}) => inputOf(block) ? 'enabled' : 'hidden',
       callback: ({block}) => block && changeInputs(block as unknown as DefinitionBlock, -1, place),
     });

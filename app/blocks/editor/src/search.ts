@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {definitionOf} from './definitions';
 import {helpFor} from './help';
 import {iconElement} from './icons';
+import {t} from './words';
 
 export type Entry = Record<string, unknown>;
 
@@ -60,16 +61,16 @@ export class FindBar {
     this.bar.setAttribute('role', 'search');
     this.bar.hidden = true;
     this.words.type = 'search';
-    this.words.placeholder = 'Find in the blocks';
-    this.words.setAttribute('aria-label', 'Find in the blocks');
+    this.words.placeholder = t('Find in the blocks');
+    this.words.setAttribute('aria-label', t('Find in the blocks'));
     this.words.spellcheck = false;
     this.count.setAttribute('role', 'status');
     this.words.oninput = () => this.search();
     this.bar.onkeydown = (event) => this.onKey(event);
     this.bar.append(iconElement('search', 16), this.words, this.count,
-      this.button('arrow-up', 'Previous (Shift+Enter)', () => this.step(-1)),
-      this.button('arrow-down', 'Next (Enter)', () => this.step(1)),
-      this.button('x', 'Close (Esc)', () => this.close()));
+      this.button('arrow-up', t('Previous (Shift+Enter)'), () => this.step(-1)),
+      this.button('arrow-down', t('Next (Enter)'), () => this.step(1)),
+      this.button('x', t('Close (Esc)'), () => this.close()));
     document.body.append(this.bar);
   }
 
@@ -144,7 +145,7 @@ export class FindBar {
   private show(): void {
     this.found.forEach((block, number) => block.getSvgRoot()?.classList.toggle('nepFoundNow', number === this.at));
     this.count.textContent = !this.words.value.trim() ? '' :
-      this.found.length ? `${this.at + 1} of ${this.found.length}` : 'none';
+      this.found.length ? t('{number} of {count}', {number: this.at + 1, count: this.found.length}) : t('none');
     this.bar.classList.toggle('none', Boolean(this.words.value.trim()) && !this.found.length);
   }
 }

@@ -2,6 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {type Entry, findEntries} from './search';
+import {t} from './words';
 
 export const SEARCH = 'nepSearch';
 
@@ -20,9 +21,9 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.div.className = 'nepSearch';
     this.div.setAttribute('role', 'search');
     this.field.type = 'search';
-    this.field.placeholder = 'Find a block';
+    this.field.placeholder = t('Find a block');
     this.field.spellcheck = false;
-    this.field.setAttribute('aria-label', 'Find a block: type words, Enter takes the first');
+    this.field.setAttribute('aria-label', t('Find a block: type words, Enter takes the first'));
     this.field.oninput = () => this.show();
     this.field.onkeydown = (event) => this.onKey(event);
     // Otherwise the toolbox takes it for a click beside its categories and closes the blocks.
@@ -63,7 +64,7 @@ export class SearchItem extends Blockly.ToolboxItem {
       return;
     }
     const found = findEntries(this.toolbox.allEntries(), words);
-    const none = [{kind: 'label', text: `No block for “${words.trim()}”`}];
+    const none = [{kind: 'label', text: t('No block for “{words}”', {words: words.trim()})}];
     this.toolbox.showFound(found.length ? found : none);
   }
 

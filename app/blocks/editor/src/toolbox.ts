@@ -2,6 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {iconElement, iconName} from './icons';
 import {SEARCH, SearchItem} from './search_item';
+import {t} from './words';
 
 type Def = Record<string, unknown>;
 
@@ -31,8 +32,8 @@ class Category extends Blockly.ToolboxCategory {
 }
 
 function noteOf(def: Def): string {
-  if (def['connected'] === false) return 'not connected';
-  return def['virtual'] === true ? 'virtual' : '';
+  if (def['connected'] === false) return t('not connected');
+  return def['virtual'] === true ? t('virtual') : '';
 }
 
 /** What is wrong with a robot now: a status of the design (its dot has that colour), and the words for it. */
@@ -105,7 +106,7 @@ interface Items {
 function withIds(def: Items): Items {
   let section = '';
   const empty = def.contents.length && !def.contents.some((item) => item['kind'] === 'robotHeading');
-  const none = {kind: 'robotHeading', name: 'No robot', note: 'connected', connected: false};
+  const none = {kind: 'robotHeading', name: t('No robot'), note: t('connected'), connected: false};
   const contents = def.contents.map((item) => {
     const name = text(item['name']) || text(item['text']);
     if (item['kind'] !== 'category') {

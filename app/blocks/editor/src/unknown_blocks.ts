@@ -3,6 +3,7 @@
 import * as Blockly from 'blockly/core';
 import {type BlockDefinition, definitionOf, fieldNames, inputKinds} from './definitions';
 import {readInputs} from './mutators';
+import {t} from './words';
 
 export const KEPT = 'nep_kept';
 
@@ -177,6 +178,6 @@ Blockly.Blocks[KEPT] = {
       else this.setPreviousStatement(true);
       this.setNextStatement(true);
     }
-    this.setTooltip(`This file uses “${state.label}”, which is not known here. It is kept and skipped.`);
+    this.setTooltip(t('This file uses “{block}”, which is not known here. It is kept and skipped.', {block: state.label}));
   },
 };

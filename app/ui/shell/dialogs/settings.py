@@ -1,4 +1,4 @@
-"""The settings: look, size of text, contrast, motion, shortcuts, and where pictures are kept."""
+"""The settings: language, look, size of text, contrast, motion, shortcuts, and where pictures are kept."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from app.ui.theme.system import WISHES
 from app.ui.theme.theme import MODES, Theme
 from app.ui.widgets import Button, Elided, IconButton, Segments, label
 from app.ui.widgets.file_dialogs import show_free
+from nep import i18n
+from nep.i18n import _
 
 WIDE = 620
 MODE_WORDS = {"light": ("Light", "sun"), "dark": ("Dark", "moon"), "system": ("As the system", "monitor")}
@@ -23,13 +25,16 @@ TEXT_SIZES = ("100", "125", "150", "175", "200")
 
 
 class SettingsSheet(Overlay):
-    """Everything applies at once and is kept; there is nothing to confirm."""
+    """Everything is kept, and applies at once but for the language; there is nothing to confirm."""
 
     top = 72
 
     def __init__(self, theme: Theme, window: QWidget, state: WindowState, settings: Settings) -> None:
         super().__init__(theme, window, "Settings")
         self._state, self._settings = state, settings
+        languages = [(code, name, None) for code, name in i18n.offered()]
+        self.language = Segments(theme, languages, check=True, size="form", name=_("Language"))
+        self.from_next_start = label(_("From the next start of Studio"), "body", role="textSecondary")
         self.mode = Segments(
             theme, [(mode, *MODE_WORDS[mode]) for mode in MODES], check=True, size="form", name="Look"
         )
@@ -42,6 +47,7 @@ class SettingsSheet(Overlay):
         self.shortcuts = Button(theme, "Change the shortcuts", "keyboard", size="form")
         self.folder = Elided("bodyLarge", "textSecondary")
         self.choose = Button(theme, "Choose a folder", "folder-open", size="form")
+        self.language.changed.connect(self._language)
         self.mode.changed.connect(self._mode)
         self.text.changed.connect(lambda percent: self._changed(lambda: theme.set_text_percent(int(percent))))
         self.contrast.changed.connect(self._contrast)
@@ -68,7 +74,12 @@ class SettingsSheet(Overlay):
         pictures = QHBoxLayout()
         pictures.addWidget(self.folder, 1)
         pictures.addWidget(self.choose)
+        spoken = QHBoxLayout()
+        spoken.addWidget(self.language)
+        spoken.addWidget(self.from_next_start)
+        spoken.addStretch(1)
         rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
+            (_("Language"), spoken),
             ("Look", self.mode),
             ("Text size", self.text),
             ("High contrast", self.contrast),
@@ -95,7 +106,7 @@ class SettingsSheet(Overlay):
         column.addWidget(self._area, 1)
 
     def first(self) -> QWidget:
-        return self.mode.chosen_button() or self
+        return self.language.chosen_button() or self
 
     def wanted_size(self, room: QSize) -> QSize:
         inside = self._inside.sizeHint()
@@ -110,6 +121,9 @@ class SettingsSheet(Overlay):
 
     def _show(self) -> None:
         theme = self.theme
+        chosen = self._chosen_language()
+        self.language.set_value(chosen)
+        self.from_next_start.setVisible(chosen != i18n.language())
         self.mode.set_value(theme.mode)
         self.text.set_value(str(theme.text_percent))
         self.contrast.set_value(theme.contrast)
@@ -121,6 +135,15 @@ class SettingsSheet(Overlay):
     def _changed(self, change: Callable[[], object]) -> None:
         change()
         self._state.keep_theme(self.theme)
+
+    def _chosen_language(self) -> str:
+        """What was chosen here and can be spoken, else what is spoken now."""
+        chosen = self._settings.get("language", "")
+        return chosen if chosen in dict(i18n.offered()) else i18n.language()
+
+    def _language(self, chosen: str) -> None:
+        self._state.keep("language", chosen)
+        self._show()
 
     def _mode(self, chosen: str) -> None:
         mode = next(mode for mode in MODES if mode == chosen)
