@@ -83,7 +83,7 @@ def test_it_is_one_alert_with_the_exact_count_and_no_dialog(
         button = panel.rows[0].button
         QTest.mousePress(button, Qt.MouseButton.LeftButton)
         publisher.publish_bytes(BAD)
-        qtbot.waitUntil(lambda: (window.tick(), panel.rows[0].alert.count == SENT + 1)[1])
+        qtbot.waitUntil(lambda: (window.tick(), panel.shown[0].count == SENT + 1)[1])
         QTest.mouseRelease(button, Qt.MouseButton.LeftButton)
         assert window.bench is not None
         assert window.bench.docks["inspector"].panel.topics == ["/bad"], "its next step was taken"
