@@ -12,7 +12,7 @@ import pytest
 
 from app.core.run.child_process import MOST_BYTES
 from app.core.run.runner import EVENTS_PER_S, Runner
-from tests.core.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, quickest_stop
+from tests.core.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, stopping_s
 
 __all__ = ["heard"]
 ENDED = 'print(\'{"is": "ended", "ok": true, "elapsed_s": 1.0}\', flush=True)'
@@ -83,25 +83,22 @@ def test_a_behaviours_program_has_a_gigabyte() -> None:
 def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) -> None:
     me = psutil.Process()
     before = me.memory_info().rss
-    late: list[float] = []
+    shares: list[float] = []
 
     def begin() -> Runner:
-        runner, pause, longest = started(GIGABYTE), threading.Event(), 0.0
-        for _ in range(100):  # what a window's timer would feel
-            began = time.monotonic()
+        runner, pause = started(GIGABYTE), threading.Event()
+        began, worked = time.monotonic(), time.process_time()
+        for _ in range(100):  # as a window's timer
             pause.wait(0.01)
-            longest = max(longest, time.monotonic() - began - 0.01)
-        late.append(longest)
+        shares.append((time.process_time() - worked) / (time.monotonic() - began))
         assert runner.state == "running"  # it is not through: its pipe makes it wait
         return runner
 
     began = time.monotonic()
-    assert quickest_stop(begin) < STOP_WITHIN_S
-    while min(late) >= 0.05 and len(late) < 6:  # one try may say only how busy the computer is
-        quickest_stop(begin)
+    assert stopping_s(begin) < STOP_WITHIN_S
     seconds = time.monotonic() - began
     assert heard.until("ended").ok
-    assert min(late) < 0.05
+    assert shares[0] < 0.5  # reading the flood leaves the window more than half of a processor
     assert me.memory_info().rss - before < 60_000_000
     (told, *_) = printed(heard)
     assert told.endswith(" MB that no block wrote were left out")
@@ -118,7 +115,7 @@ def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:
         return runner
 
     began = time.monotonic()
-    assert quickest_stop(begin) < STOP_WITHIN_S
+    assert stopping_s(begin) < STOP_WITHIN_S
     heard.until("ended")
     seconds = time.monotonic() - began
     assert printed(heard).count("x") <= EVENTS_PER_S * (seconds + 1)
@@ -180,7 +177,7 @@ def test_processes_that_it_started_end_with_stop(started, heard, new) -> None:
         left.append(child_of(heard, runner))
         return runner
 
-    assert quickest_stop(begin) < STOP_WITHIN_S
+    assert stopping_s(begin) < STOP_WITHIN_S
     heard.until("ended")  # although its child holds the pipe
     assert all(gone(each) for each in left)
 

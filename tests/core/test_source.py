@@ -74,7 +74,7 @@ def test_what_did_not_arrive_is_counted_from_the_watch_on(
         publisher.publish(1)
         until(lambda: source.missed().get("/a") == 0, "nothing was lost")
         _, subscriber = source._subscribers["/a"]
-        subscriber._inlet._readable.sources.lost += 5  # as libzmq does when nobody reads for long
+        subscriber._transport._readable.sources.lost += 5  # as libzmq does when nobody reads for long
         assert source.missed()["/a"] == 5
         source.watch("/a")  # somebody looks anew
         assert source.missed()["/a"] == 0

@@ -7,6 +7,7 @@ import os
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -33,9 +34,11 @@ def foreign():
 def test_a_master_of_this_computer_is_found_with_its_process(master):
     with nep.node("Pepper") as node:
         node.new_pub("/odom")
+        began = time.monotonic()
         facts = gather(master.address)
+        took_s = time.monotonic() - began
     assert {each.name for each in facts.view.nodes.values()} == {"Pepper"}
-    assert facts.answered_s < 1.0
+    assert 0.0 < facts.answered_s < took_s  # it is a part of the look
     assert facts.master_port.is_taken
     assert facts.master_port.holder.pid == os.getpid()
     assert facts.loopback == ""

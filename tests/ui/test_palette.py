@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.command_palette import Palette
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import Example
+from app.ui.widgets.lists import fuzzy
 from app.ui.widgets.lists.entry_list import Heading
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Found, match
 from tests.ui.shell_parts import PlainPanel
@@ -76,16 +76,18 @@ def test_of_very_many_whole_pieces_are_found_and_all_are_counted() -> None:
     assert count == 10_001
 
 
-def test_ten_thousand_topics_are_searched_at_once() -> None:
+def test_of_ten_thousand_topics_few_are_looked_at_closely(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What makes it quick (4 ms): the costly comparison is made for the most promising alone."""
     finder = Finder(
         [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
     )
-    times = []
+    compared: list[str] = []
+    monkeypatch.setattr(fuzzy, "match", lambda query, words: compared.append(words) or match(query, words))
     for query in ("j", "jo", "joi", "joint", "joint 9", "robot9999"):
-        began = time.perf_counter()
-        finder.find(query, 40)
-        times.append(time.perf_counter() - began)
-    assert min(times) < 0.1  # 4 ms on a quiet machine; the bound is wide for a busy one
+        compared.clear()
+        assert finder.find(query, 40)[0]
+        assert 0 < len(compared) <= fuzzy.MANY
+        assert fuzzy.MANY * 10 <= 10_000
 
 
 # -- in the window --------------------------------------------------------------------------------
