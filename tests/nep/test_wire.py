@@ -77,7 +77,7 @@ def test_the_shared_vectors(vector: dict[str, object]) -> None:
     assert isinstance(said, dict)
     assert read.topic == said["topic"]
     assert read.header == wire.Header(
-        said["codec"], said["flags"], said["seq"], said["stamp_ns"], said["publisher"]
+        said["codec"], said["flags"], said["seq"], said["stamp_ns"], said["publisher"], said.get("size", 0)
     )
     assert bytes(read.payload).hex() == said["payload"]
     assert read.extension == said["extension"]

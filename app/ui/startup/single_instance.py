@@ -95,8 +95,14 @@ def is_ours(name: str) -> bool:
 def peer_of(descriptor: int) -> int | None:
     """The user at the other end of a local socket; None where the system does not tell."""
     asked = getattr(socket, "SO_PEERCRED", None)
+    copy = os.dup(descriptor)
     try:
-        with socket.socket(fileno=os.dup(descriptor)) as ours:
+        ours = socket.socket(fileno=copy)
+    except OSError:
+        os.close(copy)
+        return None
+    try:
+        with ours:
             if asked is not None:  # Linux: pid, user, group
                 return int(struct.unpack("3i", ours.getsockopt(socket.SOL_SOCKET, asked, 12))[1])
             if sys.platform == "darwin":  # xucred: version, user, ...; SOL_LOCAL is 0, LOCAL_PEERCRED 1
