@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import typer
 
 from nep.cli.fields import leaves
-from nep.cli.graphs import look
 from nep.errors import NepError
+from nep.masters.process import view
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import host_of, master_address
@@ -62,7 +62,7 @@ def _master(ctx: typer.Context) -> str:
 
 def _view(ctx: typer.Context) -> GraphView | None:
     try:
-        return look(_master(ctx), _ANSWER_S)
+        return view(_master(ctx), _ANSWER_S)
     except (NepError, OSError, UnicodeError):
         return None
 

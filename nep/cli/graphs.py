@@ -24,12 +24,6 @@ def node_for(command: str, master: str | None) -> Node:
     return Node(f"nep-topic-{command}-{os.getpid()}", master=master)
 
 
-def look(master: str | None, timeout_s: float = 2.0) -> GraphView:
-    """The graph of the master now. Raises `MasterUnreachable`."""
-    with Node(f"nep-cli-{os.getpid()}", master=master) as node:
-        return node.graph(timeout_s)
-
-
 class Waiting:
     """Topics that a command waits for: says which of them nobody publishes, when that is so and not again.
 

@@ -7,9 +7,9 @@ from dataclasses import asdict
 
 import typer
 
-from nep.cli.graphs import look
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import UNKNOWN, Column, duration, say, show_alerts, show_json, show_table
+from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import escaped
 
@@ -36,7 +36,7 @@ _WIRES = {
 @app.command("list")
 def list_nodes(master: MasterOption = None, as_json: JsonOption = False) -> None:
     """List all nodes, with what they publish and subscribe."""
-    graph = look(master)
+    graph = view(master)
     nodes = sorted(graph.nodes.values(), key=lambda node: (node.generation != "native", node.name, node.id))
     if as_json:
         show_json([{**asdict(node), **_topics_of(graph, node)} for node in nodes])

@@ -7,12 +7,12 @@ from dataclasses import asdict
 import typer
 
 from nep.cli.echo import echo
-from nep.cli.graphs import look
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
 from nep.cli.rates import bw, hz
 from nep.cli.screen import UNKNOWN, Column, rate, say, show_alerts, show_json, show_table, size
 from nep.cli.values import ids_as_text
+from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.text import escaped
 
@@ -35,7 +35,7 @@ _COLUMNS = (
 @app.command("list")
 def list_topics(master: MasterOption = None, as_json: JsonOption = False) -> None:
     """List all topics, with who publishes and subscribes them and how fast."""
-    graph = look(master)
+    graph = view(master)
     topics = [graph.topics[name] for name in sorted(graph.topics)]
     if as_json:
         show_json(ids_as_text([asdict(topic) for topic in topics]))

@@ -15,7 +15,7 @@ from nep.errors import MasterUnreachable, RequestRefusedError, WireError
 from nep.protocol.encoding import decode_answer, encode_request
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
-from nep.system.addresses import endpoint_of, master_address
+from nep.system.addresses import MasterName, endpoint_of, master_address
 from nep.system.descriptors import check_room
 from nep.system.lazy_import import later
 
@@ -25,11 +25,13 @@ else:
     psutil = later("psutil")
 
 _FILES = 16
+_AGAIN_S = 0.5
+"""A request without an answer is sent again after this."""
 
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """A `creationflags`: Windows opens a window for every console program otherwise."""
 
-__all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "look", "start_process"]
+__all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "look", "start_process", "view"]
 
 
 class Owner:
@@ -54,13 +56,32 @@ class Owner:
 
 def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
     """Whether a master answers at `address` (default: see `master_address`) within `timeout_s` seconds."""
-    return isinstance(_ask(Ping(), master_address(address), timeout_s), Done)
+    chosen = master_address(address)
+    try:
+        return isinstance(_ask(Ping(), chosen, timeout_s), Done)
+    except (MasterUnreachable, RequestRefusedError):
+        return False
+
+
+def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
+    """Who is there now, asked without a node of one's own.
+
+    Raises `MasterUnreachable` when no master answers in time, and `RequestRefusedError`.
+    """
+    chosen = master_address(address)
+    reply = _ask(Look(), chosen, timeout_s)
+    if not isinstance(reply, Seen):
+        raise RequestRefusedError(f"the master at '{chosen}' shows no graph")
+    return reply.view
 
 
 def look(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
-    """Who is there now, asked without a node of one's own; None when no master answers in time."""
-    reply = _ask(Look(), master_address(address), timeout_s)
-    return reply.view if isinstance(reply, Seen) else None
+    """As `view`; None when no master answers in time, or none that this nep understands."""
+    chosen = master_address(address)
+    try:
+        return view(chosen, timeout_s)
+    except (MasterUnreachable, RequestRefusedError):
+        return None
 
 
 def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 2.0) -> None:
@@ -69,38 +90,49 @@ def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 
     Whoever reaches one of them may then read and command everything: there is no password. Raises
     `RequestRefusedError` with the reason, `MasterUnreachable` when none answers within `timeout_s` seconds.
     """
-    chosen = master_address(address)
-    reply = _ask(Listen(tuple(hosts)), chosen, timeout_s)
-    if reply is None:
-        raise MasterUnreachable(chosen, timeout_s)
-    if isinstance(reply, Refused):
-        raise RequestRefusedError(reply.reason)
+    _ask(Listen(tuple(hosts)), master_address(address), timeout_s)
 
 
-def _ask(request: Request, address: str, timeout_s: float) -> Reply | None:
-    """A master's reply to one request; None when there is none that answers in time."""
+def _ask(request: Request, address: str, timeout_s: float) -> Reply:
+    """A master's reply to one request. Raises `MasterUnreachable`, `RequestRefusedError`."""
     check_room(_FILES, "a question to the master")
+    started = time.monotonic()
+    name = MasterName(address, lambda _known: None)
+    name.look(started)
+    if not name.wait(timeout_s):
+        raise MasterUnreachable(address, timeout_s, is_known=False)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.DEALER)
     try:
         socket.setsockopt(zmq.LINGER, 0)
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
-        socket.connect(endpoint_of(address))
-        socket.send(encode_request(request, 1))
-        deadline = time.monotonic() + timeout_s
+        socket.connect(endpoint_of(name.known))
+        body = encode_request(request, 1)
+        socket.send(body)
+        deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _AGAIN_S
         while (left := deadline - time.monotonic()) > 0:
-            if not socket.poll(int(min(left, 0.1) * 1000) + 1):
-                continue
-            try:
-                answer = decode_answer(socket.recv())[1]
-            except WireError:
-                return None
-            if isinstance(answer, Reply):
-                return answer
-        return None
+            if socket.poll(int(min(left, 0.1) * 1000) + 1):
+                reply = _read(socket.recv())
+                if reply is not None:
+                    return reply
+            elif time.monotonic() >= again_at:  # it may have gone to a master that ended just then
+                again_at += _AGAIN_S
+                socket.send(body)
+        raise MasterUnreachable(address, timeout_s)
     finally:
         socket.close()
         context.term()
+
+
+def _read(body: bytes) -> Reply | None:
+    """The reply in a body, None for a push. Raises `RequestRefusedError`."""
+    try:
+        answer = decode_answer(body)[1]
+    except WireError as error:
+        raise RequestRefusedError(f"the master's answer cannot be read: {error.reason}") from error
+    if isinstance(answer, Refused):
+        raise RequestRefusedError(answer.reason)
+    return answer if isinstance(answer, Reply) else None
 
 
 def start_process(

@@ -11,9 +11,10 @@ import zmq
 
 import nep
 from nep.backends.zeromq.io_thread import SharedContext, shared_context
-from nep.backends.zeromq.master_session import MasterName, MasterSession
+from nep.backends.zeromq.master_session import MasterSession
 from nep.masters.master import Master
 from nep.protocol.requests import NodeRecord
+from nep.system.addresses import MasterName
 from tests.nep.programs import eventually
 
 

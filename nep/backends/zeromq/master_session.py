@@ -1,7 +1,7 @@
 """MasterSession: what a node has registered with one master: renews it when due, hears of publishers.
 
 It keeps everything that is registered, so that a master that was started again learns all of it at once.
-`Pace` tells when to renew, and `MasterName` the address behind a master's name.
+`Pace` tells when to renew.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from nep.backends.zeromq.bindings import in_reach, may_stay
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.rpc import Asking, Calls
-from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards, is_number, look_up
+from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
 from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
@@ -50,19 +50,15 @@ from nep.protocol.requests import (
     Seen,
     SubscriberRecord,
 )
-from nep.system.addresses import host_of, is_loopback
+from nep.system.addresses import MasterName, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
-__all__ = ["MasterName", "MasterSession", "Pace"]
+__all__ = ["MasterSession", "Pace"]
 
 _RENEW_LONGEST_S = 30.0
 """A master cannot make a node wait for longer."""
 
 _logger = logging.getLogger("nep")
-_ASK_AGAIN_S = 5.0
-_SLICE_S = 0.1
-_HERE = frozenset({"localhost", "*"})
-"""Names of this computer that nobody has to be asked for; a master at "*" is reached here as well."""
 
 _FOLLOW_S = 1.0
 """How often a node looks whether its publishers have to move."""
@@ -87,74 +83,6 @@ class Pace:
         """Renew so soon; and so often while no answer comes."""
         self._renew_s = min(_RENEW_LONGEST_S, max(RENEW_S, renew_s))
         self.due_at = now + self._renew_s
-
-
-class MasterName:
-    """The address behind a master's name, never looked up where sockets are served.
-
-    Asking for a name can take half a minute, and libzmq asks again in its own thread with each attempt to
-    connect. So a thread of its own asks, and ends; libzmq gets numbers. It asks again only while the master
-    is not connected.
-
-    What in `address` is a number already is known at once. `on_change` is told a new `known`, in the thread
-    that asked.
-    """
-
-    def __init__(
-        self, address: str, on_change: Callable[[str], None], look_up: Callable[[str], str] = look_up
-    ) -> None:
-        self.known = ""
-        """The address with a number as its host; "" as long as nobody knows it."""
-        self._host, self._port = host_of(address), address.rpartition(":")[2]
-        self._on_change = on_change
-        self._look_up = look_up
-        self._thread: threading.Thread | None = None
-        self._again_at = 0.0
-        self._is_told = False
-        self._answered = threading.Event()
-        host = "127.0.0.1" if self._host in _HERE else self._host
-        if is_number(host):
-            self.known = f"{host}:{self._port}"
-            self._answered.set()
-
-    def look(self, now: float) -> None:
-        """The master is not connected: ask again, when it is a name and the last time was long ago."""
-        is_asking = self._thread is not None and self._thread.is_alive()
-        if is_number(self._host) or self._host in _HERE or is_asking or now < self._again_at:
-            return
-        self._again_at = now + _ASK_AGAIN_S
-        thread = threading.Thread(target=self._ask, name=f"nep-name-{self._host}", daemon=True)
-        try:
-            thread.start()
-        except RuntimeError:
-            return  # no thread can be had now
-        self._thread = thread
-
-    def wait(self, timeout_s: float | None) -> bool:
-        """Wait until it is known, None without a limit; whether it is."""
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        while not self._answered.is_set():
-            left = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
-            if left <= 0.0:
-                return False
-            self._answered.wait(left)
-        return True
-
-    def _ask(self) -> None:
-        try:
-            known = f"{self._look_up(self._host)}:{self._port}"
-        except (OSError, UnicodeError) as error:
-            if not self._is_told:
-                self._is_told = True
-                _logger.info(  # who waits for the master is told by `MasterUnreachable`
-                    "nobody knows the computer '%s' of the master (%s); asking again", self._host, error
-                )
-            return
-        self._is_told = False
-        if known != self.known:
-            self.known = known
-            self._on_change(known)
-        self._answered.set()
 
 
 class MasterSession:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import ipaddress
 import socket
 import threading
 import time
@@ -12,7 +11,7 @@ from collections.abc import Callable
 import zmq
 
 from nep.errors import AddressInUseError, NepError
-from nep.system.addresses import endpoint_of, host_of, is_endpoint, is_loopback
+from nep.system.addresses import endpoint_of, host_of, in_numbers, is_endpoint, is_loopback
 from nep.system.descriptors import check_room
 from nep.system.log_rarely import is_told
 
@@ -25,10 +24,7 @@ __all__ = [
     "bind_free_port",
     "connect",
     "host_towards",
-    "in_numbers",
-    "is_number",
     "keep_alive",
-    "look_up",
     "receive_mark",
     "send_mark",
     "sendable",
@@ -125,33 +121,6 @@ def connect(owner: Socket, address: str) -> str:
     endpoint = endpoint_of(in_numbers(address))
     owner.connect(endpoint)
     return endpoint
-
-
-def look_up(host: str) -> str:
-    """The first IPv4 address of a name. May wait for long; raises `OSError`, `UnicodeError`."""
-    return str(socket.getaddrinfo(host, None, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
-
-
-def in_numbers(address: str) -> str:
-    """An address with a number as its host, asked for in the caller's thread. Raises `NepError`."""
-    host = host_of(address)
-    if is_number(host):
-        return address
-    try:
-        return f"{look_up(host)}:{address.rpartition(':')[2]}"
-    except (OSError, UnicodeError) as error:
-        raise NepError(
-            f"no computer is called '{host}' here; look for a typing error, or write its address in numbers"
-        ) from error
-
-
-def is_number(host: str) -> bool:
-    """Whether it is an IPv4 address, for which nobody has to be asked."""
-    try:
-        ipaddress.IPv4Address(host)
-    except ValueError:
-        return False
-    return True
 
 
 def host_towards(address: str) -> str | None:
