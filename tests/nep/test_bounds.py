@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 import zmq
 
-from nep.backends.zeromq.rpc import Calls
+from nep.backends.zeromq.rpc import RpcClient
 from nep.gateway.attachment import NativeNetwork
 from nep.gateway.framing import PORT_A
 from nep.gateway.listing import Listing
@@ -102,7 +102,7 @@ def pair() -> Iterator[SimpleNamespace]:
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     router = context.socket(zmq.ROUTER)
     port = router.bind_to_random_port("tcp://127.0.0.1")
-    calls = Calls(context.socket(zmq.DEALER), f"127.0.0.1:{port}", lambda: None)
+    calls = RpcClient(context.socket(zmq.DEALER), f"127.0.0.1:{port}", lambda: None)
     calls.lead_to(f"127.0.0.1:{port}")
     yield SimpleNamespace(router=router, calls=calls)
     calls.release()
@@ -283,6 +283,6 @@ class JustConnected:
 def test_a_request_is_sent_at_once_when_the_connection_comes_while_it_is_made() -> None:
     """The look at the socket takes the only signal of it: without a second try it waits for half a second."""
     socket = JustConnected()
-    calls = Calls(socket, "127.0.0.1:9", lambda: None)  # type: ignore[arg-type]
+    calls = RpcClient(socket, "127.0.0.1:9", lambda: None)  # type: ignore[arg-type]
     calls.begin(Ping())
     assert socket.sent == [encoding.encode_request(Ping(), 1)]

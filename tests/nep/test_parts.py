@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import nep
 from nep.backends.base import Backend
 from nep.backends.zeromq.io_thread import IoThread, Rest
-from nep.backends.zeromq.loss import UNLISTED_MAX, Sources
+from nep.backends.zeromq.loss import UNLISTED_MAX, HeardPublishers
 from nep.backends.zeromq.publisher import MAX_SUBSCRIBERS, Subscriptions
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.messages.message import Message
@@ -56,7 +56,7 @@ def remote(id: int, node: str = "n", name: str = "N") -> RemotePublisher:
 
 
 def test_gaps_are_losses_counted_from_the_echo() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     sources.reached(1, 10)
     for seq in (11, 12, 15):
         assert sources.arrived(1, seq, is_alone=False)
@@ -66,21 +66,21 @@ def test_gaps_are_losses_counted_from_the_echo() -> None:
 
 
 def test_counting_starts_at_the_first_message_when_there_is_no_echo_yet() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     assert sources.arrived(1, 100, is_alone=False)
     sources.reached(1, 100)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_a_latched_message_that_is_sent_again_is_dropped() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     assert sources.arrived(1, 5, is_alone=True)
     assert not sources.arrived(1, 5, is_alone=True)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     sources.reached(1, 0)
     sources.get(1).has_echoed = True
     sources.arrived(1, 1, is_alone=False)
@@ -94,7 +94,7 @@ def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late()
 
 
 def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     sources.get(1).remote = remote(1)
     assert sources.replaced_by(remote(2)) == []
     sources.get(1).is_lapsed = True
@@ -257,7 +257,7 @@ def test_the_public_names_are_there() -> None:
 
 
 def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     sources.reached(1, 0)
     assert sources.arrived(1, 1, is_alone=False)
     with pytest.raises(nep.errors.WireError, match="its number leaps from 1 to 18446744073709551615"):
@@ -271,7 +271,7 @@ def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
 
 
 def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     assert sources.arrived(1, 1, is_alone=False)
     far = 1 + 2**32 + 1
     with pytest.raises(nep.errors.WireError):
@@ -282,7 +282,7 @@ def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
 
 
 def test_the_largest_gap_that_can_be_is_counted() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     assert sources.arrived(1, 1, is_alone=False)
     assert sources.arrived(1, 1 + 2**32, is_alone=False)
     assert sources.lost == 2**32 - 1
@@ -375,7 +375,7 @@ def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
 
 
 def test_publishers_that_nobody_lists_are_remembered_up_to_a_bound() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     for number in range(1, 11):
         sources.listed(remote(number))
     for number in range(100, 5000):
@@ -420,7 +420,7 @@ def test_a_batch_of_a_sink_has_a_bound() -> None:
 
 
 def test_publishers_that_died_and_do_not_come_back_are_left_beyond_a_bound() -> None:
-    sources = Sources()
+    sources = HeardPublishers()
     for number in range(1, UNLISTED_MAX + 11):
         sources.listed(remote(number, name=f"N{number}")).is_lapsed = number != 5
     assert sources.ended(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]

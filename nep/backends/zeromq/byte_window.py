@@ -1,7 +1,7 @@
 """What is under way to subscribers, in bytes: libzmq bounds its queues by a number of messages only.
 
-A `Window` is for a subscriber that tells what it has read: what is queued here, in the kernel and in its own
-socket. `Backlog` is for all others: what libzmq still holds here. No sockets.
+A `SendWindow` is for a subscriber that tells what it has read: what is queued here, in the kernel and in its
+own socket. `Backlog` is for all others: what libzmq still holds here. No sockets.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Protocol
 
-__all__ = ["BACKLOG_STEP_BYTES", "STEP_BYTES", "WINDOW_BYTES", "WINDOW_LEAST_BYTES", "Backlog", "Window"]
+__all__ = ["BACKLOG_STEP_BYTES", "STEP_BYTES", "WINDOW_BYTES", "WINDOW_LEAST_BYTES", "Backlog", "SendWindow"]
 
 WINDOW_BYTES = 192 * 2**20
 """So much may be under way to one subscriber. With the batch that its sink works on these are 256 MB."""
@@ -25,7 +25,7 @@ _ASK_AGAIN_S = 0.5
 """A subscriber without room is asked again after this: libzmq drops a question when its own queue is full."""
 
 
-class Window:
+class SendWindow:
     """What was sent to one subscriber and is not known to be read. It lives under its publisher's lock."""
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Sources: the publishers that a subscriber hears, and how many of their messages were lost. No sockets."""
+"""The publishers that a subscriber hears, and how many of their messages were lost. No sockets."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from nep.errors import WireError
 from nep.messages.message import Kind, kind_of
 from nep.protocol.requests import RemotePublisher
 
-__all__ = ["UNLISTED_MAX", "Source", "Sources"]
+__all__ = ["UNLISTED_MAX", "HeardPublisher", "HeardPublishers"]
 
 FAREWELL_S = 3.0
 """So long after a publisher has unregistered its last messages may still come."""
@@ -20,7 +20,7 @@ _UNKNOWN = kind_of("", "", "")
 
 
 @dataclass
-class Source:
+class HeardPublisher:
     """One publisher. `last` is the newest message heard of it, None before the first.
 
     `form` is that of the header of its last message, and `kind` goes with it; 0 when there was none.
@@ -44,44 +44,44 @@ class Source:
     """The number of a message that was refused because too many would be missing before it; else 0."""
 
 
-class Sources:
+class HeardPublishers:
     """Counts `received` and `lost`, from sequence numbers without gaps."""
 
     def __init__(self) -> None:
         self.received = 0
         self.lost = 0
-        self.by_id: dict[int, Source] = {}
+        self.by_id: dict[int, HeardPublisher] = {}
         """All of them. Only to be looked at."""
         self._unlisted: dict[int, None] = {}
         """Those that no master lists, the oldest first."""
 
-    def get(self, publisher: int) -> Source:
+    def get(self, publisher: int) -> HeardPublisher:
         """The source of this id, made when it is new; the oldest that no master lists may go for it."""
         source = self.by_id.get(publisher)
         if source is None:
-            source = self.by_id[publisher] = Source()
+            source = self.by_id[publisher] = HeardPublisher()
             self._unlisted[publisher] = None
             if len(self._unlisted) > UNLISTED_MAX:
                 self.pop(next(iter(self._unlisted)))
         return source
 
-    def listed(self, remote: RemotePublisher) -> Source:
+    def listed(self, remote: RemotePublisher) -> HeardPublisher:
         """The source of a publisher that the master lists, made when it is new."""
         source = self.get(remote.publisher.id)
         source.remote = remote
         self._unlisted.pop(remote.publisher.id, None)
         return source
 
-    def find(self, publisher: int) -> Source | None:
+    def find(self, publisher: int) -> HeardPublisher | None:
         """The source of this id, if there is one."""
         return self.by_id.get(publisher)
 
-    def pop(self, publisher: int) -> Source | None:
+    def pop(self, publisher: int) -> HeardPublisher | None:
         """Forget a source."""
         self._unlisted.pop(publisher, None)
         return self.by_id.pop(publisher, None)
 
-    def items(self) -> list[tuple[int, Source]]:
+    def items(self) -> list[tuple[int, HeardPublisher]]:
         """All of them, by id."""
         return list(self.by_id.items())
 

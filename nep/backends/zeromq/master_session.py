@@ -15,7 +15,7 @@ from dataclasses import replace
 from nep.backends.zeromq.bindings import in_reach, may_stay
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.publisher import NativePublisher
-from nep.backends.zeromq.rpc import Asking, Calls
+from nep.backends.zeromq.rpc import PendingCall, RpcClient
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
 from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
@@ -102,7 +102,7 @@ class MasterSession:
         self.address = address
         self._node = node
         self._io = io
-        self._calls = Calls(socket, address, after_use=lambda: io.serve_soon(self))
+        self._calls = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
         self._publishers: dict[int, tuple[PublisherRecord, NativePublisher]] = {}
         self._subscribers: dict[int, tuple[SubscriberRecord, NativeSubscriber]] = {}
@@ -113,7 +113,7 @@ class MasterSession:
         self._follow_at = 0.0
         self._was_connected = False
         self._is_closed = False
-        self._leaving: Asking | None = None
+        self._leaving: PendingCall | None = None
         self._left_at = 0.0
         self._is_near = is_loopback(address)
         self._served: tuple[str, ...] = ()
@@ -162,7 +162,7 @@ class MasterSession:
     def add_publisher(
         self, record: PublisherRecord, publisher: NativePublisher, wait_s: float | None
     ) -> Added:
-        """Register; the subscribers to expect. Raises as `Calls.ask` does."""
+        """Register; the subscribers to expect. Raises as `RpcClient.ask` does."""
         with self._lock:
             self._publishers[record.id] = (record, publisher)
         try:
@@ -183,7 +183,7 @@ class MasterSession:
     def add_subscriber(
         self, record: SubscriberRecord, subscriber: NativeSubscriber, wait_s: float | None
     ) -> Found:
-        """Register; the publishers to connect to. Raises as `Calls.ask` does."""
+        """Register; the publishers to connect to. Raises as `RpcClient.ask` does."""
         with self._lock:
             self._subscribers[record.id] = (record, subscriber)
         try:
@@ -218,7 +218,7 @@ class MasterSession:
         self._calls.tell(ReportMissing(self._node.id, publisher, tuple(subscribers)))
 
     def look(self, timeout_s: float) -> GraphView:
-        """The graph. Raises as `Calls.ask` does."""
+        """The graph. Raises as `RpcClient.ask` does."""
         self.wait_for_name(timeout_s)
         reply = self._calls.ask(Look(), timeout_s)
         if not isinstance(reply, Seen):

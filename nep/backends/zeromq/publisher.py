@@ -15,7 +15,7 @@ import zmq
 
 from nep.backends.base import PublisherSpec
 from nep.backends.zeromq.bindings import SMALL, Bindings
-from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog, Window
+from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog, SendWindow
 from nep.backends.zeromq.io_thread import Rest, Served
 from nep.backends.zeromq.sockets import Part, Refusals, Socket, send_mark, sendable, wait_until
 from nep.errors import ClosedError
@@ -69,7 +69,7 @@ class Subscriptions:
         """Under which first part each of them is reached alone."""
         self.apart: dict[bytes, int] = {}
         """Filters by which somebody reads who did not say that it reads messages of one part; of how many."""
-        self.windows: dict[int, Window] = {}
+        self.windows: dict[int, SendWindow] = {}
         """What is under way to those that tell what they have read."""
         self.refusals = Refusals()
         self._id = publisher
@@ -122,7 +122,7 @@ class Subscriptions:
         self.hellos[hello.subscriber] = what
         self.windows.pop(hello.subscriber, None)
         if hello.tells:
-            self.windows[hello.subscriber] = Window()  # a connection of its own: nothing is under way
+            self.windows[hello.subscriber] = SendWindow()  # a connection of its own: nothing is under way
         return what
 
     def _note_filter(self, what: bytes, *, is_wanted: bool) -> None:

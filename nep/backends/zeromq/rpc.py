@@ -1,4 +1,4 @@
-"""Calls: requests to a master and its answers, over one DEALER socket that any thread may use."""
+"""RpcClient: requests to a master and its answers, over one DEALER socket that any thread may use."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nep.protocol.encoding import call_of_view, decode_answer, encode_request
 from nep.protocol.requests import Push, Refused, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
 
-__all__ = ["Answer", "Asking", "Calls", "Then"]
+__all__ = ["Answer", "PendingCall", "RpcClient", "Then"]
 
 _logger = logging.getLogger("nep")
 
@@ -32,7 +32,7 @@ Then = Callable[[Reply], None]
 
 
 @dataclass
-class Asking:
+class PendingCall:
     """A request that is under way."""
 
     body: bytes
@@ -51,14 +51,14 @@ class Answer(NamedTuple):
     then: Then | None
 
 
-class Calls:
+class RpcClient:
     """`after_use` is called when the socket may have input that its descriptor no longer tells of."""
 
     def __init__(self, socket: Socket, address: str, after_use: Callable[[], None]) -> None:
         self.address = address
         self._socket = socket
         self._after_use = after_use
-        self._calls: dict[int, Asking] = {}
+        self._calls: dict[int, PendingCall] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
         self.refusals = Refusals()
@@ -102,11 +102,11 @@ class Calls:
         """
         return self.wait(self.begin(request), timeout_s)
 
-    def begin(self, request: Request) -> Asking:
+    def begin(self, request: Request) -> PendingCall:
         """Send a request whose answer will be waited for."""
         return self._send(request, is_waited=True, then=None)
 
-    def wait(self, call: Asking, timeout_s: float | None) -> Reply:
+    def wait(self, call: PendingCall, timeout_s: float | None) -> Reply:
         """The reply. Raises as `ask` does."""
         started = time.monotonic()
         with self._changed:
@@ -173,10 +173,10 @@ class Calls:
             self._is_closed = True
             self._socket.close(0)
 
-    def _send(self, request: Request, *, is_waited: bool, then: Then | None) -> Asking:
+    def _send(self, request: Request, *, is_waited: bool, then: Then | None) -> PendingCall:
         with self._changed:
             number = next(self._numbers)
-            call = Asking(encode_request(request, number), is_waited, then)
+            call = PendingCall(encode_request(request, number), is_waited, then)
             if self._is_closed:
                 return call
             self._calls[number] = call

@@ -16,7 +16,7 @@ import zmq
 
 from nep.backends.base import SubscriberSpec
 from nep.backends.zeromq.byte_window import WINDOW_BYTES
-from nep.backends.zeromq.loss import Source, Sources
+from nep.backends.zeromq.loss import HeardPublisher, HeardPublishers
 from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive, receive_mark, wait_shortly
 from nep.errors import WireError
 from nep.messages.codecs import codec_for, codec_numbered
@@ -70,7 +70,7 @@ class _CarefulParser:
         self,
         spec: SubscriberSpec,
         hello: bytes,
-        sources: Sources,
+        sources: HeardPublishers,
         leave: Callable[[int], None],
         tell: Callable[[int, int], None],
     ) -> None:
@@ -132,7 +132,7 @@ class SubSocket:
     """Sets the filters at once, before anything is connected or bound: the hello must follow the topic."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
-        self.sources = Sources()
+        self.sources = HeardPublishers()
         self.refusals = Refusals()
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
@@ -184,7 +184,7 @@ class SubSocket:
             else:
                 self._refuse(source, endpoint, "it is none")
 
-    def _connect(self, source: Source, endpoint: str) -> None:
+    def _connect(self, source: HeardPublisher, endpoint: str) -> None:
         if source.endpoint:  # its computer has another address now, or its master listens anew
             self._disconnect(source.endpoint)
             source.has_echoed = False
@@ -197,7 +197,7 @@ class SubSocket:
         else:
             source.endpoint = endpoint
 
-    def _refuse(self, source: Source, endpoint: str, why: str) -> None:
+    def _refuse(self, source: HeardPublisher, endpoint: str, why: str) -> None:
         """Whoever tells the master nonsense keeps nobody from hearing the others: it is named, not raised."""
         name = source.remote.node_name if source.remote is not None else ""
         shown = ascii(endpoint[:100])[1:-1]

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from nep.backends.zeromq.byte_window import STEP_BYTES, WINDOW_BYTES, WINDOW_LEAST_BYTES, Backlog, Window
+from nep.backends.zeromq.byte_window import STEP_BYTES, WINDOW_BYTES, WINDOW_LEAST_BYTES, Backlog, SendWindow
 
 
 class Held:
@@ -17,7 +17,7 @@ class Held:
 
 def test_what_is_under_way_is_bounded_for_any_sizes() -> None:
     for seed in range(20):
-        chance, window, most = random.Random(seed), Window(), 0
+        chance, window, most = random.Random(seed), SendWindow(), 0
         for seq in range(1, 3000):
             size = chance.choice([0, 1, 2**10, 2**20, 6 * 2**20, 64 * 2**20])
             if window.has_room(size):
@@ -31,7 +31,7 @@ def test_what_is_under_way_is_bounded_for_any_sizes() -> None:
 
 
 def test_a_message_larger_than_the_window_goes_when_nearly_nothing_is_under_way() -> None:
-    window = Window()
+    window = SendWindow()
     window.sent(1, STEP_BYTES)
     assert window.has_room(WINDOW_BYTES * 2)
     window.sent(2, WINDOW_BYTES * 2)
@@ -44,7 +44,7 @@ def test_a_message_larger_than_the_window_goes_when_nearly_nothing_is_under_way(
 
 @pytest.mark.parametrize("bound", [0, 1, WINDOW_LEAST_BYTES, 2**64 - 1])
 def test_a_subscriber_chooses_its_bound_within_limits(bound: int) -> None:
-    window = Window()
+    window = SendWindow()
     window.read(0, bound)
     size, count = 2**20, 0
     while window.has_room(size):
@@ -54,7 +54,7 @@ def test_a_subscriber_chooses_its_bound_within_limits(bound: int) -> None:
 
 
 def test_many_small_messages_need_few_entries() -> None:
-    window = Window()
+    window = SendWindow()
     for seq in range(1, 200_000):
         window.sent(seq, 1000)
     assert len(window._sent) < 250
@@ -63,7 +63,7 @@ def test_many_small_messages_need_few_entries() -> None:
 
 
 def test_it_is_asked_for_each_step_and_again_while_it_has_no_room() -> None:
-    window = Window()
+    window = SendWindow()
     window.sent(1, STEP_BYTES - 1)
     assert not window.is_to_ask(0.0, has_room=True)
     window.sent(2, 1)
@@ -75,7 +75,7 @@ def test_it_is_asked_for_each_step_and_again_while_it_has_no_room() -> None:
 
 
 def test_who_missed_something_is_told_once_when_there_is_room_again() -> None:
-    window = Window()
+    window = SendWindow()
     window.sent(1, WINDOW_BYTES)
     assert not window.is_to_tell()
     window.missed()
