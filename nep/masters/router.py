@@ -1,4 +1,4 @@
-"""MasterPort: the master's ROUTER socket: requests in, bodies out. For the master's thread only."""
+"""MasterRouter: the master's ROUTER socket: requests in, bodies out. For the master's thread only."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nep.errors import AddressInUseError
 from nep.system.addresses import endpoint_of
 from nep.system.descriptors import check_room
 
-__all__ = ["MasterPort"]
+__all__ = ["MasterRouter"]
 
 REQUEST_MAX_BYTES = 4 * 2**20
 """Whoever sends more in one part is disconnected."""
@@ -31,7 +31,7 @@ _EVENT = struct.Struct("=HI")
 """What libzmq tells of a connection: the kind of event and the connection's number."""
 
 
-class MasterPort:
+class MasterRouter:
     """Raises `AddressInUseError` when `address` cannot be bound, `TooManyFilesError`."""
 
     def __init__(self, address: str) -> None:

@@ -19,7 +19,7 @@ from nep.masters.graph import Graph, Outgoing, with_hosts, without
 from nep.masters.leases import is_renewal, read_renewal, renewed_body
 from nep.masters.listen_addresses import Listening
 from nep.masters.process import Owner
-from nep.masters.router import MasterPort
+from nep.masters.router import MasterRouter
 from nep.protocol.encoding import AnswerEncoder, Asked, collecting_later, decode_request
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Done, Listen, Look, Refused, Reply, ReportAlerts, Request
@@ -43,7 +43,7 @@ _FOLLOW_S = 2.0
 
 
 class Submission:
-    """`done` is set with the reply, or without one when the master has ended."""
+    """A request from inside the master's process. `done` is set with its reply, or without when that ends."""
 
     def __init__(self, request: Request) -> None:
         self.request = request
@@ -67,7 +67,7 @@ class MasterServer:
         self._graph = graph
         self._listeners = listeners
         self._owner = owner
-        self._port = MasterPort(address)
+        self._port = MasterRouter(address)
         self.address = self._port.address
         self._waker = Waker()
         self._submitted: deque[Submission] = deque()

@@ -20,7 +20,7 @@ from nep.gateway.requests import RequestError, read_request
 from nep.masters.bad_requests import BadRequests
 from nep.masters.graph import Graph
 from nep.masters.registry import Registry
-from nep.masters.router import MasterPort
+from nep.masters.router import MasterRouter
 from nep.masters.snapshot import GraphViewer
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView, TopicInfo
@@ -151,7 +151,7 @@ def test_many_pushes_are_read_in_slices(pair: SimpleNamespace) -> None:
 
 
 def test_who_asks_for_graphs_and_reads_none_costs_the_master_no_memory_without_end() -> None:
-    port = MasterPort("127.0.0.1:0")
+    port = MasterRouter("127.0.0.1:0")
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     with context.socket(zmq.DEALER) as socket:
         socket.setsockopt(zmq.LINGER, 0)

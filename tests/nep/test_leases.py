@@ -17,7 +17,7 @@ from nep.masters.graph import Graph
 from nep.masters.leases import LEASE_S, Leases
 from nep.masters.master import Master
 from nep.masters.registry import Registry
-from nep.masters.router import MasterPort
+from nep.masters.router import MasterRouter
 from nep.protocol.requests import Join, NodeRecord, Renew, Renewed
 from tests.nep.programs import eventually, running
 
@@ -174,7 +174,7 @@ def dealer(context: zmq.Context[zmq.Socket[bytes]], address: str, name: bytes) -
 
 
 def test_the_port_tells_whose_connection_ended_each_once_a_moment_later() -> None:
-    port = MasterPort("127.0.0.1:0")
+    port = MasterRouter("127.0.0.1:0")
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     sockets = {name: dealer(context, port.address, name) for name in (b"a", b"b", b"c")}
     heard: set[bytes] = set()
