@@ -232,16 +232,18 @@ class SubSocket:
             if error.errno != errno.ENOENT:  # it was not connected any more
                 raise
 
-    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+    def read_into(
+        self, into: Into, most: int, room: int, *, may_wait: bool = False, first: bytes | None = None
+    ) -> int:
         """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
 
-        With `may_wait` the first is waited for. Notices are dealt with on the way. Nearly every message is
-        just the next one of its publisher, has the form of the one before and comes in one part: that is read
-        here.
+        With `may_wait` the first is waited for; `first` is what was read of it already. Notices are dealt
+        with on the way. Nearly every message is just the next one of its publisher, has the form of the one
+        before and comes in one part: that is read here.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
         cut, body = self._cut, self._body
-        count, others, flags, first = 0, 0, 0 if may_wait else _DONTWAIT, None
+        count, others, flags = 0, 0, 0 if may_wait else _DONTWAIT
         try:
             while count < most and room > 0:
                 if first is None:
@@ -279,9 +281,30 @@ class SubSocket:
         return count
 
     def read(self, *, may_wait: bool = False) -> Message | None:
-        """The next message, waited for with `may_wait`; None when there is nothing more."""
+        """The next message, waited for with `may_wait`; None when there is nothing more.
+
+        The usual message is read here as in `read_into`: calling that takes a third longer, and a program
+        that reads one message after the other does this for each.
+        """
+        try:
+            first = self._recv(0 if may_wait else _DONTWAIT)
+        except zmq.Again:
+            return None
+        if len(first) >= self._body and first.startswith(self._topic):
+            form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
+            source = self.sources.by_id.get(publisher)
+            raw = first[self._body :]
+            if source and source.form == form and source.last == seq - 1 and len(raw) == size:
+                self.sources.received += 1
+                message = new_message(Message)
+                message.kind, message.raw = source.kind, raw
+                message.stamp_ns = stamp_ns
+                message.seq = source.last = seq
+                message.publisher, message.extension = publisher, NOTHING
+                message.decoded = UNDECODED
+                return message
         one: list[Message] = []
-        return one[0] if self.read_into(one, 1, 1, may_wait=may_wait) else None
+        return one[0] if self.read_into(one, 1, 1, first=first) else None
 
     def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
         """A message that begins with `first`: what comes behind it, if that was read too, and the message.
