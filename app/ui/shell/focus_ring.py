@@ -1,6 +1,8 @@
 """The focus ring: 2 px wide, 2 px outside the control, only when the keyboard led there.
 
 Style sheets cannot move an outline outwards, so one small overlay follows the widget that has the focus.
+Qt's QFocusFrame does not serve: it becomes a child of the scroll area around the widget and is deleted with
+it, and its distance is the style's, one for all widgets.
 """
 
 from __future__ import annotations
