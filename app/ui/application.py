@@ -29,9 +29,9 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.shell.window_state import WindowState, fitting
 from app.ui.startup import interpreter, qt_log, single_instance
-from app.ui.startup.deferred import AfterFirstPaint
+from app.ui.startup.deferred import DeferredSteps
 from app.ui.startup.file_open import Application, IncomingFiles
-from app.ui.startup.single_instance import Asked
+from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
 
@@ -104,7 +104,7 @@ def make_window(session: Session, options: Options) -> MainWindow:
     return window
 
 
-def open_asked(window: MainWindow, asked: Asked) -> None:
+def open_asked(window: MainWindow, asked: StartRequest) -> None:
     """Do what a start asks, this one or a later one that found this window."""
     if asked.files:
         window.commands.files.open_all(asked.files)
@@ -129,14 +129,14 @@ def first_steps(window: MainWindow, options: Options) -> list[Callable[[], objec
     asked = bool(options.files or options.demo)
     if options.self_drive is not None:
         window.begin()
-        open_asked(window, Asked(options.files, options.demo))
+        open_asked(window, StartRequest(options.files, options.demo))
         return []
     if not asked and not left:
         return [window.begin]
 
     def show() -> None:
         if asked:
-            open_asked(window, Asked(options.files, options.demo))
+            open_asked(window, StartRequest(options.files, options.demo))
         else:
             window.commands.view.show_layout(left)
         if window.bench is None:  # what was asked can't be opened; an alert says so
@@ -171,7 +171,9 @@ def run(options: Options) -> int:
     bring_here()
     meeting_place = single_instance.place(home())
     turn = Turn(home() / "starting")
-    if not options.alone and single_instance.found(meeting_place, Asked(options.files, options.demo), turn):
+    if not options.alone and single_instance.found(
+        meeting_place, StartRequest(options.files, options.demo), turn
+    ):
         return 0
     refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:
@@ -189,12 +191,14 @@ def run(options: Options) -> int:
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.take(session.console.add))
     hearing.start(LOG_EVERY_MS)
-    soon = AfterFirstPaint(window, steps_after(window))
+    soon = DeferredSteps(window, steps_after(window))
     window.show()
     window.activateWindow()  # keys go there at once, also where no window manager sees to it
     first = first_steps(window, options)
     if not options.alone:
-        first.append(lambda: single_instance.Meeting(meeting_place, partial(open_asked, window), window))
+        first.append(
+            lambda: single_instance.SingleInstanceServer(meeting_place, partial(open_asked, window), window)
+        )
         first.append(turn.leave)
     soon.put_first(first)
     IncomingFiles(window, window.commands.files.open_all)

@@ -67,7 +67,7 @@ def dropped(monkeypatch: pytest.MonkeyPatch) -> list[tuple[QMenu, QWidget]]:
 
 
 def test_the_layout_says_its_name_and_offers_the_others(tools, window, dropped) -> None:
-    window.arrangements.keep_as(window.bench, "developer", "Two cameras")
+    window.saved_layouts.keep_as(window.bench, "developer", "Two cameras")
     tools.refresh()
     assert tools.layout.text() == "Two cameras"
     assert tools.layout.accessibleName() == "Layout Two cameras"

@@ -9,9 +9,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
-from app.ui.shell.bars.banner import BannerPlace
+from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.bars.toast import Toast
-from app.ui.shell.dialogs.sheet import Sheet
+from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.focus_ring import FocusRing
 from app.ui.text.numbers import spoken_key
 from app.ui.theme.theme import Theme
@@ -75,7 +75,7 @@ def test_a_toast_stays_while_it_has_the_focus(qtbot, place: QWidget, theme: Them
 
 
 def test_an_offer_waits_for_its_answer_and_alerts_wait_behind_it(place: QWidget, theme: Theme) -> None:
-    banner = BannerPlace(theme)
+    banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     done: list[str] = []
     banner.offer(
@@ -94,7 +94,7 @@ def test_an_offer_waits_for_its_answer_and_alerts_wait_behind_it(place: QWidget,
 
 
 def test_a_closed_offer_and_a_closed_alert_make_room_for_the_next(place: QWidget, theme: Theme) -> None:
-    banner = BannerPlace(theme)
+    banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     dismissed: list[str] = []
     banner.on_dismiss = dismissed.append
@@ -109,14 +109,14 @@ def test_a_closed_offer_and_a_closed_alert_make_room_for_the_next(place: QWidget
 
 
 def test_words_of_an_alert_are_no_markup(place: QWidget, theme: Theme) -> None:
-    banner = BannerPlace(theme)
+    banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     banner.show_alerts([Said("a", title="<b>/faces</b> & co.")])
     assert "&lt;b&gt;/faces&lt;/b&gt; &amp; co." in banner.banner.words.text()
 
 
 def test_a_banner_grows_with_long_words(qtbot, place: QWidget, theme: Theme) -> None:
-    banner = BannerPlace(theme)
+    banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     banner.show_alerts([Said("a")])
     QTest.qWait(1)
@@ -235,8 +235,8 @@ def test_a_sheet_closes_with_esc_and_when_the_person_goes_elsewhere(
     field = QLineEdit()
     place.layout().addWidget(field)
     for leave in (lambda: QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape), field.setFocus):
-        sheet = Sheet(theme, place, "Keyboard shortcuts", [("Stop", "F12"), ("plain words", "")])
-        sheet.show_over()
+        sheet = AboutSheet(theme, place)
+        sheet.open()
         assert sheet.isVisible()
         assert place.rect().contains(sheet.geometry())
         with qtbot.waitSignal(sheet.destroyed):

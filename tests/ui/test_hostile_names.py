@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QAbstractItemView, QLabel, QMenu, QWidget
 import app.ui
 from app.ui.panels.base import PanelWidget
 from app.ui.panels.registry import PanelShelf
-from app.ui.shell.bars.banner import BannerPlace
+from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.docking.dock import Dock
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -117,7 +117,7 @@ def test_no_panel_takes_a_name_for_markup(qtbot, name: str) -> None:
 
 def test_the_banner_shows_names_as_they_are(qtbot, theme: Theme) -> None:
     window = hostile()
-    banner = BannerPlace(theme)
+    banner = AlertBanner(theme)
     qtbot.addWidget(banner)
     banner.show_alerts(window.session.alerts.active)
     for label in banner.findChildren(QLabel):

@@ -15,19 +15,19 @@ from app.core.session import Session
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.base import Toast as Says
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
-from app.ui.shell.bars.banner import BannerPlace, BannerRoom
+from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
 from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
 from app.ui.shell.bars.status_bar import Facts, StatusBar
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.shell import START
-from app.ui.shell.dialogs.motion_permission import MoveQuestion
+from app.ui.shell.dialogs.motion_permission import MotionQuestion
 from app.ui.shell.docking.dock import Dock, fitting
 from app.ui.shell.docking.layouts import LAYOUTS, layout_named
-from app.ui.shell.docking.saved_layouts import Arrangements
+from app.ui.shell.docking.saved_layouts import SavedLayouts
 from app.ui.shell.docking.workbench import Workbench
-from app.ui.shell.documents.flush import Leaving
+from app.ui.shell.documents import FlushBeforeClose
 from app.ui.shell.focus_ring import FocusRing
 from app.ui.shell.keyboard import PanelFocus
 from app.ui.shell.start_page.page import Example, StartPage
@@ -68,7 +68,7 @@ class MainWindow(QMainWindow):
         self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
         self.state = WindowState(session.settings, self.complain)
-        self.arrangements = Arrangements(self.state, self.complain)
+        self.saved_layouts = SavedLayouts(self.state, self.complain)
         self.on_shut: Callable[[], object] = lambda: None
         self._showing = ""
         self.benches: dict[str, Workbench] = {}
@@ -77,7 +77,7 @@ class MainWindow(QMainWindow):
         self._ticks = self._halves = 0
         self._twice = False  # the timer runs twice as often as the tick
         self._shut = False
-        self._leaving = Leaving(self, self.editor, self.close)
+        self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
         self.context = PanelContext(session, theme, self.open_topic, self.say, self._run)
         self.ring = FocusRing(theme, self)
@@ -101,12 +101,12 @@ class MainWindow(QMainWindow):
         self.use_robot = Button(theme, "Use the virtual robot", "bot", size="small")
         self.use_robot.let_shrink()
         self.tool_bar.add_tool(self.use_robot)
-        self.banner = BannerPlace(theme)
+        self.banner = AlertBanner(theme)
         self.start = StartPage(theme, examples)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.start)
         self.status = StatusBar(theme)
-        self.room = BannerRoom(self.banner, self.pages)
+        self.room = BannerSpacer(self.banner, self.pages)
         middle = QWidget()
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
@@ -118,7 +118,7 @@ class MainWindow(QMainWindow):
         self.banner.setParent(middle)  # over the pages, which it does not move
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
-        self.question = MoveQuestion(theme, self, self.session.fleet.moving, self.complain)
+        self.question = MotionQuestion(theme, self, self.session.fleet.moving, self.complain)
 
     def _connect(self) -> None:
         commands, start, run = self.commands, self.start, self._run
@@ -210,7 +210,7 @@ class MainWindow(QMainWindow):
             self.benches[layout.name] = bench
             self.pages.addWidget(bench)
             bench.resize(self.pages.size())
-            self.arrangements.bring_back(bench, layout.name)
+            self.saved_layouts.bring_back(bench, layout.name)
             self.bench_made.emit()
         bench = self.benches[layout.name]
         focus = QApplication.focusWidget()
@@ -384,11 +384,11 @@ class MainWindow(QMainWindow):
         if not self._shut:
             if self._moves():
                 self.session.runs.stop()  # told now, answered while the session closes
-            if not self._leaving.ready():
+            if not self._flush_before_close.ready():
                 event.ignore()
                 return
             if not self._may_lose_work():
-                self._leaving.stay()
+                self._flush_before_close.stay()
                 event.ignore()
                 return
             self._shut = True
@@ -415,7 +415,7 @@ class MainWindow(QMainWindow):
     def _keep(self) -> None:
         self.state.keep_place(self)
         for name, bench in self.benches.items():
-            self.arrangements.keep(bench, name)
+            self.saved_layouts.keep(bench, name)
         self.state.keep_theme(self.theme)
 
 

@@ -14,7 +14,7 @@ AT_THE_LATEST_MS = 2000  # a window that starts minimised, or behind a locked sc
 _log = logging.getLogger(__name__)
 
 
-class AfterFirstPaint(QObject):
+class DeferredSteps(QObject):
     """Takes one step in each turn of the event loop, so that a click waits for one step at most."""
 
     def __init__(self, window: QWidget, steps: Iterable[Callable[[], object]]) -> None:

@@ -43,7 +43,7 @@ OK = b"ok\n"
 
 
 @dataclass(frozen=True)
-class Asked:
+class StartRequest:
     """What a second start asks of the window that is there."""
 
     files: tuple[Path, ...] = ()
@@ -112,7 +112,7 @@ def peer_of(descriptor: int) -> int | None:
     return None
 
 
-def hand_over(name: str, asked: Asked) -> bool:
+def hand_over(name: str, asked: StartRequest) -> bool:
     """Let the window that runs do it; False when none runs. Waits at most 3 s for its answer.
 
     What another user put there is not talked to.
@@ -135,7 +135,7 @@ def hand_over(name: str, asked: Asked) -> bool:
     return answer == OK
 
 
-def found(name: str, asked: Asked, turn: Turn, within_s: float = START_S) -> bool:
+def found(name: str, asked: StartRequest, turn: Turn, within_s: float = START_S) -> bool:
     """Whether the window that runs, or one that another start is bringing up, does it.
 
     When not, this start has the ``turn`` and brings up a window; it leaves the turn when that can be found.
@@ -162,10 +162,12 @@ def _is_others(line: QtNetwork.QLocalSocket) -> bool:
     return user is not None and user != os.geteuid()
 
 
-class Meeting(QObject):
+class SingleInstanceServer(QObject):
     """The place where later starts find this window; `close` leaves it."""
 
-    def __init__(self, name: str, do: Callable[[Asked], object], parent: QObject | None = None) -> None:
+    def __init__(
+        self, name: str, do: Callable[[StartRequest], object], parent: QObject | None = None
+    ) -> None:
         """``do`` is called for each later start."""
         super().__init__(parent)
         self._do = do
@@ -228,7 +230,7 @@ class Meeting(QObject):
         self._server.close()
 
 
-def parse(data: bytes) -> Asked | None:
+def parse(data: bytes) -> StartRequest | None:
     """What a start asked; None for what no Studio sends."""
     try:
         content = json.loads(data)
@@ -237,4 +239,4 @@ def parse(data: bytes) -> Asked | None:
     files = content.get("files") if isinstance(content, Mapping) else None
     if not isinstance(files, Sequence) or isinstance(files, str):
         return None
-    return Asked(tuple(Path(str(each)) for each in files), content.get("demo") is True)
+    return StartRequest(tuple(Path(str(each)) for each in files), content.get("demo") is True)

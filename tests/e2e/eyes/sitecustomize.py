@@ -138,7 +138,7 @@ def _is_in_fresh_banner(widget) -> bool:
     from PySide6.QtCore import Qt
 
     above = widget
-    while above is not None and type(above).__name__ != "BannerPlace":
+    while above is not None and type(above).__name__ != "AlertBanner":
         above = above.parentWidget()
     return above is not None and above.testAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 

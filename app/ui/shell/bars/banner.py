@@ -134,7 +134,7 @@ class Banner(AlertBox):
         return (self.height() - self.icon_side) / 2
 
 
-class BannerPlace(QWidget):
+class AlertBanner(QWidget):
     """Where the banner is: shows the worst alert that was not closed, and goes when it is cured."""
 
     def __init__(self, theme: Theme, banner: Banner | None = None) -> None:
@@ -230,12 +230,12 @@ class BannerPlace(QWidget):
         self.on_more()
 
 
-class BannerRoom(QWidget):
+class BannerSpacer(QWidget):
     """The room between bars and pages; the banner lies over it, or over pages that may not move yet."""
 
     def __init__(
         self,
-        place: BannerPlace,
+        place: AlertBanner,
         pages: QWidget,
         *,
         mouse_at: Callable[[], QPoint] | None = None,

@@ -83,7 +83,7 @@ class DeveloperTools(QObject):
         self._actions[FREEZE].setChecked(frozen)
         self.freeze.setChecked(frozen)
         self.freeze.setEnabled(bool(freezable(shell.bench)))
-        own = shell.arrangements.own("developer")
+        own = shell.saved_layouts.own("developer")
         name = own or "Developer"
         self.layout.set_word(name)
         self.layout.setAccessibleName(f"Layout {name}")

@@ -12,7 +12,7 @@ from app.core.session import Session
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
 from app.ui.shell.commands.shell import UNTIL_END, Shell
-from app.ui.shell.documents.controller import Files
+from app.ui.shell.documents import DocumentController
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
@@ -79,9 +79,9 @@ def bring_into_view(shell: Shell) -> None:
 class BehaviourCommands:
     """What a person does with behaviours and their tabs."""
 
-    def __init__(self, shell: Shell, session: Session, files: Files) -> None:
+    def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
         self._shell, self._session, self._files = shell, session, files
-        self._versions: version_history.EarlierSheet | None = None
+        self._versions: version_history.VersionHistorySheet | None = None
 
     # -- run --------------------------------------------------------------------------------------
 
@@ -185,7 +185,7 @@ class BehaviourCommands:
 
     def _show_versions(self) -> None:
         if self._versions is None:
-            self._versions = version_history.EarlierSheet(
+            self._versions = version_history.VersionHistorySheet(
                 self._shell.theme, self._shell.surface, self._files.copy, self._files.save
             )
         document = self._session.document

@@ -15,7 +15,7 @@ from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS, Handlers
 from app.ui.shell.commands.view import ViewCommands
-from app.ui.shell.documents.controller import Files
+from app.ui.shell.documents import DocumentController
 from app.ui.shell.stop_keys import StopKeys
 from app.ui.widgets.file_dialogs import Asks
 
@@ -27,7 +27,9 @@ class Commands:
 
     def __init__(self, shell: Shell, session: Session, asks: Asks) -> None:
         keys = Shortcuts(session.settings, shell.complain, COMMANDS)
-        self.files = Files(session, asks, shell.say, partial(bring_into_view, shell), shell.editor)
+        self.files = DocumentController(
+            session, asks, shell.say, partial(bring_into_view, shell), shell.editor
+        )
         self.behaviours = BehaviourCommands(shell, session, self.files)
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)

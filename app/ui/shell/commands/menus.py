@@ -83,7 +83,7 @@ class MenuLists:
 
     def _list_layouts(self, menu: Menu) -> None:
         menu.clear()
-        arrangements, shown = self._shell.arrangements, self._shell.showing
+        arrangements, shown = self._shell.saved_layouts, self._shell.showing
         for layout in LAYOUTS:
             entry = menu.addAction(self._shell.theme.icon(layout.icon), layout.title)
             entry.setCheckable(True)

@@ -69,7 +69,7 @@ class PaletteEntries:
         return [Entry(f"robot:{link.name}", link.name, "bot", link.chip) for link in links]
 
     def _layouts(self) -> list[Entry]:
-        own = self._shell.arrangements.all()
+        own = self._shell.saved_layouts.all()
         return [Entry(f"layout:{each.name}", each.name, "panel-left", each.base.title()) for each in own]
 
     def _files(self) -> list[Entry]:

@@ -9,8 +9,8 @@ from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
 from app.core.session import Session
 from app.errors import SettingsError
 from app.ui.shell.commands.shell import UNTIL_END, Shell
-from app.ui.shell.dialogs.network_access import OthersSheet
-from app.ui.shell.documents.controller import Files
+from app.ui.shell.dialogs.network_access import NetworkAccessSheet
+from app.ui.shell.documents import DocumentController
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,12 @@ class RobotSwap:
 class RobotCommands:
     """Starts virtual robots, connects missing ones, and asks who may connect."""
 
-    def __init__(self, shell: Shell, session: Session, files: Files, undo: Callable[[], object]) -> None:
+    def __init__(
+        self, shell: Shell, session: Session, files: DocumentController, undo: Callable[[], object]
+    ) -> None:
         """``undo`` takes back the last edit of the blocks."""
         self._shell, self._session, self._files, self._undo = shell, session, files, undo
-        self._network_access: OthersSheet | None = None
+        self._network_access: NetworkAccessSheet | None = None
 
     # -- virtual robots ---------------------------------------------------------------------------
 
@@ -110,7 +112,9 @@ class RobotCommands:
     def ask_about_others(self) -> None:
         """Ask whether other computers may connect."""
         if self._network_access is None:
-            self._network_access = OthersSheet(self._shell.theme, self._shell.surface, self._session.reach)
+            self._network_access = NetworkAccessSheet(
+                self._shell.theme, self._shell.surface, self._session.reach
+            )
         self._network_access.open()
 
 

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenuBar, QWidget
 
 from app.ui.panels.base import Panel, Toast
 from app.ui.shell.docking.dock import Dock
-from app.ui.shell.docking.saved_layouts import Arrangements
+from app.ui.shell.docking.saved_layouts import SavedLayouts
 from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.keyboard import PanelFocus
 from app.ui.shell.start_page.page import Example
@@ -25,7 +25,7 @@ class Shell(Protocol):
 
     theme: Theme
     state: WindowState
-    arrangements: Arrangements
+    saved_layouts: SavedLayouts
     panels: Mapping[str, Panel]
     panel_focus: PanelFocus
 

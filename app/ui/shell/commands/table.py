@@ -17,7 +17,7 @@ from app.ui.shell.commands.freeze import freezable
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.view import TEXT_STEP, ViewCommands
-from app.ui.shell.documents.controller import Files
+from app.ui.shell.documents import DocumentController
 from app.ui.theme.theme import TEXT_PERCENT
 
 A = TypeVar("A")
@@ -36,7 +36,7 @@ class Handlers:
 
     session: Session
     shell: Shell
-    files: Files
+    files: DocumentController
     behaviours: BehaviourCommands
     robots: RobotCommands
     view: ViewCommands
@@ -71,7 +71,7 @@ def _no_panels(do: Handlers) -> str:
 
 
 def _no_own_layout(do: Handlers) -> str:
-    if do.shell.arrangements.own(do.shell.showing):
+    if do.shell.saved_layouts.own(do.shell.showing):
         return ""
     return _no_panels(do) or "This layout came with Studio"
 

@@ -18,8 +18,8 @@ from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.freeze import freeze_or_go_on
 from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.shell import START, UNTIL_END, Shell
-from app.ui.shell.dialogs.sheet import Sheet
-from app.ui.shell.documents.controller import Files
+from app.ui.shell.dialogs.about import AboutSheet
+from app.ui.shell.documents import DocumentController
 from app.ui.theme.system import Wish
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
@@ -41,11 +41,6 @@ else:
 
 TEXT_STEP = 25
 NEXT_LAYOUT = "Keep this layout as"
-ABOUT = (
-    "See what robots say, and tell them what to do.",
-    "NEP Studio is free software (MIT licence).",
-    "Inter and JetBrains Mono: SIL Open Font License 1.1. Icons: Lucide, ISC licence.",
-)
 
 
 @runtime_checkable
@@ -59,7 +54,7 @@ class ChoosesRobot(Protocol):
 class ViewCommands:
     """What shows in the window, and what opens over it. `use` gives it the actions, before any command."""
 
-    def __init__(self, shell: Shell, session: Session, files: Files, keys: Shortcuts) -> None:
+    def __init__(self, shell: Shell, session: Session, files: DocumentController, keys: Shortcuts) -> None:
         self._shell, self._session, self._files = shell, session, files
         self.shortcuts = keys
         self._palette: command_palette.Palette | None = None
@@ -174,15 +169,15 @@ class ViewCommands:
 
     def show_built_in_layout(self, layout: str) -> None:
         """Show the built-in arrangement of a layout, also in place of an own one."""
-        self._shell.arrangements.use(self._shell.show_layout(layout), layout, "")
+        self._shell.saved_layouts.use(self._shell.show_layout(layout), layout, "")
         self._actions.choose(f"layout.{layout}")
 
     def show_own_layout(self, name: str) -> None:
         """Show a layout with a name of its own."""
-        own = self._shell.arrangements.named(name)
+        own = self._shell.saved_layouts.named(name)
         if own is not None:
             bench = self._shell.show_layout(own.base)
-            self._shell.arrangements.use(bench, own.base, name)
+            self._shell.saved_layouts.use(bench, own.base, name)
             self._actions.choose(f"layout.{own.base}")
 
     def reset_layout(self) -> None:
@@ -198,7 +193,7 @@ class ViewCommands:
     def keep_layout(self) -> None:
         """Keep what shows under a name that is asked for."""
         shell = self._shell
-        arrangements, bench, base = shell.arrangements, shell.bench, shell.showing
+        arrangements, bench, base = shell.saved_layouts, shell.bench, shell.showing
         if bench is None:
             return
 
@@ -210,7 +205,7 @@ class ViewCommands:
 
     def rename_layout(self) -> None:
         """Give the own layout that shows another name."""
-        arrangements = self._shell.arrangements
+        arrangements = self._shell.saved_layouts
         old = arrangements.own(self._shell.showing)
         if old:
             self._ask_name().ask(
@@ -223,7 +218,7 @@ class ViewCommands:
 
     def delete_layout(self) -> None:
         """Forget the own layout that shows; it can be undone."""
-        arrangements, shell = self._shell.arrangements, self._shell
+        arrangements, shell = self._shell.saved_layouts, self._shell
         name = arrangements.own(shell.showing)
         if name:
             kept, undo = arrangements.delete(shell.bench, name)
@@ -285,8 +280,7 @@ class ViewCommands:
 
     def about(self) -> None:
         """Say what this program is."""
-        lines = [(line, "") for line in ABOUT]
-        Sheet(self._shell.theme, self._shell.surface, "NEP Studio", lines).show_over()
+        AboutSheet(self._shell.theme, self._shell.surface).open()
 
 
 def _wish(action: QAction) -> Wish:

@@ -38,7 +38,7 @@ class _Tile(QWidget):
         painter.end()
 
 
-class MoveQuestion(QWidget):
+class MotionQuestion(QWidget):
     """Shows the question of `Moving` while it stands; Escape is "Not now".
 
     The keyboard is on "Not now" first: an Enter that was meant for something else moves nothing.

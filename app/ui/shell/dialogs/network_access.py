@@ -18,7 +18,7 @@ WARNING = (
 )
 
 
-class OthersSheet(Overlay):
+class NetworkAccessSheet(Overlay):
     """Opened by the command "Let other computers connect" and from the status bar."""
 
     top = 128

@@ -44,7 +44,7 @@ def difference_words(found: Difference) -> str:
     return f"{plural(found.blocks, 'block')}; since then {since}"
 
 
-class EarlierSheet(Overlay):
+class VersionHistorySheet(Overlay):
     """Opened for one behaviour. What is different is read a version at a time, so that the window goes on."""
 
     top = 72

@@ -25,7 +25,7 @@ class OwnLayout:
     base: str
 
 
-class Arrangements:
+class SavedLayouts:
     """Which arrangement each workbench shows, and the states of all others."""
 
     def __init__(self, state: WindowState, complain: Callable[[str], object]) -> None:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
-from app.ui.shell.documents import flush
-from app.ui.shell.documents.flush import Leaving
+from app.ui.shell.documents import FlushBeforeClose, flush
 from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -28,14 +27,14 @@ class Late:
 
 def test_without_an_editor_it_closes_at_once(qapp) -> None:
     closed: list[bool] = []
-    assert Leaving(QObject(), lambda: None, lambda: closed.append(True)).ready()
+    assert FlushBeforeClose(QObject(), lambda: None, lambda: closed.append(True)).ready()
     assert closed == []
 
 
 def test_a_late_editor_is_waited_for_and_asked_once(qtbot, qapp, monkeypatch) -> None:
     monkeypatch.setattr(flush, "LONGEST_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
-    waits = Leaving(parent, lambda: editor, lambda: closed.append(waits.ready()))
+    waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.ready()))
     assert not waits.ready()
     assert not waits.ready()
     assert len(editor.done) == 1
@@ -47,7 +46,7 @@ def test_a_late_editor_is_waited_for_and_asked_once(qtbot, qapp, monkeypatch) ->
 
 def test_an_editor_that_hangs_is_left(qtbot, qapp) -> None:
     editor, closed, parent = Late(), [], QObject()
-    waits = Leaving(parent, lambda: editor, lambda: closed.append(True))
+    waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(True))
     assert not waits.ready()
     qtbot.waitUntil(lambda: closed == [True], timeout=60_000)
     assert waits.ready()

@@ -78,7 +78,7 @@ def test_names_that_cant_be_are_said(shown: MainWindow, commands: Commands) -> N
     assert sheet.wrong.text() == "A layout needs a name."
     QTest.keyClick(sheet.field, Qt.Key.Key_Escape)
     assert not sheet.isVisible()
-    assert shown.arrangements.all() == ()
+    assert shown.saved_layouts.all() == ()
 
 
 def test_a_layout_is_renamed(shown: MainWindow, commands: Commands) -> None:
@@ -89,8 +89,8 @@ def test_a_layout_is_renamed(shown: MainWindow, commands: Commands) -> None:
     assert sheet.field.text() == "One"
     sheet.field.setText("Two")
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
-    assert [own.name for own in shown.arrangements.all()] == ["Two"]
-    assert shown.arrangements.own("developer") == "Two"
+    assert [own.name for own in shown.saved_layouts.all()] == ["Two"]
+    assert shown.saved_layouts.own("developer") == "Two"
 
 
 def test_a_deleted_layout_comes_back_by_undo(shown: MainWindow, commands: Commands) -> None:
@@ -98,11 +98,11 @@ def test_a_deleted_layout_comes_back_by_undo(shown: MainWindow, commands: Comman
     shown.bench.docks["console"].close()
     small = opened(shown)
     commands.run("layout.delete")
-    assert shown.arrangements.all() == ()
+    assert shown.saved_layouts.all() == ()
     assert opened(shown) > small
     QTest.mouseClick(shown.toast.button, Qt.MouseButton.LeftButton)
-    assert [own.name for own in shown.arrangements.all()] == ["One"]
-    assert shown.arrangements.own("developer") == "One"
+    assert [own.name for own in shown.saved_layouts.all()] == ["One"]
+    assert shown.saved_layouts.own("developer") == "One"
     assert opened(shown) == small
 
 
@@ -117,7 +117,7 @@ def test_the_next_start_shows_the_same_layout(
     qtbot.addWidget(other)
     again = other.commands
     again.run("layout.developer")
-    assert other.arrangements.own("developer") == "Mine"
+    assert other.saved_layouts.own("developer") == "Mine"
     assert opened(other) == left
     use(other, again, "Developer")
     assert "console" in opened(other)
@@ -143,7 +143,7 @@ def test_a_damaged_layout_is_as_at_first_and_said_in_the_console(
     assert {"topics", "inspector", "image", "console"} <= opened(window)
     said = [record.text for record in session.console.records]
     assert "The layout “developer” could not be put back; it is as at first." in said
-    assert window.arrangements.all() == ()
+    assert window.saved_layouts.all() == ()
     window.close()
 
 
@@ -175,7 +175,7 @@ def test_the_palette_shows_own_layouts(shown: MainWindow, commands: Commands) ->
     use(shown, commands, "Developer")
     found = {entry.words: entry for entry in commands.entries.all()}
     commands.view.do(found["Two cameras"])
-    assert shown.arrangements.own("developer") == "Two cameras"
+    assert shown.saved_layouts.own("developer") == "Two cameras"
 
 
 def test_what_can_not_be_written_is_not_said_to_be_kept(shown: MainWindow, commands: Commands) -> None:

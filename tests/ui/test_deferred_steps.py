@@ -20,7 +20,7 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.ui.application import Options, make_application, make_window
 from app.ui.panels.registry import PanelShelf
-from app.ui.startup.deferred import AfterFirstPaint
+from app.ui.startup.deferred import DeferredSteps
 from app.ui.theme import fonts
 from tests.ui.shell_parts import free_address
 
@@ -31,7 +31,7 @@ def test_nothing_is_done_before_the_first_paint(qtbot: QtBot) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     done: list[str] = []
-    soon = AfterFirstPaint(window, [lambda: done.append("panels"), lambda: done.append("editor")])
+    soon = DeferredSteps(window, [lambda: done.append("panels"), lambda: done.append("editor")])
     soon.put_first([lambda: done.append("begin"), lambda: done.append("meeting")])
     qtbot.wait(50)
     assert (done, soon.began) == ([], False)
@@ -62,7 +62,7 @@ def test_a_click_comes_between_two_steps(qtbot: QtBot) -> None:
         seen.append("one")
         QCoreApplication.postEvent(ear, QEvent(QEvent.Type.User))
 
-    soon = AfterFirstPaint(window, [one, lambda: seen.append("two")])
+    soon = DeferredSteps(window, [one, lambda: seen.append("two")])
     window.show()
     qtbot.waitUntil(lambda: soon.done)
     assert seen == ["one", "click", "two"]
@@ -72,7 +72,7 @@ def test_a_window_that_is_not_painted_begins_a_little_later(qtbot: QtBot) -> Non
     window = QWidget()
     qtbot.addWidget(window)
     done: list[int] = []
-    soon = AfterFirstPaint(window, [lambda: done.append(1)])
+    soon = DeferredSteps(window, [lambda: done.append(1)])
     qtbot.waitUntil(lambda: soon.done)
     assert done == [1]
 
@@ -85,7 +85,7 @@ def test_a_step_that_fails_stops_none_of_the_others(qtbot: QtBot, caplog: pytest
     def fail() -> None:
         raise OSError("no such file")
 
-    soon = AfterFirstPaint(window, [fail, lambda: done.append(1)])
+    soon = DeferredSteps(window, [fail, lambda: done.append(1)])
     with caplog.at_level(logging.ERROR):
         window.show()
         qtbot.waitUntil(lambda: soon.done)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from PySide6.QtCore import QObject, QTimer
+
 from app.blocks.fixes.fixes import mend
 from app.core.documents.document import Document
 from app.core.documents.file_format import SUFFIX
@@ -17,6 +19,8 @@ from app.core.storage import deep_json
 from app.core.storage.settings import home
 from app.errors import AppError, DocumentError, SettingsError
 from app.ui.widgets.file_dialogs import Asks
+
+LONGEST_FLUSH_MS = 500
 
 
 @runtime_checkable
@@ -36,7 +40,7 @@ class Closed:
         self.stamp = stamp_of(document.path) if document.path is not None else None
 
 
-class Files:
+class DocumentController:
     """The open behaviours' files. ``say`` is the toast, ``shown`` is called when another one shows."""
 
     def __init__(
@@ -305,3 +309,40 @@ def strange_words(paths: Sequence[Path]) -> str:
     shown = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     are = "is no behaviour" if len(names) == 1 else "are no behaviours"
     return f"{shown} {are}; behaviours are files ending in {SUFFIX}"
+
+
+class FlushBeforeClose(QObject):
+    """Before the window closes: takes over the newest edit, which the block editor tells a moment late.
+
+    Waits for the editor, half a second at most: an editor that hangs does not keep the window open.
+    """
+
+    def __init__(self, parent: QObject, editor: Callable[[], object], close: Callable[[], object]) -> None:
+        """``close`` closes the window; it is called once, when `ready` had to wait."""
+        super().__init__(parent)
+        self._editor, self._close = editor, close
+        self._asked = self._ready = self._waits = False
+
+    def ready(self) -> bool:
+        """Whether the window may close now; if not, it is closed as soon as it may."""
+        if not self._asked:
+            self._asked, self._ready = True, False
+            editor = self._editor()
+            if isinstance(editor, Flushes):
+                editor.flush(self._go_on)
+            else:
+                self._ready = True
+            self._waits = not self._ready
+            if self._waits:
+                QTimer.singleShot(LONGEST_FLUSH_MS, self, self._go_on)
+        return self._ready
+
+    def stay(self) -> None:
+        """The window stays open after all: the next time the editor is asked anew."""
+        self._asked = self._ready = self._waits = False
+
+    def _go_on(self) -> None:
+        self._ready = True
+        if self._waits:
+            self._waits = False
+            QTimer.singleShot(0, self, self._close)

@@ -14,7 +14,7 @@ from app.core.robots.motion_permission import Moving
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
-from app.ui.shell.dialogs.motion_permission import MoveQuestion
+from app.ui.shell.dialogs.motion_permission import MotionQuestion
 from app.ui.theme.theme import Theme
 from tests.ui.clipping import clipped
 
@@ -32,7 +32,7 @@ class Window(QWidget):
         column.addWidget(self.field)
         self.moving = Moving(Settings(folder))
         self.complaints: list[str] = []
-        self.question = MoveQuestion(Theme("light"), self, self.moving, self.complaints.append)
+        self.question = MotionQuestion(Theme("light"), self, self.moving, self.complaints.append)
         self.done: list[str] = []
 
     def ask(self, *actions: str) -> None:

@@ -13,7 +13,7 @@ from PySide6.QtTest import QTest
 from app.core.documents.diff import Difference
 from app.core.documents.versions import keep_earlier
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.dialogs.version_history import EarlierSheet, difference_words
+from app.ui.shell.dialogs.version_history import VersionHistorySheet, difference_words
 from app.ui.shell.main_window import MainWindow
 from app.ui.text.dates import when_words
 from app.ui.widgets import Button
@@ -33,14 +33,14 @@ def shown(qtbot, window: MainWindow) -> MainWindow:
     return window
 
 
-def opened(qtbot, commands: Commands, window: MainWindow) -> EarlierSheet:
+def opened(qtbot, commands: Commands, window: MainWindow) -> VersionHistorySheet:
     commands.run("file.earlier")
-    (sheet,) = window.findChildren(EarlierSheet)
+    (sheet,) = window.findChildren(VersionHistorySheet)
     qtbot.waitUntil(lambda: sheet.read)
     return sheet
 
 
-def rows(sheet: EarlierSheet) -> list[tuple[str, str]]:
+def rows(sheet: VersionHistorySheet) -> list[tuple[str, str]]:
     told = []
     for line in sheet.rows.lines.lines:
         if isinstance(line, Found):

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app.core.alerts import Alerts
 from app.core.network.remote_access import Reach, words_of
 from app.core.storage.settings import Settings
-from app.ui.shell.dialogs.network_access import OthersSheet
+from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.theme.theme import Theme
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import OwnAddress
@@ -34,7 +34,7 @@ def make(qtbot, tmp_path):
         window.resize(1100, 700)
         qtbot.addWidget(window)
         window.show()
-        sheet = OthersSheet(Theme("light"), window, reach)
+        sheet = NetworkAccessSheet(Theme("light"), window, reach)
         made.append((reach, window))
         return sheet, reach, asked
 

@@ -17,21 +17,30 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.storage.file_lock import Turn
 from app.ui.startup import single_instance
-from app.ui.startup.single_instance import Asked, Meeting, found, hand_over, is_ours, parse, peer_of, place
+from app.ui.startup.single_instance import (
+    SingleInstanceServer,
+    StartRequest,
+    found,
+    hand_over,
+    is_ours,
+    parse,
+    peer_of,
+    place,
+)
 
 WAIT_MS = 30_000
 SECOND = """
 import sys
 from pathlib import Path
-from app.ui.startup.single_instance import Asked, hand_over
+from app.ui.startup.single_instance import StartRequest, hand_over
 files = tuple(Path(each) for each in sys.argv[2:])
-sys.exit(0 if hand_over(sys.argv[1], Asked(files)) else 3)
+sys.exit(0 if hand_over(sys.argv[1], StartRequest(files)) else 3)
 """
 
 
-def meet(name: str, do: Callable[[Asked], object]) -> Meeting:
+def meet(name: str, do: Callable[[StartRequest], object]) -> SingleInstanceServer:
     """As Studio makes it: Qt owns it. One that only its connections keep goes in the midst of their end."""
-    return Meeting(name, do, QApplication.instance())
+    return SingleInstanceServer(name, do, QApplication.instance())
 
 
 @pytest.fixture
@@ -45,29 +54,29 @@ def second(name: str, *files: str, cwd: Path) -> subprocess.Popen[bytes]:
 
 
 def test_nobody_there_means_a_window_of_its_own(name: str) -> None:
-    assert hand_over(name, Asked()) is False
+    assert hand_over(name, StartRequest()) is False
 
 
 def test_another_process_hands_over_whole_paths(qtbot, name: str, tmp_path: Path) -> None:
-    asked: list[Asked] = []
+    asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
     assert meeting.open
     process = second(name, "a.nepb", str(tmp_path / "Grüße.nepb"), cwd=tmp_path)
     qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
     assert process.returncode == 0
-    assert asked == [Asked((tmp_path / "a.nepb", tmp_path / "Grüße.nepb"))]
+    assert asked == [StartRequest((tmp_path / "a.nepb", tmp_path / "Grüße.nepb"))]
     meeting.close()
-    assert hand_over(name, Asked()) is False
+    assert hand_over(name, StartRequest()) is False
 
 
 STARTING = """
 import sys
 from pathlib import Path
 from app.core.storage.file_lock import Turn
-from app.ui.startup.single_instance import Asked, found
+from app.ui.startup.single_instance import StartRequest, found
 print("begun", flush=True)
 turn = Turn(Path(sys.argv[2]))
-there = found(sys.argv[1], Asked((Path("a.nepb"),)), turn, 60.0)
+there = found(sys.argv[1], StartRequest((Path("a.nepb"),)), turn, 60.0)
 print("found" if there else "first", flush=True)
 sys.stdin.read()
 """
@@ -88,7 +97,7 @@ def test_of_two_starts_at_once_the_second_waits_for_the_window_of_the_first(
     qtbot, name: str, tmp_path: Path
 ) -> None:
     turn, asked = Turn(tmp_path / "starting"), []
-    assert not found(name, Asked(), turn)
+    assert not found(name, StartRequest(), turn)
     process = starting(name, tmp_path / "starting")
     assert process.stdout is not None
     assert process.stdout.readline() == "begun\n"
@@ -107,26 +116,26 @@ def test_a_start_that_dies_before_its_window_is_there_is_not_waited_for(name: st
     assert not turn.take()
     process.kill()
     process.communicate(timeout=60)
-    assert not found(name, Asked(), turn, 60.0)
+    assert not found(name, StartRequest(), turn, 60.0)
     assert not Turn(tmp_path / "starting").take(), "it has the turn"
     turn.leave()
 
 
 def test_the_second_window_does_not_take_the_place_of_the_first(qtbot, name: str, tmp_path: Path) -> None:
-    asked: list[Asked] = []
+    asked: list[StartRequest] = []
     first = meet(name, asked.append)
     later = meet(name, asked.append)
     assert (first.open, later.open) == (True, False)
     process = second(name, cwd=tmp_path)
     qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
-    assert asked == [Asked()]
+    assert asked == [StartRequest()]
     first.close()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a named pipe goes with its process")
 def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
-    code = "import sys; from app.ui.startup.single_instance import *; m = Meeting(sys.argv[1], print); "
-    code += "print(m.open, flush=True); sys.stdin.read()"
+    code = "import sys; from app.ui.startup.single_instance import *; "
+    code += "m = SingleInstanceServer(sys.argv[1], print); print(m.open, flush=True); sys.stdin.read()"
     environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen(
         [sys.executable, "-c", code, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environ
@@ -142,7 +151,7 @@ def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
 
 
 def test_nonsense_is_no_start(qtbot, name: str) -> None:
-    asked: list[Asked] = []
+    asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
     for data in (b"{\n", b"[]\n", b'{"files": "x"}\n', b"[" * 200_000 + b"\n", b"x" * 1_100_000):
         socket = QLocalSocket()
@@ -208,20 +217,20 @@ def test_no_private_folder_means_no_meeting_and_a_start_all_the_same(
     """A stranger has made the folders before us."""
     monkeypatch.setattr(os, "geteuid", lambda: 4242)
     assert place(tmp_path) == ""
-    assert hand_over("", Asked()) is False
-    assert Meeting("", lambda _asked: None).open is False
+    assert hand_over("", StartRequest()) is False
+    assert SingleInstanceServer("", lambda _asked: None).open is False
 
 
 @needs_modes
 def test_what_is_no_socket_of_ours_is_not_talked_to(qtbot, runtime: Path, tmp_path: Path) -> None:
     name = place(tmp_path)
     os.mkfifo(name)
-    assert hand_over(name, Asked()) is False
+    assert hand_over(name, StartRequest()) is False
     meeting = meet(name, lambda _asked: None)
     assert meeting.open, "what is left in our own folder is ours to take away"
     assert is_ours(name)
     Path(name).parent.chmod(0o777)
-    assert hand_over(name, Asked()) is False
+    assert hand_over(name, StartRequest()) is False
     meeting.close()
 
 
@@ -229,10 +238,10 @@ def test_what_is_no_socket_of_ours_is_not_talked_to(qtbot, runtime: Path, tmp_pa
 def test_another_user_at_the_other_end_is_not_served(
     qtbot, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[Asked] = []
+    asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
     monkeypatch.setattr(single_instance, "peer_of", lambda _descriptor: os.geteuid() + 1)
-    assert hand_over(name, Asked()) is False
+    assert hand_over(name, StartRequest()) is False
     socket = QLocalSocket()
     socket.connectToServer(name)
     socket.waitForConnected(WAIT_MS)
@@ -261,13 +270,13 @@ def test_one_that_never_answers_does_not_hold_a_start_up(qtbot, name: str, monke
     )
     assert process.stdout is not None
     assert process.stdout.readline() == b"up\n"
-    assert hand_over(name, Asked()) is False
+    assert hand_over(name, StartRequest()) is False
     process.kill()
     process.communicate()
 
 
 def test_a_start_is_read() -> None:
-    assert parse(b'{"files": ["/a.nepb"], "demo": true}') == Asked((Path("/a.nepb"),), True)
+    assert parse(b'{"files": ["/a.nepb"], "demo": true}') == StartRequest((Path("/a.nepb"),), True)
     assert parse(b"\xff") is None
 
 
@@ -278,7 +287,7 @@ def test_a_window_that_goes_while_a_later_start_talks_to_it_raises_nothing(
     raised: list[BaseException] = []
     monkeypatch.setattr(sys, "excepthook", lambda _kind, error, _trace: raised.append(error))
     window = QObject()
-    meeting = Meeting(name, lambda _asked: None, window)
+    meeting = SingleInstanceServer(name, lambda _asked: None, window)
     line = QLocalSocket()
     line.connectToServer(name)
     assert line.waitForConnected(WAIT_MS)

@@ -1,1 +1,0 @@
-"""Opening, saving and closing behaviours in the window."""
