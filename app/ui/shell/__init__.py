@@ -1,1 +1,4 @@
-"""The window around the panels: bars, docks, dialogs, documents, commands, the start page."""
+"""The window around the panels: `main_window` puts together bars, layouts, dialogs and commands.
+
+Its parts do not know it: commands know it as a `Shell`, panels as a `PanelContext`.
+"""

@@ -1,1 +1,4 @@
-"""The start page: its cards, pictures and previews."""
+"""The start page: its cards, pictures and previews of behaviours.
+
+`StartPage` tells by signals what a person chose.
+"""
