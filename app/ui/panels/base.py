@@ -25,7 +25,7 @@ Density = Literal["compact", "comfortable"]
 ANY_TYPE = "*"
 
 
-class Toast(Protocol):
+class ShowToast(Protocol):
     """Says for some seconds what the person just did."""
 
     def __call__(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
@@ -43,7 +43,7 @@ class PanelContext:
     session: Session
     theme: Theme
     open_topic: Callable[[str], None]
-    toast: Toast
+    toast: ShowToast
     run: Callable[[str], None]
 
 

@@ -12,8 +12,7 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidge
 from app.core.faults import survived
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
-from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.base import Toast as Says
+from app.ui.panels.base import Panel, PanelContext, ShowToast
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
 from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
 from app.ui.shell.bars.developer_tools import DeveloperTools
@@ -174,7 +173,7 @@ class MainWindow(QMainWindow):
         return self.bar.menus
 
     @property
-    def say(self) -> Says:
+    def say(self) -> ShowToast:
         """Says for some seconds what the person just did."""
         return self.toast.say
 

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from PySide6.QtWidgets import QMenuBar, QWidget
 
-from app.ui.panels.base import Panel, Toast
+from app.ui.panels.base import Panel, ShowToast
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.docking.saved_layouts import SavedLayouts
 from app.ui.shell.docking.workbench import Workbench
@@ -50,7 +50,7 @@ class Shell(Protocol):
         """The workbench that shows; None on the start page."""
 
     @property
-    def say(self) -> Toast:
+    def say(self) -> ShowToast:
         """Says for some seconds what the person just did."""
 
     def complain(self, sentence: str) -> None:
