@@ -8,7 +8,8 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
-from app.ui.shell.documents import FlushBeforeClose, flush
+from app.ui.shell import documents
+from app.ui.shell.documents import FlushBeforeClose
 from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -32,15 +33,15 @@ def test_without_an_editor_it_closes_at_once(qapp) -> None:
 
 
 def test_a_late_editor_is_waited_for_and_asked_once(qtbot, qapp, monkeypatch) -> None:
-    monkeypatch.setattr(flush, "LONGEST_MS", 2000)
+    monkeypatch.setattr(documents, "LONGEST_FLUSH_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
     waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.ready()))
     assert not waits.ready()
     assert not waits.ready()
     assert len(editor.done) == 1
     editor.done[0]()
-    qtbot.waitUntil(lambda: closed == [True], timeout=flush.LONGEST_MS - 100)
-    qtbot.wait(flush.LONGEST_MS)  # its own end of waiting comes, too, and closes nothing twice
+    qtbot.waitUntil(lambda: closed == [True], timeout=documents.LONGEST_FLUSH_MS - 100)
+    qtbot.wait(documents.LONGEST_FLUSH_MS)  # its own end of waiting comes, too, and closes nothing twice
     assert closed == [True]
 
 
