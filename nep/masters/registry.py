@@ -293,41 +293,31 @@ class Registry:
         not those of just what is registered, or not of these types: some of it may have been taken over.
         """
         try:
-            return self._renew(member, publisher_counts, subscriber_counts, now, cpu_ratio)
+            publishers, subscribers = member.publishers, member.subscribers
+            if len(publisher_counts) != len(publishers) or len(subscriber_counts) != len(subscribers):
+                return False
+            for counts in publisher_counts:
+                publisher = publishers[counts["id"]]
+                count, size_bytes, last_seq = counts["count"], counts["bytes"], counts["last_seq"]
+                stamp_ns, problem = counts.get("last_stamp_ns"), counts.get("problem", "")
+                if not type(count) is type(size_bytes) is type(last_seq) is int:
+                    return False
+                if (stamp_ns is not None and type(stamp_ns) is not int) or type(problem) is not str:
+                    return False
+                self.counted(publisher, count, size_bytes, now)
+                self.reached(publisher, last_seq, stamp_ns)
+                if problem != publisher.problem:
+                    self.troubled(publisher, problem)
+            for seen in subscriber_counts:
+                received, lost, problem = seen["received"], seen["lost"], seen.get("problem", "")
+                if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
+                    return False
+                self.seen(subscribers[seen["id"]], received, lost, problem)
+            member.renewed_at, member.cpu_ratio = now, _as_ratio(cpu_ratio)
+            if member.hung:
+                member.hung.clear()
         except (LookupError, TypeError, AttributeError):  # a field or a publisher is missing, or no map
             return False
-
-    def _renew(
-        self,
-        member: RegisteredNode,
-        publisher_counts: Counts,
-        subscriber_counts: Counts,
-        now: float,
-        cpu_ratio: float | None,
-    ) -> bool:
-        publishers, subscribers = member.publishers, member.subscribers
-        if len(publisher_counts) != len(publishers) or len(subscriber_counts) != len(subscribers):
-            return False
-        for counts in publisher_counts:
-            publisher = publishers[counts["id"]]
-            count, size_bytes, last_seq = counts["count"], counts["bytes"], counts["last_seq"]
-            stamp_ns, problem = counts.get("last_stamp_ns"), counts.get("problem", "")
-            if not type(count) is type(size_bytes) is type(last_seq) is int:
-                return False
-            if (stamp_ns is not None and type(stamp_ns) is not int) or type(problem) is not str:
-                return False
-            self.counted(publisher, count, size_bytes, now)
-            self.reached(publisher, last_seq, stamp_ns)
-            if problem != publisher.problem:
-                self.troubled(publisher, problem)
-        for seen in subscriber_counts:
-            received, lost, problem = seen["received"], seen["lost"], seen.get("problem", "")
-            if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
-                return False
-            self.seen(subscribers[seen["id"]], received, lost, problem)
-        member.renewed_at, member.cpu_ratio = now, _as_ratio(cpu_ratio)
-        if member.hung:
-            member.hung.clear()
         return True
 
     def counted(self, publisher: RegisteredPublisher, count: int, size_bytes: int, now: float) -> None:
