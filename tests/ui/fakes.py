@@ -209,7 +209,7 @@ class RobotLink:
     robot: Robot
     virtual: bool = True
     state: str = "ready"
-    chip: str = "virtual, ready"
+    state_words: str = "ready"
     can_confirm_stop: bool = True
     connected: bool = True
     values: dict[str, object] = field(default_factory=dict)
@@ -224,6 +224,10 @@ class RobotLink:
     not_stopped: str = ""
     goes_on: str = ""
     stopping: bool = False
+
+    @property
+    def chip(self) -> str:
+        return f"virtual, {self.state_words}" if self.virtual else self.state_words
 
 
 class Kept(dict[str, object]):

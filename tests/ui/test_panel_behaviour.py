@@ -114,15 +114,15 @@ def test_blocks_of_absent_robots_are_grey(panel, window) -> None:
 def test_the_toolbox_says_which_robots_may_move_or_do_not_answer(panel, window) -> None:
     link = window.session.fleet.links[0]
     assert editor(panel).last("set_alarms") == {}
-    for state, chip, status in (
-        ("stopping", "virtual, stopping", "running"),
-        ("not stopped", "virtual, may still move", "error"),
-        ("silent", "virtual, does not answer", "warn"),
+    for state, words, status in (
+        ("stopping", "stopping", "running"),
+        ("not stopped", "may still move", "error"),
+        ("silent", "does not answer", "warn"),
     ):
-        link.state, link.chip = state, chip
+        link.state, link.state_words = state, words
         panel.refresh()
-        assert editor(panel).last("set_alarms") == {link.name: (status, chip.removeprefix("virtual, "))}
-    link.state, link.chip = "busy", "virtual, busy"
+        assert editor(panel).last("set_alarms") == {link.name: (status, words)}
+    link.state, link.state_words = "busy", "busy"
     panel.refresh()
     assert editor(panel).last("set_alarms") == {}
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from app.core.network.watches import Watch
 from app.robots.description.description import Robot, Topics
 from app.robots.identity import Identity
+from nep.i18n import _, lazy
 from nep.nodes.publisher import Publisher
 
 SENDER = "studio"
@@ -19,6 +20,15 @@ NOT_STOPPED = "not stopped"
 STOPPING = "stopping"
 MAY_MOVE = "may still move"
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
+STATE_WORDS = {
+    NOT_STOPPED: lazy("not stopped"),
+    STOPPING: lazy("stopping"),
+    "away": lazy("away"),
+    "silent": lazy("silent"),
+    "busy": lazy("busy"),
+    "ready": lazy("ready"),
+}
+"""What people read for each `RobotLink.state`."""
 
 Payload = Mapping[str, object]
 
@@ -141,14 +151,20 @@ class RobotLink:
         return tuple(made for made in known.values() if made.running)
 
     @property
+    def state_words(self) -> str:
+        """How it is, as people read it: ``ready``, ``may still move``, ``does not answer``."""
+        state = self.state
+        if state == NOT_STOPPED and MAY_MOVE in f"{self.goes_on} {self.not_stopped}":
+            return _("may still move")
+        if self.connected and state == "silent":
+            return _("does not answer") if self.mute else self.silent or _(STATE_WORDS[state])
+        return _(STATE_WORDS[state])
+
+    @property
     def chip(self) -> str:
         """The words of its chip: ``virtual, ready``."""
-        words = self.state
-        if words == NOT_STOPPED and MAY_MOVE in f"{self.goes_on} {self.not_stopped}":
-            words = MAY_MOVE
-        if self.connected and words == "silent":
-            words = "does not answer" if self.mute else self.silent or words
-        return f"virtual, {words}" if self.virtual else words
+        words = self.state_words
+        return _("virtual, {state}").format(state=words) if self.virtual else words
 
 
 def topics_of(robot: Robot) -> list[str]:

@@ -323,11 +323,7 @@ class BlocksWait:
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
     """What the toolbox says of robots that may move or do not answer, instead of a green dot."""
-    return {
-        link.name: (ROBOT_STATUS[link.state], link.chip.removeprefix("virtual, "))
-        for link in links
-        if link.state in ALARMS
-    }
+    return {link.name: (ROBOT_STATUS[link.state], link.state_words) for link in links if link.state in ALARMS}
 
 
 def tab_facts(document: Document, runs: Runs) -> TabFacts:

@@ -164,7 +164,7 @@ def robots_chip(session: Session) -> tuple[str, str]:
     moving = [link for link in links if link.state == "not stopped"]
     if moving:
         others = f" and {len(moving) - 1} more" if len(moving) > 1 else ""
-        return f"{moving[0].name}{others}: {moving[0].chip.removeprefix('virtual, ')}", "error"
+        return f"{moving[0].name}{others}: {moving[0].state_words}", "error"
     stopping = [link for link in links if link.state == "stopping"]
     if stopping:
         return f"{stopping[0].name if len(stopping) == 1 else f'{len(stopping)} robots'} stopping", "running"
