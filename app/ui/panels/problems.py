@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
-    QFrame,
     QHBoxLayout,
-    QScrollArea,
     QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
@@ -26,6 +24,7 @@ from app.ui.widgets.cards import Tile
 from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.keyboard import is_pressed_key
 from app.ui.widgets.labels import BoldInLine
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
 
 if TYPE_CHECKING:
     from app.blocks import Program
@@ -120,27 +119,17 @@ class ProblemsPanel(PanelWidget):
         self.chips = [self.chip]
         self.checked = label("Checked while you build", "body", role="textSecondary")
         self.header = [self.checked]
-        inside = QWidget()
-        inside.setProperty("bare", "true")
-        self._column = QVBoxLayout(inside)
-        self._column.setContentsMargins(0, 4, 0, 4)
-        self._column.setSpacing(0)
+        self._scroll = ScrollColumn("Problems", margins=(0, 4, 0, 4))
+        self._column = self._scroll.column
         self.others = label("", "body", role="textSecondary")
         self.others.setContentsMargins(14, 6, 8, 6)
         self.others.hide()
-        self._column.addWidget(self.others)
-        self._column.addStretch(1)
-        scroll = self._scroll = QScrollArea()
-        scroll.setAccessibleName("Problems")
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(inside)
+        self._column.insertWidget(0, self.others)
         self.nothing = label(NOTHING, "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.pages = QStackedWidget()
         self.pages.addWidget(Scrolled(self.nothing))
-        self.pages.addWidget(scroll)
+        self.pages.addWidget(self._scroll)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.pages)

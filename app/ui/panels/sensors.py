@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description.description import Sensor
 from app.ui.panels.base import Density, Panel, PanelContext
@@ -17,6 +17,7 @@ from app.ui.text.sensor_values import Reading, reading_of
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState, paint
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
@@ -92,24 +93,14 @@ class SensorsPanel(OneRobotPanel):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, "Sensors now")
         self.rows: list[SensorRow] = []
-        self._list = QWidget()
-        self._list.setProperty("bare", "true")
-        self._column = QVBoxLayout(self._list)
-        self._column.setContentsMargins(0, 6, 0, 6)
-        self._column.setSpacing(0)
-        self._column.addStretch(1)
-        self._scroll = scroll = QScrollArea()
-        scroll.setAccessibleName("Sensors")
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(self._list)
+        self._scroll = ScrollColumn("Sensors", margins=(0, 6, 0, 6))
+        self._column = self._scroll.column
         self.empty = EmptyState(
             self.theme, "eye", "No robot, no sensors", "Connect a robot to see what it feels and sees."
         )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
-        self.pages.addWidget(scroll)
+        self.pages.addWidget(self._scroll)
         self.pages.setMinimumSize(1, 1)
         self._frame = QVBoxLayout(self)
         self._frame.setContentsMargins(0, 0, 0, 0)

@@ -9,9 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
-    QFrame,
     QHBoxLayout,
-    QScrollArea,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -29,6 +27,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, Elided, EmptyAction, EmptyState, Line, SearchField, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.indicators import ROBOT_STATUS
+from app.ui.widgets.lists.scroll_areas import ScrollColumn
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
@@ -150,20 +149,12 @@ class RobotsPanel(OneRobotPanel):
         row.addWidget(self.pages, 1)
 
     def _make_cards(self) -> QWidget:
-        inside = QWidget()
-        inside.setProperty("bare", "true")
-        self._card_column = QVBoxLayout(inside)
-        self._card_column.setContentsMargins(16, 14, 16, 14)
-        self._card_column.setSpacing(12)
+        scroll = ScrollColumn("Actions", margins=(16, 14, 16, 14), gap=12)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
+        self._card_column = scroll.column
         self.none = label("No action has these words.", "bodyLarge", role="textSecondary")
         self.none.hide()
-        self._card_column.addWidget(self.none)
-        self._card_column.addStretch(1)
-        scroll = QScrollArea()
-        scroll.setAccessibleName("Actions")
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setWidget(inside)
+        self._card_column.insertWidget(0, self.none)
         return scroll
 
     # -- what it shows ------------------------------------------------------------------------------------

@@ -42,24 +42,33 @@ class Scrolled(QScrollArea):
         return super().viewportEvent(event)
 
 
+class ScrollColumn(QScrollArea):
+    """Rows below each other, which scroll; put them into `column`, whose end is a stretch."""
+
+    def __init__(self, name: str, *, margins: tuple[int, int, int, int] = (0, 0, 0, 0), gap: int = 0) -> None:
+        """``name`` is what a screen reader calls the rows; ``margins`` left, top, right, bottom."""
+        super().__init__()
+        inside = QWidget()
+        inside.setProperty("bare", "true")
+        self.column = QVBoxLayout(inside)
+        self.column.setContentsMargins(*margins)
+        self.column.setSpacing(gap)
+        self.column.addStretch(1)
+        self.setAccessibleName(name)
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setWidget(inside)
+
+
 class PanelRows(QStackedWidget):
     """Shows ``empty`` until it is told that there are rows."""
 
     def __init__(self, empty: QWidget, name: str = "") -> None:
         """``name`` is what a screen reader calls the rows."""
         super().__init__()
-        inside = QWidget()
-        inside.setProperty("bare", "true")
-        self._column = QVBoxLayout(inside)
-        self._column.setContentsMargins(8, 8, 8, 8)
-        self._column.setSpacing(6)
-        self._column.addStretch(1)
-        scroll = QScrollArea()
-        scroll.setAccessibleName(name)
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(inside)
+        scroll = ScrollColumn(name, margins=(8, 8, 8, 8), gap=6)
+        self._column = scroll.column
         self.addWidget(empty)
         self.addWidget(scroll)
 
