@@ -19,7 +19,6 @@ from app.ui.shell.bars.banner import Banner
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
-    Bar,
     Button,
     Card,
     Chip,
@@ -36,6 +35,7 @@ from app.ui.widgets import (
     StatusItem,
     StopButton,
     Switch,
+    ValueBar,
     label,
 )
 
@@ -111,7 +111,7 @@ def _fields(theme: Theme) -> list[QWidget]:
 def _rest(theme: Theme) -> list[QWidget]:
     spark = Sparkline(theme)
     spark.set_values(WAVE)
-    bar = Bar(theme, 0.6)
+    bar = ValueBar(theme, 0.6)
     bar.setFixedWidth(200)
     banner = Banner(theme)
     banner.show_words(

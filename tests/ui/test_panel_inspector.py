@@ -16,7 +16,7 @@ from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE
 from app.ui.panels.inspector.diff import OFF, changes_words, count_changes
 from app.ui.panels.inspector.footer import message_facts
 from app.ui.panels.inspector.panel import PANEL, InspectorPanel
-from app.ui.panels.inspector.tree_model import Node
+from app.ui.panels.inspector.tree_model import TreeNode
 from app.ui.panels.inspector.values import LARGE_BYTES, image_summary, plain_words
 from nep.messages.message import Message, kind_of
 from tests.ui.fakes import Session, blackboard
@@ -468,7 +468,7 @@ def test_a_pinned_message_stays_the_one_to_compare_with(panel, window) -> None:
     assert not panel.pin.isChecked()
 
 
-def top(panel: InspectorPanel) -> list[Node]:
+def top(panel: InspectorPanel) -> list[TreeNode]:
     return [panel.model.node(panel.model.index(row, 0)) for row in range(panel.model.rowCount())]
 
 

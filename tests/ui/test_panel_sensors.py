@@ -6,7 +6,7 @@ from app.robots.description.inputs import Choice
 from app.robots.description.model import Field, Sensor
 from app.ui.panels import sensors
 from app.ui.panels.sensors import PANEL, SensorsPanel
-from app.ui.text.sensor_values import Reading, number_words, reading_of
+from app.ui.text.sensor_values import ReadingWords, number_words, reading_of
 from tests.ui.fakes import RobotLink, Session, pepper
 from tests.ui.panel_case import Window
 
@@ -18,26 +18,26 @@ POSE = Sensor("pose", "position", "object", "/p", fields=(
 @pytest.mark.parametrize(
     ("sensor", "value", "reading"),
     [
-        (Sensor("t", "touch", "boolean", "/t"), True, Reading("yes")),
-        (Sensor("t", "touch", "boolean", "/t"), False, Reading("no")),
-        (Sensor("t", "touch", "boolean", "/t"), None, Reading()),
-        (Sensor("d", "d", "number", "/d", "m", 0, 2), 0.82, Reading("0.82 m", share=0.41)),
-        (Sensor("d", "d", "number", "/d", "m", 0, 2), 7.0, Reading("7 m", share=1.0)),
-        (Sensor("d", "d", "number", "/d", "dB"), 34.04, Reading("34.0 dB")),
-        (Sensor("b", "b", "integer", "/b", "%", 0, 100), 84, Reading("84 %", share=0.84)),
-        (Sensor("w", "word", "text", "/w"), "hello", Reading("“hello”")),
-        (Sensor("w", "word", "text", "/w"), "", Reading("")),
-        (Sensor("c", "c", "choice", "/c", choices=(Choice("en", "English"),)), "en", Reading("English")),
-        (POSE, {"x": 1.284, "y": -0.307, "theta": 31.2}, Reading("1.3, \u22120.3 m", "facing 31°")),
-        (POSE, {}, Reading("", "")),
+        (Sensor("t", "touch", "boolean", "/t"), True, ReadingWords("yes")),
+        (Sensor("t", "touch", "boolean", "/t"), False, ReadingWords("no")),
+        (Sensor("t", "touch", "boolean", "/t"), None, ReadingWords()),
+        (Sensor("d", "d", "number", "/d", "m", 0, 2), 0.82, ReadingWords("0.82 m", share=0.41)),
+        (Sensor("d", "d", "number", "/d", "m", 0, 2), 7.0, ReadingWords("7 m", share=1.0)),
+        (Sensor("d", "d", "number", "/d", "dB"), 34.04, ReadingWords("34.0 dB")),
+        (Sensor("b", "b", "integer", "/b", "%", 0, 100), 84, ReadingWords("84 %", share=0.84)),
+        (Sensor("w", "word", "text", "/w"), "hello", ReadingWords("“hello”")),
+        (Sensor("w", "word", "text", "/w"), "", ReadingWords("")),
+        (Sensor("c", "c", "choice", "/c", choices=(Choice("en", "English"),)), "en", ReadingWords("English")),
+        (POSE, {"x": 1.284, "y": -0.307, "theta": 31.2}, ReadingWords("1.3, \u22120.3 m", "facing 31°")),
+        (POSE, {}, ReadingWords("", "")),
         (Sensor("f", "faces", "detections", "/f"), {"count": 1, "name": "Aiko", "items": []},
-        Reading("1", "Aiko")),
+        ReadingWords("1", "Aiko")),
         (Sensor("f", "faces", "detections", "/f"), {"items": [{"name": "a"}, {"name": "b"}]},
-        Reading("2", "a, b")),
-        (Sensor("l", "list", "list", "/l"), ["x", "y"], Reading("2", "x, y")),
+        ReadingWords("2", "a, b")),
+        (Sensor("l", "list", "list", "/l"), ["x", "y"], ReadingWords("2", "x, y")),
     ],
 )  # fmt: skip
-def test_a_sensor_in_words(sensor: Sensor, value: object, reading: Reading) -> None:
+def test_a_sensor_in_words(sensor: Sensor, value: object, reading: ReadingWords) -> None:
     found = reading_of(sensor, value)
     assert (found.value, found.beside) == (reading.value, reading.beside)
     assert found.share == (pytest.approx(reading.share) if reading.share is not None else None)
@@ -96,11 +96,11 @@ def test_values_follow_and_the_last_yes_is_remembered(qtbot, window, monkeypatch
     touch = panel.rows[0]
     values["head_touched"] = True
     panel.refresh()
-    assert touch.reading == Reading("yes")
+    assert touch.reading == ReadingWords("yes")
     values["head_touched"] = False
     now[0] = 114.3
     panel.refresh()
-    assert touch.reading == Reading("no", "14 s ago")
+    assert touch.reading == ReadingWords("no", "14 s ago")
     assert touch.accessibleDescription() == "no 14 s ago"
 
 
@@ -110,7 +110,7 @@ def test_a_robot_that_went_away_feels_nothing(qtbot, window) -> None:
     assert isinstance(panel, SensorsPanel)
     window.session.fleet.links[0].connected = False
     panel.refresh()
-    assert {row.reading for row in panel.rows} == {Reading()}
+    assert {row.reading for row in panel.rows} == {ReadingWords()}
 
 
 def test_the_rows_are_painted_otherwise_when_values_differ(qtbot, window) -> None:

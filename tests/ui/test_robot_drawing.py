@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QImage, QPainter
 from app.ui.robot_drawing.pepper import EMOTIONS
 from app.ui.robot_drawing.room import Stage
 from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
-from app.ui.robot_drawing.state import RobotState, Room, Thing
+from app.ui.robot_drawing.state import RobotState, RoomBounds, Thing
 from tests.ui.fakes import drawing
 
 AREA = QRectF(0, 0, 382, 286)
@@ -107,14 +107,14 @@ def test_parts_are_found_where_they_are_drawn(qapp, part, size) -> None:
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (-2.0, 1.5), (2.4, -2.0), (1.2, 0.3)])
 def test_the_floor_is_found_again(place) -> None:
-    stage = Stage(AREA, Room())
+    stage = Stage(AREA, RoomBounds())
     spot = stage.spot(*place)
     x, y = stage.floor(stage.origin + QPointF(spot.u, spot.v) * stage.scale)
     assert (x, y) == (pytest.approx(place[0]), pytest.approx(place[1]))
 
 
 def test_what_is_nearer_is_lower_and_larger() -> None:
-    stage = Stage(AREA, Room())
+    stage = Stage(AREA, RoomBounds())
     far, near = stage.spot(-2, 0), stage.spot(2, 0)
     assert near.v > far.v
     assert near.scale > far.scale
@@ -125,10 +125,10 @@ def test_a_message_becomes_a_state_and_damaged_parts_keep_their_defaults() -> No
     state = RobotState.parse(drawing(x=1.5, touched=["head"], speech="  "))
     assert (state.x, state.touched, state.speech) == (1.5, ("head",), None)
     assert state.objects[0].kind == "ball"
-    assert state.room == Room(-3, 3, -2.5, 2.5)
+    assert state.room == RoomBounds(-3, 3, -2.5, 2.5)
     broken = RobotState.parse(
         {"x": "far", "eyes": "blue", "objects": "none", "room": {"width": 0}, "emotion": None}
     )
     assert broken == RobotState()
     room = RobotState.parse({"room": {"x_min": -1, "x_max": 3, "y_min": -2, "y_max": 2}}).room
-    assert room == Room(-1, 3, -2, 2)
+    assert room == RoomBounds(-1, 3, -2, 2)

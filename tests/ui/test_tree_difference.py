@@ -10,7 +10,7 @@ from PySide6.QtCore import QModelIndex
 
 from app.core.messages.lazy_json import JsonIndex
 from app.ui.panels.inspector.diff import MISSING, OFF, differs, mark_of, parts_of
-from app.ui.panels.inspector.tree_model import Node, TreeModel
+from app.ui.panels.inspector.tree_model import TreeModel, TreeNode
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_a_message_that_is_no_container_is_compared_too() -> None:
     model = TreeModel()
     model.set_value(5, 0.0, 4)
     node = model.node(model.index(0, 0))
-    assert isinstance(node, Node)
+    assert isinstance(node, TreeNode)
     assert (node.key, node.value, node.base, node.mark) == ("value", 5, 4, "changed")
 
 

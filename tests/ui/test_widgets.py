@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
-    Bar,
     Button,
     Chip,
     Choice,
@@ -26,6 +25,7 @@ from app.ui.widgets import (
     StatusItem,
     StopButton,
     Switch,
+    ValueBar,
     paint,
 )
 from app.ui.widgets.indicators import paint_sparkline
@@ -216,7 +216,7 @@ def test_swatches_name_the_colour_and_take_another(qtbot, theme: Theme) -> None:
 
 
 def test_a_bar_knows_what_it_does_not_know(theme: Theme) -> None:
-    bar = Bar(theme)
+    bar = ValueBar(theme)
     assert bar.fraction is None
     bar.set_fraction(1.7)
     assert bar.fraction == 1.0

@@ -13,7 +13,7 @@ from app.robots.description.description import Sensor
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_words
-from app.ui.text.sensor_values import Reading, reading_of
+from app.ui.text.sensor_values import ReadingWords, reading_of
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState, paint
@@ -35,7 +35,7 @@ class SensorRow(QWidget):
         super().__init__()
         self._theme, self.sensor = theme, sensor
         self.title = sensor.title[:1].upper() + sensor.title[1:]
-        self.reading = Reading()
+        self.reading = ReadingWords()
         self.large = True
         self._yes_s: float | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -47,7 +47,7 @@ class SensorRow(QWidget):
         if value is True:
             self._yes_s = now
         elif value is False and self._yes_s is not None:
-            reading = Reading(reading.value, f"{age_words(max(1.0, float(int(now - self._yes_s))))} ago")
+            reading = ReadingWords(reading.value, f"{age_words(max(1.0, float(int(now - self._yes_s))))} ago")
         if reading != self.reading:
             self.reading = reading
             self.setAccessibleDescription(" ".join(part for part in (reading.value, reading.beside) if part))

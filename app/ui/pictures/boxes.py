@@ -23,7 +23,7 @@ BOX_INK = "#1C1B19"
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class DetectionBox:
     """Something that was recognised: its words, its confidence (0 to 1 or None), its place as shares."""
 
     words: str
@@ -32,7 +32,7 @@ class Box:
     kind: int = 0
 
 
-def boxes_of(detections: object, kind: int = 0) -> tuple[Box, ...]:
+def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
     """The boxes in a detections sensor's value; whatever is none is left out."""
     if not isinstance(detections, Mapping):
         return ()
@@ -46,14 +46,14 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[Box, ...]:
         if isinstance(item, Mapping) and isinstance(place, Sequence) and len(place) == 4:
             x, y, w, h = (_number(part) or 0.0 for part in place)
             area = QRectF(x / width, y / height, w / width, h / height)
-            found.append(Box(str(item.get("name", "")), _number(item.get("confidence")), area, kind))
+            found.append(DetectionBox(str(item.get("name", "")), _number(item.get("confidence")), area, kind))
     return tuple(found)
 
 
-def boxes_on(link: RobotLink, topic: str) -> tuple[Box, ...]:
+def boxes_on(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
     """The boxes of all detections that were made in this camera's pictures; one colour for each sensor."""
     cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
-    found: list[Box] = []
+    found: list[DetectionBox] = []
     detecting = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
     for kind, sensor in enumerate(detecting):
         if sensor.camera is None or sensor.camera in cameras:
@@ -74,7 +74,7 @@ def owner_of(session: Session, topic: str) -> RobotLink | None:
     return None
 
 
-def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: Box) -> None:
+def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox) -> None:
     """A box around ``place`` (pixels of the view), with its words upright above it."""
     colour = QColor(BOX_COLOURS[box.kind % len(BOX_COLOURS)])
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)

@@ -9,7 +9,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.pictures.boxes import Box, paint_box
+from app.ui.pictures.boxes import DetectionBox, paint_box
 from app.ui.pictures.placement import PicturePlace
 from app.ui.text.numbers import age_words
 from app.ui.theme.icons import paint_icon
@@ -63,7 +63,7 @@ class PictureView(QWidget):
         self._picture: Picture | None = None
         self._image: QImage | None = None
         self._grey: QImage | None = None  # of the last picture, when no new one comes
-        self._boxes: tuple[Box, ...] = ()
+        self._boxes: tuple[DetectionBox, ...] = ()
         self._rate = self._state = self._age = ""
         self.mouse: QPointF | None = None  # where a person points, when it matters
         self._takes = 0
@@ -86,7 +86,7 @@ class PictureView(QWidget):
         return "  ".join(part for part in (self._state or self._rate, *facts) if part)
 
     @property
-    def boxes(self) -> tuple[Box, ...]:
+    def boxes(self) -> tuple[DetectionBox, ...]:
         """What is marked now."""
         return self._boxes
 
@@ -102,7 +102,7 @@ class PictureView(QWidget):
         self._rate = self._state = self._age = ""
         self.update()
 
-    def take(self, stream: ImageStream, boxes: tuple[Box, ...] = ()) -> None:
+    def take(self, stream: ImageStream, boxes: tuple[DetectionBox, ...] = ()) -> None:
         """Show what the stream has now."""
         before = (self.words, self._boxes)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s

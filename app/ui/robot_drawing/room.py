@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPen, QPolygonF
 
-from app.ui.robot_drawing.state import Room
+from app.ui.robot_drawing.state import RoomBounds
 
 WIDTH, HEIGHT = 382.0, 286.0
 HORIZON, WALL_FOOT, FLOOR_TOP = 91.0, 157.0, 162.8
@@ -33,7 +33,7 @@ class Stage:
     """How a room fills a rectangle: uniform scale, centred; wall and floor go on to the edges."""
 
     area: QRectF
-    room: Room
+    room: RoomBounds
 
     @property
     def scale(self) -> float:

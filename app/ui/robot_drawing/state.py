@@ -23,7 +23,7 @@ class Thing:
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class RoomBounds:
     """The floor in m; the person looks from ``x_max`` towards ``x_min``, and has ``y_max`` at the right."""
 
     x_min: float = -3.0
@@ -57,7 +57,7 @@ class RobotState:
     figure: str = "pepper"
     bumped: str = ""
     objects: tuple[Thing, ...] = ()
-    room: Room = field(default_factory=Room)
+    room: RoomBounds = field(default_factory=RoomBounds)
 
     @classmethod
     def parse(cls, data: Mapping[str, object]) -> RobotState:
@@ -125,12 +125,12 @@ def _thing(one: Mapping[str, object]) -> Thing:
     )
 
 
-def _room(value: object) -> Room:
+def _room(value: object) -> RoomBounds:
     if not isinstance(value, Mapping):
-        return Room()
+        return RoomBounds()
     if "x_min" in value and "y_min" in value:
         sides = [_number(value.get(side)) for side in ("x_min", "x_max", "y_min", "y_max")]
-        return Room(*sides) if sides[1] - sides[0] > 0.1 and sides[3] - sides[2] > 0.1 else Room()
+        return RoomBounds(*sides) if sides[1] - sides[0] > 0.1 and sides[3] - sides[2] > 0.1 else RoomBounds()
     wide = _number(value.get("width"), 6.0)
     deep = _number(value.get("depth"), 5.0)
-    return Room(-wide / 2, wide / 2, -deep / 2, deep / 2) if min(wide, deep) > 0.1 else Room()
+    return RoomBounds(-wide / 2, wide / 2, -deep / 2, deep / 2) if min(wide, deep) > 0.1 else RoomBounds()

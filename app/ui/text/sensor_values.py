@@ -11,7 +11,7 @@ MINUS = "\u2212"
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ReadingWords:
     """``value`` in bold at the right, ``beside`` in the middle, ``share`` (0 to 1) as a bar; None: no bar."""
 
     value: str = ""
@@ -19,24 +19,24 @@ class Reading:
     share: float | None = None
 
 
-def reading_of(sensor: Sensor, value: object) -> Reading:
+def reading_of(sensor: Sensor, value: object) -> ReadingWords:
     """How to say a sensor's newest value; nothing when there is none yet."""
     if value is None:
-        return Reading()
+        return ReadingWords()
     if sensor.kind == "boolean" or isinstance(value, bool):
-        return Reading("yes" if value else "no")
+        return ReadingWords("yes" if value else "no")
     if sensor.kind == "detections" and isinstance(value, Mapping):
         return _detections(value)
     if isinstance(value, Mapping):
         return _object(sensor, value)
     if isinstance(value, (int, float)):
-        return Reading(number_words(value, sensor.unit), share=_share(sensor, value))
+        return ReadingWords(number_words(value, sensor.unit), share=_share(sensor, value))
     if isinstance(value, str):
         title = next((choice.title for choice in sensor.choices if choice.value == value), value)
-        return Reading(title if sensor.kind == "choice" else f"“{title}”" if title else "")
+        return ReadingWords(title if sensor.kind == "choice" else f"“{title}”" if title else "")
     if isinstance(value, Sequence):
-        return Reading(str(len(value)), ", ".join(_name(item) for item in value))
-    return Reading(str(value))
+        return ReadingWords(str(len(value)), ", ".join(_name(item) for item in value))
+    return ReadingWords(str(value))
 
 
 def number_words(value: float, unit: str | None) -> str:
@@ -60,29 +60,31 @@ def _share(sensor: Sensor, value: float) -> float | None:
     return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
-def _detections(value: Mapping[str, object]) -> Reading:
+def _detections(value: Mapping[str, object]) -> ReadingWords:
     items = value.get("items")
     found = [item for item in items if isinstance(item, Mapping)] if isinstance(items, list) else []
     count = value.get("count")
     name = value.get("name")
     names = str(name) if name else ", ".join(str(item.get("name", "")) for item in found)
-    return Reading(str(count if isinstance(count, int) else len(found)), names)
+    return ReadingWords(str(count if isinstance(count, int) else len(found)), names)
 
 
-def _object(sensor: Sensor, value: Mapping[str, object]) -> Reading:
+def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
     """Fields of one unit are said together ("1.3, 0.3 m"), the others beside ("facing 31°")."""
     fields = sensor.fields or tuple(Field(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
     numbers = [(field, number) for field, number in known if _is_number(number)]
     if not numbers:
-        return Reading("", ", ".join(f"{field.title} {words}" for field, words in known if words is not None))
+        return ReadingWords(
+            "", ", ".join(f"{field.title} {words}" for field, words in known if words is not None)
+        )
     unit = numbers[0][0].unit
     together = [f"{number:.1f}".replace("-", MINUS) for field, number in numbers if field.unit == unit]
     others = [(field, number) for field, number in numbers if field.unit != unit]
     beside = ", ".join(
         f"{field.title} {number_words(_round(number), field.unit)}" for field, number in others
     )
-    return Reading(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
+    return ReadingWords(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
 
 
 def _is_number(value: object) -> bool:

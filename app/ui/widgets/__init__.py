@@ -10,10 +10,10 @@ from app.ui.widgets.buttons import name_command as name_command
 from app.ui.widgets.cards import Card as Card
 from app.ui.widgets.empty_state import EmptyAction as EmptyAction
 from app.ui.widgets.empty_state import EmptyState as EmptyState
-from app.ui.widgets.indicators import Bar as Bar
 from app.ui.widgets.indicators import Chip as Chip
 from app.ui.widgets.indicators import Sparkline as Sparkline
 from app.ui.widgets.indicators import StatusItem as StatusItem
+from app.ui.widgets.indicators import ValueBar as ValueBar
 from app.ui.widgets.indicators import paint_sparkline as paint_sparkline
 from app.ui.widgets.inputs.choice import Choice as Choice
 from app.ui.widgets.inputs.choice import ColourSwatches as ColourSwatches

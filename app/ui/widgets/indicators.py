@@ -255,7 +255,7 @@ def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], co
     painter.restore()
 
 
-class Bar(QWidget):
+class ValueBar(QWidget):
     """A sensor's value between its limits; None shows only the track."""
 
     def __init__(self, theme: Theme, fraction: float | None = None) -> None:

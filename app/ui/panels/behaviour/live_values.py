@@ -11,7 +11,7 @@ from app.ui.text.sensor_values import number_words, reading_of
 SILENT = "silent"
 
 
-class Told(Protocol):
+class KnownValues(Protocol):
     """What is known of a robot that is there (`app.core.robots.robot_link.RobotLink`)."""
 
     @property
@@ -24,13 +24,13 @@ class Told(Protocol):
     def connected(self) -> bool: ...
 
 
-class Fleet(Protocol):
+class RobotLookup(Protocol):
     """Where robots are found by their names."""
 
-    def link(self, name: str) -> Told | None: ...
+    def link(self, name: str) -> KnownValues | None: ...
 
 
-def live_words(fleet: Fleet, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
+def live_words(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
     """Words by ``<robot>/<sensor>`` and ``<robot>/<sensor>/<field>``, and which of them are old.
 
     Old is what a robot told that has fallen silent. A robot that is away says nothing.

@@ -224,7 +224,7 @@ class LineDelegate(QStyledItemDelegate):
         return parts
 
 
-class Lines(QListView):
+class LineList(QListView):
     """The list of lines. ``/`` asks for the field of words; `resized` when its place changed."""
 
     find_wanted = Signal()

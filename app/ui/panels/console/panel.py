@@ -17,7 +17,7 @@ from app.ui.panels.console.list import (
     ConsoleModel,
     FindWords,
     LineDelegate,
-    Lines,
+    LineList,
     Wanted,
     line_of,
 )
@@ -81,8 +81,8 @@ class ConsolePanel(PanelWidget):
         column.addLayout(row)
         column.addWidget(self.pages)
 
-    def _make_list(self) -> Lines:
-        made = Lines()
+    def _make_list(self) -> LineList:
+        made = LineList()
         made.setModel(self.model)
         self._delegate = LineDelegate(self.theme, lambda: self.density, self.text_font)
         made.setItemDelegate(self._delegate)

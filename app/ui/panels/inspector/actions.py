@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from PySide6.QtWidgets import QWidget
 
     from app.ui.panels.inspector.body import InspectorBody
-    from app.ui.panels.inspector.tree_model import Node
+    from app.ui.panels.inspector.tree_model import TreeNode
     from app.ui.theme.theme import Theme
     from nep.messages.message import Message
 
@@ -103,7 +103,7 @@ class InspectorActions(QObject):
             text = plain_words(self._body.model.value())
         self._copied(text, f"the message of {message.topic}")
 
-    def _chosen(self) -> Node | None:
+    def _chosen(self) -> TreeNode | None:
         """The value that is chosen in the tree."""
         index = self._body.tree.currentIndex()
         return self._body.model.node(index) if index.isValid() else None

@@ -22,7 +22,7 @@ _ROOT = QModelIndex()
 
 
 @dataclass(slots=True, eq=False)
-class Node:
+class TreeNode:
     """One value of the message: ``children`` is None until somebody looked into it.
 
     ``base`` is the value that it is compared with (`OFF`: nothing is compared), ``mark`` how they differ;
@@ -31,10 +31,10 @@ class Node:
 
     key: str | int
     value: object
-    parent: Node | None
+    parent: TreeNode | None
     row: int = 0
     depth: int = 0
-    children: list[Node] | None = None
+    children: list[TreeNode] | None = None
     changed_s: float | None = None
     base: object = OFF
     mark: Mark = ""
@@ -62,7 +62,7 @@ class TreeModel(QAbstractItemModel):
     def __init__(self) -> None:
         """Nothing is shown yet."""
         super().__init__()
-        self._root = Node("", {}, None, depth=-1, children=[])
+        self._root = TreeNode("", {}, None, depth=-1, children=[])
         self.changed_at_s: float | None = None
         self._changing = False
         self._changes_only = False
@@ -119,12 +119,12 @@ class TreeModel(QAbstractItemModel):
 
     # -- what the inspector asks and says ---------------------------------------------------------------
 
-    def node(self, index: Index) -> Node:
+    def node(self, index: Index) -> TreeNode:
         """The node of an index; the invisible root for an invalid one."""
         inside = index.internalPointer() if index.isValid() else None
-        return inside if isinstance(inside, Node) else self._root
+        return inside if isinstance(inside, TreeNode) else self._root
 
-    def index_of(self, node: Node) -> QModelIndex:
+    def index_of(self, node: TreeNode) -> QModelIndex:
         """The index of a node."""
         return QModelIndex() if node is self._root else self.createIndex(node.row, 0, node)
 
@@ -135,7 +135,7 @@ class TreeModel(QAbstractItemModel):
     def clear(self) -> None:
         """Show nothing; the next message begins anew."""
         self.beginResetModel()
-        self._root = Node("", {}, None, depth=-1, children=[])
+        self._root = TreeNode("", {}, None, depth=-1, children=[])
         self.changed_at_s = None
         self.endResetModel()
 
@@ -157,13 +157,13 @@ class TreeModel(QAbstractItemModel):
         finally:
             self._changing = False
 
-    def _size(self, node: Node) -> int:
+    def _size(self, node: TreeNode) -> int:
         """How many children a node has, or (compared, and not looked at yet) whether it has any."""
         if node.base is OFF:
             return size_of(node.value)
         return node.total if node.children is not None else size_of(node.value) or size_of(node.base)
 
-    def _parts(self, node: Node, count: int) -> list[Part]:
+    def _parts(self, node: TreeNode, count: int) -> list[Part]:
         """The first ``count`` children as they are to be shown."""
         if node.base is OFF:
             pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
@@ -172,7 +172,7 @@ class TreeModel(QAbstractItemModel):
         parts, node.total = parts_of(node.value, node.base, node.mark, count, changes_only=only)
         return parts
 
-    def _update(self, node: Node, part: Part, now: float | None) -> None:
+    def _update(self, node: TreeNode, part: Part, now: float | None) -> None:
         _key, value, base, mark = part
         before, node.value = node.value, value
         marked, node.mark, node.base = node.mark != mark, mark, base
@@ -198,12 +198,12 @@ class TreeModel(QAbstractItemModel):
         if rows:
             self._tell(loaded[rows[0]], loaded[rows[-1]])
 
-    def _tell(self, first: Node, last: Node) -> None:
+    def _tell(self, first: TreeNode, last: TreeNode) -> None:
         if first is not self._root:
             roles = [Qt.ItemDataRole.DisplayRole]
             self.dataChanged.emit(self.index_of(first), self.index_of(last), roles)
 
-    def _load(self, node: Node, count: int) -> None:
+    def _load(self, node: TreeNode, count: int) -> None:
         """Have ``count`` children, or as many as there are."""
         parts = self._parts(node, count)
         if node.children is None:
@@ -218,7 +218,7 @@ class TreeModel(QAbstractItemModel):
         self._changing = before
         self.endInsertRows()
 
-    def _fit(self, node: Node, loaded: list[Node], parts: Sequence[Part]) -> None:
+    def _fit(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[Part]) -> None:
         """Children came, went or changed places: those that stay keep what is expanded in them."""
         wanted = [part[0] for part in parts]
         keep = set(wanted)
@@ -238,7 +238,7 @@ class TreeModel(QAbstractItemModel):
                 _number(loaded)
                 self.endInsertRows()
 
-    def _reorder(self, loaded: list[Node], wanted: Sequence[str | int]) -> None:
+    def _reorder(self, loaded: list[TreeNode], wanted: Sequence[str | int]) -> None:
         place = {key: number for number, key in enumerate(wanted)}
         self.layoutAboutToBeChanged.emit()
         before = self.persistentIndexList()
@@ -263,9 +263,9 @@ class TreeModel(QAbstractItemModel):
         return self.index_of(node)
 
 
-def _made(parent: Node, row: int, part: Part) -> Node:
+def _made(parent: TreeNode, row: int, part: Part) -> TreeNode:
     key, value, base, mark = part
-    return Node(key, value, parent, row, parent.depth + 1, base=base, mark=mark)
+    return TreeNode(key, value, parent, row, parent.depth + 1, base=base, mark=mark)
 
 
 def _as_container(value: object) -> object:
@@ -273,6 +273,6 @@ def _as_container(value: object) -> object:
     return value if value is OFF or value is MISSING or is_container(value) else {"value": value}
 
 
-def _number(nodes: Sequence[Node]) -> None:
+def _number(nodes: Sequence[TreeNode]) -> None:
     for row, node in enumerate(nodes):
         node.row = row

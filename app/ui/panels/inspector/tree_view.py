@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QMouseEvent, QPain
 from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem, QTreeView
 
 from app.ui.panels.inspector.diff import OFF
-from app.ui.panels.inspector.tree_model import NODE_ROLE, Node, TreeModel
+from app.ui.panels.inspector.tree_model import NODE_ROLE, TreeModel, TreeNode
 from app.ui.panels.inspector.values import is_container, size_of, words_of
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -67,7 +67,7 @@ class TreeView(QTreeView):
         self.setExpandsOnDoubleClick(False)
         self.setMouseTracking(True)
 
-    def share_changed(self, node: Node) -> float:
+    def share_changed(self, node: TreeNode) -> float:
         """How strongly a node is marked now: 1 just changed, 0 long ago."""
         if node.mark:
             return 1.0
@@ -105,7 +105,7 @@ class TreeView(QTreeView):
 
     def drawRow(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         node = index.data(NODE_ROLE)
-        if not isinstance(node, Node):
+        if not isinstance(node, TreeNode):
             return
         rect = QRect(option.rect)
         rect.setLeft(0)
@@ -128,7 +128,7 @@ class TreeView(QTreeView):
             painter.drawRoundedRect(QRectF(rect).adjusted(1, 1, -1, -1), 4, 4)
         painter.restore()
 
-    def _paint_key(self, painter: QPainter, rect: QRect, node: Node, *, chosen: bool) -> float:
+    def _paint_key(self, painter: QPainter, rect: QRect, node: TreeNode, *, chosen: bool) -> float:
         theme = self.theme
         left = LEFT_EDGE + node.depth * INDENT
         if node.is_container and self._tree.hasChildren(self._tree.index_of(node)):
@@ -155,7 +155,7 @@ class TreeView(QTreeView):
         return x
 
     def _paint_value(
-        self, painter: QPainter, rect: QRect, node: Node, key_end: float, ground: QColor, share: float
+        self, painter: QPainter, rect: QRect, node: TreeNode, key_end: float, ground: QColor, share: float
     ) -> None:
         theme = self.theme
         metrics = QFontMetricsF(theme.font("code"))
@@ -178,7 +178,9 @@ class TreeView(QTreeView):
         painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
         self._paint_before(painter, rect, node, right - width - 10, key_end + 12)
 
-    def _paint_before(self, painter: QPainter, rect: QRect, node: Node, right: float, left: float) -> None:
+    def _paint_before(
+        self, painter: QPainter, rect: QRect, node: TreeNode, right: float, left: float
+    ) -> None:
         """The value that a compared one had before, where there is room for it."""
         if node.mark != "changed" or is_container(node.base):
             return
@@ -192,7 +194,7 @@ class TreeView(QTreeView):
         self._keyboard = False
         index = self.indexAt(event.position().toPoint())
         node = index.data(NODE_ROLE) if index.isValid() else None
-        if isinstance(node, Node) and event.button() == Qt.MouseButton.LeftButton:
+        if isinstance(node, TreeNode) and event.button() == Qt.MouseButton.LeftButton:
             self.setCurrentIndex(index)
             self.setFocus(Qt.FocusReason.MouseFocusReason)
             if node.is_container and _on_chevron(event.position(), node):
@@ -203,7 +205,7 @@ class TreeView(QTreeView):
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         index = self.indexAt(event.position().toPoint())
         node = index.data(NODE_ROLE) if index.isValid() else None
-        if isinstance(node, Node) and node.is_container and not _on_chevron(event.position(), node):
+        if isinstance(node, TreeNode) and node.is_container and not _on_chevron(event.position(), node):
             self.setExpanded(index, not self.isExpanded(index))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
@@ -211,7 +213,7 @@ class TreeView(QTreeView):
         super().focusInEvent(event)
 
 
-def _on_chevron(position: QPointF, node: Node) -> bool:
+def _on_chevron(position: QPointF, node: TreeNode) -> bool:
     left = LEFT_EDGE + node.depth * INDENT
     return left - 4 <= position.x() <= left + CHEVRON + 4
 

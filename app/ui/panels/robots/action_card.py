@@ -14,7 +14,7 @@ from app.ui.panels.robots.controls.chooser import Pictures
 from app.ui.panels.robots.form import ActionForm
 from app.ui.panels.robots.tries import TryList, end_words, left_words, now_words, output_words, progress_of
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Bar, Button, Card, Chip, Elided, IconButton, label, set_role
+from app.ui.widgets import Button, Card, Chip, Elided, IconButton, ValueBar, label, set_role
 from app.ui.widgets.cards import Tile
 from app.ui.widgets.flow_layout import Flow
 
@@ -66,7 +66,7 @@ class ActionCard(Card):
         self.fold.clicked.connect(lambda: self.set_folded(not self._folded))
         self.fold.setVisible(folded and bool(action.parameters))
         self.error = label("", "small", role="error", wrap=True)
-        self.progress = Bar(theme)
+        self.progress = ValueBar(theme)
         self.tries = TryList(theme, action)
         self.tries.chosen.connect(self._take_back)
         self.tries.hide()
