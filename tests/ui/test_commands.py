@@ -11,9 +11,13 @@ from pathlib import Path
 import pytest
 
 import app
+from app.ui.shell.actions.actions import ROLES, STOP
 from app.ui.shell.actions.command import UnknownCommandError
+from app.ui.shell.bars.banner import STEP_ICONS
+from app.ui.shell.bars.run_bar import PACES
 from app.ui.shell.commands.behaviours import TabPlace
 from app.ui.shell.commands.commands import Commands
+from app.ui.shell.commands.menus import ARRANGING
 from app.ui.shell.commands.robots import RobotSwap
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS
 from app.ui.shell.main_window import MainWindow
@@ -23,7 +27,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 IDS = {command.id for command in COMMANDS}
 ABOUT = {command.id for command in ARGUMENT_COMMANDS}
-CALLS = {"run": 0, "_run": 0, "bind": 1, "name_command": 1, "Mend": 1}
+CALLS = {"run": 0, "_run": 0, "bind": 1, "name_command": 1, "Mend": 1, "_complain": 1}
 """Calls that are given a command, and the place of it; `setProperty` is one with "command" before it."""
 KEYWORDS = {"action", "mend_action"}
 
@@ -97,6 +101,7 @@ def test_everybody_who_names_a_command_is_found() -> None:
         "network.others",  # an alert of the core
         "connect:{}",  # an alert, and a problem of the compiler
         "limit:{}",
+        "file.save_as",  # an alert about a file
         "robot.use:{}:{}",
         "robot.virtual:{}",
         "tab.move:{}:{}",  # panels
@@ -111,6 +116,10 @@ def test_everybody_who_names_a_command_is_found() -> None:
 @pytest.mark.parametrize(("path", "words", "line"), FOUND, ids=[f"{p.stem}-{n}-{w}" for p, w, n in FOUND])
 def test_whoever_names_a_command_names_one_that_is_there(path: Path, words: str, line: int) -> None:
     assert is_known(words), f"{path}:{line} names no command: {words!r}"
+
+
+def test_lists_of_commands_name_commands() -> None:
+    assert {*STEP_ICONS, *ROLES, *PACES, *ARRANGING, STOP} <= IDS
 
 
 def test_the_menu_of_a_tab_names_commands_about_a_tab() -> None:
