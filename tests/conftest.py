@@ -94,6 +94,14 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def pseudo(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is marked for translators is said in the pseudo-language (`tests.pseudo` finds what is not)."""
+    from tests.pseudo import words
+
+    monkeypatch.setattr("nep.i18n._now", words())
+
+
+@pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
     """A running native master on a free port of loopback; NEP_MASTER names it."""
     with Master("127.0.0.1:0", learn_s=0.0) as running:

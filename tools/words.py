@@ -15,7 +15,6 @@ import argparse
 import datetime as dt
 import io
 import json
-import math
 import os
 import re
 import sys
@@ -32,10 +31,8 @@ from babel.messages.pofile import read_po, write_po
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from app.blocks.categories.robot import GROUPS  # noqa: E402 - this file is started by its path
-from app.blocks.toolbox.catalogue import english_categories, has_words  # noqa: E402
-from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap  # noqa: E402
-from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402
+from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402 - this file is started by its path
+from tools.pseudo import MARKUP, pseudo, sentences_of_blocks  # noqa: E402
 
 KEYWORDS = {
     "_": None,
@@ -62,12 +59,6 @@ FORMATS = {"es": "es_419"}
 _MADE = dt.datetime(2026, 11, 22, tzinfo=dt.timezone.utc)
 """In every header: a real date would make a new file of the same words."""
 _HEADER = "# All sentences of NEP Studio; made by tools/words.py (docs/translate.md)."
-_MARKUP = re.compile(r"\[/?[a-z][a-z ]*\]|</?[a-z]+>|`[^`]*`")
-_KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Z][A-Z0-9_]*|%(?:(?:\(\w+\))?[sdr]|\d)|{_MARKUP.pattern}")
-_ACCENTS = str.maketrans(
-    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
-    "áƀçđéƒğĥíĵķłḿñóþǫřšťúṽŵẋýžÁƁÇĐÉƑĞĤÍĴĶŁḾÑÓÞǪŘŠŤÚṼŴẊÝŽ",
-)
 
 
 class Key(NamedTuple):
@@ -98,29 +89,6 @@ def template(root: Path = ROOT) -> Catalog:
     for context, english, place in sentences_of_blocks():
         made.add(english, locations=[(place, 0)], context=context)
     return made
-
-
-def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
-    """(context, English, its file) of what stands in the descriptions of blocks, not in calls of `_`."""
-    found: dict[tuple[str | None, str], str] = {}
-    for category in english_categories():
-        place = f"app/blocks/categories/{category.name}.py"
-
-        def say(context: str | None, english: str, place: str = place) -> str:
-            if has_words(english):
-                found.setdefault((context, english), place)
-            return english
-
-        category.translated(say)
-        for block in category.blocks:
-            for argument in block.arguments:
-                say("gap", english_name_of_gap(argument))
-    for title in GROUPS:
-        found.setdefault(("category", title), "app/blocks/categories/robot.py")
-    for example in EXAMPLES.values():
-        found.setdefault((None, example), "app/blocks/toolbox/help.py")
-    for (context, english), place in found.items():
-        yield context, english, place
 
 
 def keys(catalog: Catalog) -> set[Key]:
@@ -293,19 +261,6 @@ def pseudo_catalog(pot: Catalog) -> Catalog:
     return made
 
 
-def pseudo(english: str) -> str:
-    """`[Ŕúñ ~~]`: a third longer, in brackets, its letters with accents; holes and markup as they were."""
-    pieces, at = [], 0
-    for found in _KEPT.finditer(english):
-        pieces += [english[at : found.start()].translate(_ACCENTS), found.group()]
-        at = found.end()
-    pieces.append(english[at:].translate(_ACCENTS))
-    text = "".join(pieces)
-    # "[" before a hole or a command would be markup for what prints it, once the hole is filled.
-    begin = "[" if text[:1] and text[0] not in "{%[`<" else "[~"
-    return f"{begin}{text} {'~' * max(1, math.ceil(0.35 * len(english)))}]"
-
-
 # ---- the check ------------------------------------------------------------------------------------
 
 
@@ -344,7 +299,7 @@ def _wrong_entries(catalog: Catalog) -> Iterator[str]:
         for form in filter(None, _ids(entry.string)):
             if holes(form) not in [holes(each) for each in key.ids]:
                 yield f"'{form}' has not the holes of '{_shown(key)}'"
-            if sorted(_MARKUP.findall(form)) not in [sorted(_MARKUP.findall(each)) for each in key.ids]:
+            if sorted(MARKUP.findall(form)) not in [sorted(MARKUP.findall(each)) for each in key.ids]:
                 yield f"'{form}' has not the markup of '{_shown(key)}'"
 
 

@@ -1,0 +1,171 @@
+"""The pseudo-language, made on the fly from the sources of now: what nobody translates stays plain English.
+
+    def test_every_word_is_translated(pseudo) -> None:
+        shown = told_to_people()                     # "[Ƥéƥƥéř đíđ ñóť áñšŵéř ~~~~]"
+        assert untranslated(shown, "Pepper") == []   # data is named: it is never translated
+
+The fixture ``pseudo`` is in tests/conftest.py. A sentence that is not marked (by `_`, `lazy`, `ngettext`,
+`pgettext`, or as words of a block) stays English, even where it is given to `_`. For a widget and all that is
+in it: `untranslated_in`. Neither Babel nor the compiled words are needed.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from gettext import NullTranslations
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nep import i18n
+from tools.pseudo import MARKUP, pseudo, sentences_of_blocks
+
+if TYPE_CHECKING:
+    from PySide6.QtGui import QAction
+    from PySide6.QtWidgets import QWidget
+
+ROOT = Path(__file__).resolve().parents[1]
+MARKS = {"_": 1, "gettext": 1, "lazy": 1, "ngettext": 2, "pgettext": 2}
+"""How many strings each takes."""
+UNITS = frozenset({
+    "GB", "Hz", "KB", "MB", "TB", "cm", "deg", "fps", "kB", "kHz", "km", "mW", "min", "mm", "ms", "ns", "px",
+    "rad",
+})  # fmt: skip
+NAMES = frozenset({
+    "Alt", "Blockly", "Ctrl", "DNS", "Del", "Enter", "Esc", "F1", "HTTP", "ID", "IP", "JSON", "Linux", "NEP",
+    "OpenCV", "PNG", "Pepper", "PySide6", "Python", "Qt", "RIZE", "ROS", "Shift", "Studio", "Tab", "TCP",
+    "UDP", "Windows", "ZeroMQ", "macOS", "nep",
+})  # fmt: skip
+"""Names of things and of keys, the same in every language."""
+
+_WORD = re.compile(r"[A-Za-z][A-Za-z']+")
+_TAG = re.compile(r"<[^<>]*>|&[a-z]+;")
+_PATTERN = {"2": "[{0} àñđ {1}]", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "[{0} àñđ {1}]"}
+_FACTS: Mapping[str, object] = {
+    "and": _PATTERN,
+    "or": {name: pattern.replace("àñđ", "óř") for name, pattern in _PATTERN.items()},
+    "months": [f"[ḿóñťĥ {number}]" for number in range(1, 13)],
+    "decimal": ",",
+}
+
+
+class _Pseudo(NullTranslations):
+    """What is marked in the sources, in the pseudo-language."""
+
+    def gettext(self, message: str) -> str:
+        return pseudo(message) if (None, message) in marked() else message
+
+    def pgettext(self, context: str, message: str) -> str:
+        return pseudo(message) if (context, message) in marked() else message
+
+    def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
+        told = msgid1 if n == 1 else msgid2
+        return pseudo(told) if (msgid1, msgid2) in marked() else told
+
+
+def words() -> object:
+    """What `nep.i18n` holds while this language is in use."""
+    return i18n._Words(i18n.PSEUDO, _Pseudo(), _FACTS)
+
+
+@lru_cache(maxsize=1)
+def marked() -> frozenset[tuple[str | None, str]]:
+    """(context, sentence) of all that is marked; of `ngettext` (singular, plural)."""
+    found = {(context, english) for context, english, _place in sentences_of_blocks()}
+    for folder in ("nep", "app"):
+        for path in (ROOT / folder).rglob("*.py"):
+            found.update(_marked_in(path.read_text(encoding="utf-8")))
+    return frozenset(found)
+
+
+def _marked_in(source: str) -> Iterator[tuple[str | None, str]]:
+    if not any(f"{mark}(" in source for mark in MARKS):
+        return
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in MARKS:
+            given = [
+                each.value
+                for each in node.args[: MARKS[node.func.id]]
+                if isinstance(each, ast.Constant) and isinstance(each.value, str)
+            ]
+            if len(given) == MARKS[node.func.id]:
+                yield (None, given[0]) if len(given) == 1 else (given[0], given[1])
+
+
+def untranslated(text: str, *data: str) -> list[str]:
+    """The words of a text that are in no language but English: none of `data`, of markup, units and names."""
+    plain = MARKUP.sub(" ", _TAG.sub(" ", text))
+    for each in sorted(filter(None, data), key=len, reverse=True):
+        plain = plain.replace(each, " ")
+    return [word for word in _WORD.findall(plain) if word not in UNITS and word not in NAMES]
+
+
+def untranslated_in(widget: QWidget, *data: str, hidden: bool = True) -> list[str]:
+    """ "QLabel#name.text: Stop now", for each text of a widget, and of all that is in it, with such words.
+
+    With ``hidden=False`` only what is shown now counts.
+    """
+    return [
+        f"{place}: {text}" for place, text in texts_of(widget, hidden=hidden) if untranslated(text, *data)
+    ]
+
+
+def texts_of(widget: QWidget, *, hidden: bool = True) -> Iterator[tuple[str, str]]:
+    """(where, text) of all that a widget, and all that is in it, says: also tips, heads, accessible names."""
+    from PySide6.QtWidgets import QWidget
+
+    for each in (widget, *widget.findChildren(QWidget)):
+        if not hidden and not each.isVisible():
+            continue
+        place = f"{type(each).__name__}#{each.objectName()}"
+        for name, text in (*_own_texts(each), *_texts_of_items(each)):
+            if text:
+                yield f"{place}.{name}", text
+        for action in each.actions():
+            for name, text in _texts_of_action(action):
+                yield f"{place}.{name}", text
+
+
+def _own_texts(widget: QWidget) -> Iterable[tuple[str, str]]:
+    from PySide6.QtWidgets import QAbstractButton, QDockWidget, QGroupBox, QLabel, QLineEdit, QMenu
+
+    yield "accessibleName", widget.accessibleName()
+    yield "accessibleDescription", widget.accessibleDescription()
+    yield "toolTip", widget.toolTip()
+    yield "statusTip", widget.statusTip()
+    yield "whatsThis", widget.whatsThis()
+    if widget.isWindow() or isinstance(widget, QDockWidget):
+        yield "windowTitle", widget.windowTitle()
+    if isinstance(widget, (QLabel, QAbstractButton)):
+        yield "text", widget.text()
+    if isinstance(widget, (QGroupBox, QMenu)):
+        yield "title", widget.title()
+    if isinstance(widget, QLineEdit) or hasattr(widget, "placeholderText"):
+        yield "placeholderText", widget.placeholderText()
+
+
+def _texts_of_items(widget: QWidget) -> Iterable[tuple[str, str]]:
+    from PySide6.QtCore import Qt
+    from PySide6.QtWidgets import QAbstractItemView, QComboBox, QTabBar
+
+    if isinstance(widget, QTabBar):
+        for index in range(widget.count()):
+            yield "tabText", widget.tabText(index)
+            yield "tabToolTip", widget.tabToolTip(index)
+    if isinstance(widget, QComboBox):
+        for index in range(widget.count()):
+            yield "itemText", widget.itemText(index)
+    if isinstance(widget, QAbstractItemView) and (model := widget.model()) is not None:
+        for column in range(model.columnCount()):
+            for role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
+                head = model.headerData(column, Qt.Orientation.Horizontal, role)
+                if isinstance(head, str):
+                    yield "head", head
+
+
+def _texts_of_action(action: QAction) -> Iterable[tuple[str, str]]:
+    for name, text in (("action", action.text()), ("actionTip", action.toolTip())):
+        if text:
+            yield name, text

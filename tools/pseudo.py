@@ -1,0 +1,54 @@
+"""The pseudo-language, which shows what nobody translates, and the sentences of blocks; without Babel."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+from app.blocks.categories.robot import GROUPS
+from app.blocks.toolbox.catalogue import english_categories, has_words
+from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap
+
+MARKUP = re.compile(r"\[/?[a-z][a-z ]*\]|</?[a-z]+>|`[^`]*`")
+_KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Z][A-Z0-9_]*|%(?:(?:\(\w+\))?[sdr]|\d)|{MARKUP.pattern}")
+_ACCENTS = str.maketrans(
+    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
+    "áƀçđéƒğĥíĵķłḿñóþǫřšťúṽŵẋýžÁƁÇĐÉƑĞĤÍĴĶŁḾÑÓÞǪŘŠŤÚṼŴẊÝŽ",
+)
+
+
+def pseudo(english: str) -> str:
+    """`[Ŕúñ ~~]`: a third longer, in brackets, its letters with accents; holes and markup as they were."""
+    pieces, at = [], 0
+    for found in _KEPT.finditer(english):
+        pieces += [english[at : found.start()].translate(_ACCENTS), found.group()]
+        at = found.end()
+    pieces.append(english[at:].translate(_ACCENTS))
+    text = "".join(pieces)
+    # "[" before a hole or a command would be markup for what prints it, once the hole is filled.
+    begin = "[" if text[:1] and text[0] not in "{%[`<" else "[~"
+    return f"{begin}{text} {'~' * max(1, math.ceil(0.35 * len(english)))}]"
+
+
+def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
+    """(context, English, its file) of what stands in the descriptions of blocks, not in calls of `_`."""
+    found: dict[tuple[str | None, str], str] = {}
+    for category in english_categories():
+        place = f"app/blocks/categories/{category.name}.py"
+
+        def say(context: str | None, english: str, place: str = place) -> str:
+            if has_words(english):
+                found.setdefault((context, english), place)
+            return english
+
+        category.translated(say)
+        for block in category.blocks:
+            for argument in block.arguments:
+                say("gap", english_name_of_gap(argument))
+    for title in GROUPS:
+        found.setdefault(("category", title), "app/blocks/categories/robot.py")
+    for example in EXAMPLES.values():
+        found.setdefault((None, example), "app/blocks/toolbox/help.py")
+    for (context, english), place in found.items():
+        yield context, english, place
