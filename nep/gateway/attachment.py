@@ -216,14 +216,14 @@ class NativeNetwork:
             self.cure("gateway:full")
 
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
-        """See `Alerts`."""
+        """See `AlertSink`."""
         alert = Alert(escaped(id), escaped(sentence), escaped(hint))
         if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _ALERTS_MAX):
             self._alerts[id] = alert
             self._report(tuple(self._alerts.values()))
 
     def cure(self, id: str) -> None:
-        """See `Alerts`."""
+        """See `AlertSink`."""
         if self._alerts.pop(id, None) is not None:
             self._report(tuple(self._alerts.values()))
 

@@ -15,7 +15,7 @@ from nep.gateway.portmap import PortMap, Registration, TopicLine
 from nep.gateway.processes import Processes
 from nep.gateway.programs import OriginalProgram, ProgramTable
 from nep.gateway.proxy_pair import ProxyPair, is_free, port_to_tell
-from nep.gateway.relay import Alerts, NativeSide, Relay
+from nep.gateway.relay import AlertSink, NativeSide, Relay
 from nep.gateway.request_server import Ports, RequestServer
 from nep.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.messages.message import Message
@@ -32,7 +32,7 @@ _PROGRAMS_MAX = 2000
 _logger = logging.getLogger("nep.gateway")
 
 
-class Outside(NativeSide, Alerts, Protocol):
+class Outside(NativeSide, AlertSink, Protocol):
     """All that the gateway needs of the native network; it is called in the gateway's thread."""
 
     def start(self, inbox: NativeInbox) -> None:

@@ -36,7 +36,7 @@ class NativeSide(Protocol):
         """No original wants this topic any more."""
 
 
-class Alerts(Protocol):
+class AlertSink(Protocol):
     """Where present problems are told."""
 
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
@@ -71,7 +71,7 @@ class Relay:
         self,
         context: zmq.Context[zmq.Socket[bytes]],
         native: NativeSide,
-        alerts: Alerts,
+        alerts: AlertSink,
         who: Who = lambda _line, _role: (),
     ) -> None:
         self._context = context

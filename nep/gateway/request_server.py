@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import zmq
 
 from nep.gateway.framing import PORT_A, PORT_B
-from nep.gateway.relay import Alerts
+from nep.gateway.relay import AlertSink
 from nep.gateway.requests import (
     LOOPBACK,
     Member,
@@ -45,7 +45,7 @@ class RequestServer:
         self,
         context: zmq.Context[zmq.Socket[bytes]],
         ports: Ports,
-        alerts: Alerts,
+        alerts: AlertSink,
         decide: Callable[[Request], int],
     ) -> None:
         self._context = context

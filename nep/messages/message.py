@@ -10,7 +10,7 @@ from typing import NamedTuple
 from nep.messages.codecs import CODECS
 from nep.messages.codecs import codec as codec_named
 
-__all__ = ["NOTHING", "UNDECODED", "Kind", "Message", "arrived", "kind_of", "new_message"]
+__all__ = ["NOTHING", "UNDECODED", "Message", "MessageKind", "arrived", "kind_of", "new_message"]
 
 NOTHING: Mapping[str, object] = MappingProxyType({})
 UNDECODED = object()
@@ -18,7 +18,7 @@ new_message = object.__new__
 """For whoever makes hundreds of thousands a second and sets their fields itself: `arrived` shows how."""
 
 
-class Kind(NamedTuple):
+class MessageKind(NamedTuple):
     """What the messages of one publisher have in common. Made by `kind_of`."""
 
     topic: str
@@ -28,11 +28,11 @@ class Kind(NamedTuple):
     decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
 
 
-def kind_of(topic: str, codec: str, msg_type: str, *, is_latched: bool = False) -> Kind:
-    """The `Kind` with these. The codec may be one that there is not: then decoding says so."""
+def kind_of(topic: str, codec: str, msg_type: str, *, is_latched: bool = False) -> MessageKind:
+    """The `MessageKind` with these. The codec may be one that there is not: then decoding says so."""
     known = CODECS.get(codec)
     decode = partial(_no_codec, codec) if known is None else known.decode
-    return Kind(topic, codec, msg_type, is_latched, decode)
+    return MessageKind(topic, codec, msg_type, is_latched, decode)
 
 
 def _no_codec(name: str, data: bytes | memoryview, extension: Mapping[str, object]) -> object:
@@ -58,7 +58,7 @@ class Message:
     __slots__ = ("decoded", "extension", "kind", "publisher", "raw", "seq", "stamp_ns")
 
     raw: bytes | memoryview
-    kind: Kind
+    kind: MessageKind
     decoded: object
     extension: Mapping[str, object]
     publisher: int | None
@@ -128,7 +128,7 @@ class Message:
 
 
 def arrived(
-    kind: Kind,
+    kind: MessageKind,
     data: bytes | memoryview,
     stamp_ns: int | None,
     seq: int,

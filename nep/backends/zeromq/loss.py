@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nep.errors import WireError
-from nep.messages.message import Kind, kind_of
+from nep.messages.message import MessageKind, kind_of
 from nep.protocol.requests import RemotePublisher
 
 __all__ = ["UNLISTED_MAX", "HeardPublisher", "HeardPublishers"]
@@ -27,7 +27,7 @@ class HeardPublisher:
     """
 
     form: int = 0
-    kind: Kind = _UNKNOWN
+    kind: MessageKind = _UNKNOWN
     remote: RemotePublisher | None = None
     endpoint: str = ""
     refused: str = ""

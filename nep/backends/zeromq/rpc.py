@@ -18,7 +18,7 @@ from nep.protocol.encoding import call_of_view, decode_answer, encode_request
 from nep.protocol.requests import Push, Refused, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
 
-__all__ = ["Answer", "PendingCall", "RpcClient", "Then"]
+__all__ = ["PendingCall", "ReceivedAnswer", "RpcClient", "Then"]
 
 _logger = logging.getLogger("nep")
 
@@ -44,7 +44,7 @@ class PendingCall:
     """The body of its answer, when that is a graph: who waits for it decodes it."""
 
 
-class Answer(NamedTuple):
+class ReceivedAnswer(NamedTuple):
     """What came from the master, and what to do with it if it answers a request that said so."""
 
     what: Reply | Push
@@ -144,9 +144,9 @@ class RpcClient:
         """Send and do not wait; `then` gets the reply, in the node's thread. Lost when there is no master."""
         self._send(request, is_waited=False, then=then)
 
-    def read(self) -> list[Answer]:
+    def read(self) -> list[ReceivedAnswer]:
         """What came, `_READ_MAX` at most; also sends what is still to be sent. For the node's thread."""
-        answers: list[Answer] = []
+        answers: list[ReceivedAnswer] = []
         events = 0
         with self._changed:
             while not (many := len(answers) >= _READ_MAX):
@@ -214,7 +214,7 @@ class RpcClient:
                     del self._calls[number]
         return has_sent
 
-    def _read_one(self) -> Answer | None:
+    def _read_one(self) -> ReceivedAnswer | None:
         body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
         asked = call_of_view(body)
         if asked is not None:
@@ -230,10 +230,10 @@ class RpcClient:
             return None
         call = self._calls.pop(number, None)
         if call is None or isinstance(answer, Push):
-            return Answer(answer, None)
+            return ReceivedAnswer(answer, None)
         call.reply = answer
         self._changed.notify_all()
-        return Answer(answer, call.then)
+        return ReceivedAnswer(answer, call.then)
 
     def _refuse(self, error: WireError) -> None:
         if self.refusals.add(error.reason):
