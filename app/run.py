@@ -32,6 +32,7 @@ from app.errors import AppError, DescriptionError
 from app.robots.description.description import Robot, parse
 from app.robots.identity import DESCRIPTION_TYPE
 from nep.errors import NepError
+from nep.i18n import listed
 from nep.system.streams import tell
 from nep.text import escaped
 
@@ -178,7 +179,7 @@ def _refused(
         say(f"{problem.severity}: {problem.sentence}")
     missing = sorted(set(wanted) - {robot.name for robot in robots})
     if missing:
-        say(f"{' and '.join(missing)} not found. Switch it on, or start the virtual robot.")
+        say(f"{listed(missing)} not found. Switch it on, or start the virtual robot.")
         return ROBOT_MISSING
     if program.errors or not program.starts:
         say(f"“{program.name}” can't run.")
@@ -189,7 +190,7 @@ def _refused(
 def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], None]) -> bool:
     """Name each real robot that the program would move; whether there is one."""
     real = [robot for robot in robots if not robot.virtual]
-    wanted = wanted_by(program.runnable, real, program.moves)
+    wanted = wanted_by(program, real)
     moves = {robot.name: risky(robot, asked) for robot, asked in wanted}
     for name, titles in moves.items():
         if titles:

@@ -167,6 +167,8 @@ class Session:
                 self.runs.stop_again(name)
         with self.surviving("follow what was started here"):
             self.companions.follow()
+        with self.surviving("show the run"):
+            self.runs.tick()
         if now >= self._next_check:
             self._next_check = now + CHECK_S
             self._check(now)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from dataclasses import replace
 
 import pytest
 
-from app.core.robots.motion_permission import MayNotMoveError, Moving, actions_of, risky, wanted_by
+from app.blocks.compiler.compiler import asked_actions
+from app.blocks.model.program import Program
+from app.core.robots.motion_permission import MayNotMoveError, Moving, risky, wanted_by
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT
@@ -81,19 +84,32 @@ def test_the_question_replaces_an_older_one(rover) -> None:
     assert done == ["new"]
 
 
+def program_of(source: str) -> Program:
+    """A program whose blocks make these statements."""
+    return Program("p", source, source, {}, actions=asked_actions(ast.parse(source).body))
+
+
 def test_what_a_program_asks_of_robots_is_read_from_it(rover) -> None:
     source = "robot('Rover').do('move', distance=1)\nrobot('Rover').ask('look', 'w')\nrobot('P').get('b')\n"
-    assert actions_of(source) == {"Rover": ("move", "look")}
-    assert wanted_by(source, [rover]) == [(rover, ("move", "look"))]
+    program = program_of(source)
+    assert program.actions == {"Rover": ("move", "look")}
+    assert wanted_by(program, [rover]) == [(rover, ("move", "look"))]
     assert risky(rover, ["move", "move", "light", "unknown"]) == ("“move”",)
 
 
 @pytest.mark.parametrize("source", ["robot(name).do('move')", "robot('Rover').do(what)", "r.do('move')"])
 def test_a_program_that_hides_what_it_does_may_do_anything(rover, source) -> None:
-    assert actions_of(source) is None
-    ((_, actions),) = wanted_by(source, [rover])
+    program = program_of(source)
+    assert program.actions is None
+    ((_, actions),) = wanted_by(program, [rover])
     assert "move" in actions
-    assert not Moving().permits(wanted_by(source, [rover]), lambda: None)
+    assert not Moving().permits(wanted_by(program, [rover]), lambda: None)
+
+
+def test_a_robot_that_a_program_moves_by_publishing_may_do_anything(rover) -> None:
+    program = replace(program_of("robot('Rover').do('light')"), moves=("Rover",))
+    ((_, actions),) = wanted_by(program, [rover])
+    assert "move" in actions
 
 
 def test_the_error_names_the_robots() -> None:

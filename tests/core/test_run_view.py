@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.core.robots.stop_report import RobotStop, StopReport
-from app.core.run.view import RunState, listed, seconds, stop_words, view_of
+from app.core.run.view import RunState, seconds, stop_words, view_of
 
 PEPPER = RobotStop("Pepper", True, 38.2)
 TURTLE = RobotStop("Turtle", True, 41.4)
@@ -18,9 +18,7 @@ RIZE = RobotStop("Nao", False, None, can_confirm=False)
 def after(*robots: RobotStop, elapsed_ms: float = 41.4, **values: object) -> RunState:
     good = all(robot.answered or not robot.can_confirm for robot in robots)
     state = RunState("proven" if good else "unanswered", "Greeting", report=StopReport(robots, elapsed_ms))
-    for name, value in values.items():
-        setattr(state, name, value)
-    return state
+    return replace(state, **values)
 
 
 def test_ready_names_the_robots() -> None:
@@ -44,7 +42,7 @@ def test_a_paused_program_says_what_go_on_will_leave_out() -> None:
     said = "Rover does not tell how much of “drive” is left; Go on leaves it out"
     run = RunState("paused", "Greeting", paused_at="drive 2 m", warning=said)
     assert view_of(run, ["Rover"], 1.0).detail == said
-    run.warning = ""
+    run = replace(run, warning="")
     assert view_of(run, ["Rover"], 1.0).detail == "Robots hold still; the clock stands"
 
 
@@ -59,7 +57,7 @@ def test_the_clock_stands_while_paused() -> None:
 def test_stopping_shows_only_after_100_ms_and_counts_the_answers() -> None:
     run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper", "Turtle"), elapsed_s=14.0)
     assert view_of(run, [], 10.05).stop_word == "Stop"
-    run.answered.append(PEPPER)
+    run = replace(run, answered=(PEPPER,))
     view = view_of(run, [], 10.2)
     assert (view.title, view.detail) == ("Stopping", "Waiting for Turtle, 0.2 s")
     assert (view.stop_word, view.result) == ("Stopping", "1 of 2 robots stopped")
@@ -139,10 +137,10 @@ def test_robots_are_counted_not_the_programs_that_serve_them() -> None:
 
 def test_a_robot_is_not_called_stopped_while_another_of_its_programs_is_waited_for() -> None:
     run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper",))
-    run.answered.append(replace(PEPPER, waits=True))
+    run = replace(run, answered=(replace(PEPPER, waits=True),))
     view = view_of(run, [], 10.2)
     assert (view.detail, view.result) == ("Waiting for Pepper, 0.2 s", "0 of 1 robots stopped")
-    run.answered.append(RobotStop("Pepper", True, 90.0, program="pepper 2"))
+    run = replace(run, answered=(*run.answered, RobotStop("Pepper", True, 90.0, program="pepper 2")))
     assert view_of(run, [], 10.2).result == "1 of 1 robots stopped"
 
 
@@ -169,15 +167,6 @@ def test_the_last_stop_stays_beside_a_running_program() -> None:
 )
 def test_seconds(value: float, words: str) -> None:
     assert seconds(value) == words
-
-
-def test_listed() -> None:
-    assert [listed([]), listed(["a"]), listed(["a", "b"]), listed(["a", "b", "c"])] == [
-        "",
-        "a",
-        "a and b",
-        "a, b and c",
-    ]
 
 
 def test_stop_words() -> None:

@@ -135,6 +135,7 @@ class _Compiler:
             *own,
             *functions,
         ]
+        actions = asked_actions(body)  # before the trees are changed
         source, lines = readable([*imports(body), *body, *ending(self._name)], self._marks)
         return Program(
             name=self._name,
@@ -147,6 +148,7 @@ class _Compiler:
             publishes=tuple(self._uses.publishes),
             listens=tuple(self._uses.listens),
             moves=tuple(self._uses.moves),
+            actions=actions,
             readings=self._readings,
             labels=self._labels,
             problems=self._notes.problems(),
@@ -397,6 +399,30 @@ def template(block: Block, placed: Placed, *, in_function: bool) -> str:
 def _is_plain(name: str) -> bool:
     """Whether Python can write this name before an equals sign."""
     return name.isidentifier() and name.isascii() and not keyword.iskeyword(name)
+
+
+def asked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None:
+    """What a program asks of each robot; None when that can't be told from it: then it may be anything.
+
+    It is read from the very tree that runs, so no block can ask for more than it says.
+    """
+    found: dict[str, dict[str, None]] = {}
+    for call in (node for statement in body for node in ast.walk(statement)):
+        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute)):
+            continue
+        if call.func.attr not in ("do", "ask"):
+            continue
+        robot, action = _first_text(call.func.value), _first_text(call)
+        if robot is None or action is None:
+            return None
+        found.setdefault(robot, {})[action] = None
+    return {robot: tuple(actions) for robot, actions in found.items()}
+
+
+def _first_text(node: ast.expr) -> str | None:
+    """The text that is the first argument of a call."""
+    first = node.args[0] if isinstance(node, ast.Call) and node.args else None
+    return first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else None
 
 
 def imports(body: Sequence[ast.stmt]) -> list[ast.stmt]:

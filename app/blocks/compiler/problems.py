@@ -11,6 +11,7 @@ from app.blocks.model.program import Problem, Severity
 from app.blocks.model.workspace import Placed, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Action
+from nep.i18n import listed
 
 _ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
 _NEEDS = {
@@ -183,7 +184,7 @@ class Notes:
         """A block that moves robots by publishing on their topics."""
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
-            who, name = " and ".join(real), self.label(placed, block)
+            who, name = listed(real), self.label(placed, block)
             sentence = f"{name} on {topic} moves {who}: you are asked before it does, and Stop stops it."
             self._note("info", placed, block, name, sentence)
 

@@ -35,8 +35,9 @@ class Program:
     ``source`` is for people, and runs as a file; ``lines`` gives the block of a line of it. ``runnable`` is
     the same tree with a ``step`` before each block. ``robots`` are those that its blocks name and that are
     there, and those that it moves by publishing on their topics (``moves``); ``sensors`` and ``events`` are
-    (robot, name). ``readings`` are the blocks in words ("wait 2 s"),
-    ``labels`` the words that name them ("wait").
+    (robot, name). ``actions`` are what its blocks ask of each robot, None when that can't be told: then it
+    may be anything. ``readings`` are the blocks in words ("wait 2 s"), ``labels`` the words that name them
+    ("wait").
     """
 
     name: str
@@ -49,6 +50,7 @@ class Program:
     publishes: tuple[str, ...] = ()
     listens: tuple[str, ...] = ()
     moves: tuple[str, ...] = ()
+    actions: Mapping[str, tuple[str, ...]] | None = None
     readings: Mapping[str, str] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
     problems: tuple[Problem, ...] = ()
@@ -63,7 +65,7 @@ class Program:
     def to_json(self) -> dict[str, object]:
         """What a child process needs to run it, as JSON can hold it."""
         kept = asdict(self)
-        for name in ("source", "lines", "problems", "absent"):
+        for name in ("source", "lines", "problems", "absent", "actions"):
             del kept[name]
         return kept
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.errors import AppError
+from nep.i18n import listed
 
 _KINDS = {
     "int": "a number",
@@ -57,4 +58,4 @@ def kind(value: object) -> str:
 def _kinds(sentence: str) -> str:
     """The kinds that Python names in its sentence: "a text and a number"."""
     words = [word for quoted, word in _KINDS.items() if f"'{quoted}'" in sentence]
-    return " and ".join(dict.fromkeys(words)) or "these values"
+    return listed(list(dict.fromkeys(words))) or "these values"

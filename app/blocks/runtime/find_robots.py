@@ -20,6 +20,7 @@ from app.robots.identity import (
     wrong_topic,
 )
 from nep.errors import NepError
+from nep.i18n import listed
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
@@ -158,7 +159,7 @@ def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> Found:
     claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
     claims += [
         f"{len(each.twins) + 1} programs say that they are {each.robot.name}: {each.owner.words} was first "
-        f"and is the robot; {' and '.join(each.twins)} changes nothing."
+        f"and is the robot; {listed(each.twins)} changes nothing."
         for each in asked.values()
         if each.twins and each.robot is not None
     ]

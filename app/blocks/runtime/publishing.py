@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from app.blocks.runtime.errors import BehaviourError
 from app.robots import rize
 from app.robots.description.description import Robot
+from nep.i18n import listed
 
 
 def moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:
@@ -45,7 +46,7 @@ class PublishGuard:
         """Raise BehaviourError when a message on this topic would move a robot that is not allowed."""
         names = [name for name in self._topics.get(topic, ()) if name not in self._allowed]
         if names:
-            who = " and ".join(names)
+            who = listed(names)
             raise BehaviourError(
                 f"Publishing on {topic} would move {who}, and nobody was asked whether it may. "
                 "Stop the behaviour and run it again."

@@ -18,6 +18,7 @@ from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.status_text import StatusText
 from app.robots.description.description import Action, Parameter, Robot
 from app.robots.description.inputs import from_words
+from nep.i18n import listed
 
 FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0
@@ -197,7 +198,7 @@ def _waiting(robot: Robot, call: Call) -> str:
     """What the robot does first: "Pepper waits for “say”"."""
     found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
     titles = [f"“{action.title if action is not None else name}”" for action, name in found]
-    return f"{robot.name} waits for {' and '.join(titles)}"
+    return f"{robot.name} waits for {listed(titles)}"
 
 
 def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:

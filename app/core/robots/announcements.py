@@ -18,6 +18,7 @@ from app.robots import rize
 from app.robots.description.description import Robot, announced
 from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
 from nep.errors import NepError
+from nep.i18n import listed
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
@@ -94,7 +95,7 @@ class Announcements:
                 continue
             if known.twins and known.owner is not None:
                 name = known.robot.name if known.robot is not None else topic
-                others = " and ".join(twin.words for twin in known.twins[:MOST_CLAIMANTS])
+                others = listed([twin.words for twin in known.twins[:MOST_CLAIMANTS]])
                 found[topic] = Claim(
                     f"{len(known.twins) + 1} programs say that they are {name}.",
                     f"{known.owner.words} was first and is the robot; {others} changes nothing. Close one.",

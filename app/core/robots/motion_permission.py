@@ -8,14 +8,15 @@ for its name, model, program and computer.
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from app.blocks.model.program import Program
 from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
+from nep.i18n import listed
 
 ALWAYS = "robots.may_move"
 MOST_NAMED = 4
@@ -37,7 +38,7 @@ class MayNotMoveError(AppError):
     def __init__(self, names: Sequence[str]) -> None:
         """Make the sentence from the robots' names."""
         self.names = tuple(names)
-        super().__init__(f"{' and '.join(names)} may not move yet; answer the question above first")
+        super().__init__(f"{listed(names)} may not move yet; answer the question above first")
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,13 @@ class Question:
     @property
     def title(self) -> str:
         """In bold: "Let Rover move?"."""
-        return f"Let {_listed(list(self.moves))} move?"
+        return f"Let {listed(list(self.moves))} move?"
 
     @property
     def sentence(self) -> str:
         """What would move, and how it is stopped."""
         told = [
-            f"{_listed(list(actions))} {'moves' if len(actions) == 1 else 'move'} {name}."
+            f"{listed(list(actions))} {'moves' if len(actions) == 1 else 'move'} {name}."
             for name, actions in self.moves.items()
         ]
         return f"{' '.join(told)} See that nobody stands in the way. Stop is F12, at any time."
@@ -142,44 +143,15 @@ def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     return (*titles[:MOST_NAMED], "more") if len(titles) > MOST_NAMED else tuple(titles)
 
 
-def actions_of(runnable: str) -> dict[str, tuple[str, ...]] | None:
-    """What a program asks of each robot; None when that can't be told from it: then it may be anything."""
-    found: dict[str, dict[str, None]] = {}
-    for call in ast.walk(ast.parse(runnable)):
-        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute)):
-            continue
-        if call.func.attr not in ("do", "ask"):
-            continue
-        robot, action = _literal(_argument(call.func.value)), _literal(_argument(call))
-        if robot is None or action is None:
-            return None
-        found.setdefault(robot, {})[action] = None
-    return {robot: tuple(actions) for robot, actions in found.items()}
-
-
-def wanted_by(
-    runnable: str, robots: Iterable[Robot], moves: Collection[str] = ()
-) -> list[tuple[Robot, Sequence[str]]]:
-    """The robots of a program with what it asks of each; of those that it `moves` by publishing anything."""
-    asked = actions_of(runnable)
+def wanted_by(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
+    """What a program asks of each of its robots: anything of those that it moves by publishing."""
+    asked, moved = program.actions, program.moves
     return [
         (
             robot,
             [action.name for action in robot.actions]
-            if asked is None or robot.name in moves
+            if asked is None or robot.name in moved
             else asked.get(robot.name, ()),
         )
         for robot in robots
     ]
-
-
-def _argument(node: ast.expr) -> ast.expr | None:
-    return node.args[0] if isinstance(node, ast.Call) and node.args else None
-
-
-def _literal(node: ast.expr | None) -> str | None:
-    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

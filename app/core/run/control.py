@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
@@ -84,6 +85,7 @@ class Runs:
         self._told_owners: Mapping[str, str] = {}  # the programs that its robots are, as it knows them
         self._robots_told = -1
         self._run = RunState()
+        self._view: tuple[RunState, Document, RunView] | None = None
         self._stop_number = 0
         self._asked_again: set[str] = set()
         self._stop_thread: threading.Thread | None = None
@@ -99,13 +101,21 @@ class Runs:
         """Whether a program runs or is paused."""
         return self._run.state in {"running", "paused"}
 
+    def tick(self) -> None:
+        """Time has gone on, robots may have come or gone, another behaviour may show: `view` is made anew."""
+        self._view = None
+        if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
+            self._run = replace(self._run, nothing_in=None)  # another behaviour shows, or this one was edited
+
     def view(self) -> RunView:
-        """What the run bar says now."""
-        names = [link.name for link in self._fleet.connected]
-        if self._run.nothing_in and self._run.nothing_in is not self._documents.current.newest():
-            self._run.nothing_in = None  # another behaviour shows, or this one was edited
-        elsewhere = self.document not in {None, self._documents.current}
-        return view_of(self._run, names, self._clock(), elsewhere=elsewhere, slow=self.pace_s > 0)
+        """What the run bar says: made once a tick, and again when something was done since then."""
+        run, current = self._run, self._documents.current
+        if self._view is None or self._view[0] is not run or self._view[1] is not current:
+            names = [link.name for link in self._fleet.connected]
+            elsewhere = self.document not in {None, current}
+            made = view_of(run, names, self._clock(), elsewhere=elsewhere, slow=self.pace_s > 0)
+            self._view = (run, current, made)
+        return self._view[2]
 
     def run(self) -> None:
         """Run the behaviour as it is now; while paused, go on. Problems are told on their blocks."""
@@ -125,7 +135,7 @@ class Runs:
 
     def set_pace(self, seconds: float) -> None:
         """Slow motion, also of the program that runs: each block waits so long before it is done."""
-        self.pace_s = seconds
+        self.pace_s, self._view = seconds, None
         if self._runner is not None:
             self._runner.set_pace(seconds)
 
@@ -139,10 +149,8 @@ class Runs:
         run = self._run
         if run.state == "paused" and self._runner is not None:
             self._runner.go_on()
-            if run.pause_began_s is not None:
-                run.held_s += self._clock() - run.pause_began_s
-                run.pause_began_s = None
-            run.state = "running"
+            held_s = 0.0 if run.pause_began_s is None else self._clock() - run.pause_began_s
+            self._run = replace(self._run, state="running", held_s=run.held_s + held_s, pause_began_s=None)
             self._mark(stopped=())
 
     def stop(self) -> None:
@@ -217,7 +225,7 @@ class Runs:
     def confirm_still(self) -> None:
         """A person says that the robot that did not answer stands still."""
         if self._run.state == "unanswered":
-            self._run.state, self._run.report = "ready", None
+            self._run = replace(self._run, state="ready", report=None)
             self._fleet.stands_still(self.kept)
             self.kept = frozenset()
             self._alerts.cure("stop")
@@ -239,12 +247,17 @@ class Runs:
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
                 if event.says and event.says != run.says:
-                    run.says = event.says
+                    self._run = replace(self._run, says=event.says)
                     self._console.add("info", run.name, event.says)
                 self._mark(running=event.blocks, stopped=self.stopped_blocks)
             case "paused" if run.state in {"running", "paused"}:
-                run.state, run.paused_at = "paused", place_of(event.says, event.blocks, self._labels)
-                run.pause_began_s, run.warning = run.pause_began_s or self._clock(), event.text
+                self._run = replace(
+                    self._run,
+                    state="paused",
+                    paused_at=place_of(event.says, event.blocks, self._labels),
+                    pause_began_s=run.pause_began_s or self._clock(),
+                    warning=event.text,
+                )
                 self._mark(stopped=event.blocks)
             case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
                 self._on_error(event)
@@ -255,7 +268,6 @@ class Runs:
 
     def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
         """Take over what robots answered to the newest stop."""
-        run = self._run
         if isinstance(event, OneStopped):
             self._tell_fleet(event.report)
             self._tell_person(event.report, "stop")
@@ -263,22 +275,22 @@ class Runs:
             self._on_late(event)
         elif event.number == self._stop_number:
             if isinstance(event, RobotAnswered):
-                run.answered.append(event.robot)
+                answered = (*self._run.answered, event.robot)
+                self._run = replace(self._run, answered=answered)
                 if event.robot.wrong or not event.robot.waits:
-                    same = [robot for robot in run.answered if robot.name == event.robot.name]
+                    same = [robot for robot in answered if robot.name == event.robot.name]
                     self._tell_fleet(StopReport(tuple(same), 0.0))
             else:
-                run.dashed = bool(self.stopped_blocks)
+                self._run = replace(self._run, dashed=bool(self.stopped_blocks))
                 self._take_report(event.report)
 
     def _take_report(self, report: StopReport) -> None:
         """How it stands is taken over before any words are made: no fault in them leaves it "stopping"."""
-        run = self._run
-        run.state, run.report = "proven" if report.proven else "unanswered", report
+        self._run = replace(self._run, state="proven" if report.proven else "unanswered", report=report)
         self.kept = frozenset(report.silent)
         self._tell_fleet(report)
-        run.last_words, _ = result_words(report)
-        self._tell_person(report, run.name or "stop")
+        self._run = replace(self._run, last_words=result_words(report)[0])
+        self._tell_person(report, self._run.name or "stop")
 
     def _on_late(self, event: LateAnswer) -> None:
         """A robot answered too late: what it says now counts, if nothing else has happened since."""
@@ -305,7 +317,7 @@ class Runs:
                 self._run = RunState(nothing_in=program, last_words=self._run.last_words)
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
-            wanted = wanted_by(program.runnable, used, program.moves)
+            wanted = wanted_by(program, used)
             if not self._fleet.moving.permits(wanted, self.step if paused else self.run):
                 return  # a person is asked first; the question stands in the window
             runner = Runner(self._post_event)
@@ -347,30 +359,37 @@ class Runs:
             self._mark()
         # the end of a program is a stop like any other: every robot that it used is told and must answer
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
-        self._run.finished = finished
+        self._run = replace(self._run, finished=finished)
         if not event.ok and not self.block_errors:
             self._alerts.put("program", "error", "The behaviour ended by itself.", event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
         """Stop these robots, or all."""
         run = self._run
-        run.pressed_s = self._clock()
-        run.again = run.state == "unanswered" or (run.state == "stopping" and run.again)
+        now, elapsed_s = self._clock(), run.elapsed_s
         if self.active:
-            run.elapsed_s = run.elapsed(run.pressed_s)
+            elapsed_s = run.elapsed(now)
         elif run.state not in {"stopping", "unanswered"}:
-            run.elapsed_s = None
-        run.state, run.report, run.answered, run.finished = "stopping", None, [], False
+            elapsed_s = None
         everybody = tuple(
             link.name
             for link in self._fleet.links
             if link.connected or link.not_stopped or link.name in self.kept
         )
         # those that an earlier stop has told and that have not answered: its own report is not waited for
-        run.asked = tuple(
-            dict.fromkeys((*(names if names is not None else everybody), *self._fleet.stopping))
+        asked = tuple(dict.fromkeys((*(names if names is not None else everybody), *self._fleet.stopping)))
+        self._run = replace(
+            self._run,
+            state="stopping",
+            pressed_s=now,
+            again=run.state == "unanswered" or (run.state == "stopping" and run.again),
+            elapsed_s=elapsed_s,
+            report=None,
+            answered=(),
+            finished=False,
+            asked=asked,
         )
-        self._fleet.told_to_stop(run.asked)
+        self._fleet.told_to_stop(asked)
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(
@@ -378,7 +397,7 @@ class Runs:
             self._stop_number,
             self._runner,
             self._network.stopper,
-            run.asked,
+            asked,
             self._program_key,
         )
         self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
@@ -433,7 +452,8 @@ class Runs:
         )
 
     def _set_errors(self, errors: Mapping[str, str]) -> None:
-        self.block_errors = self._run.errors = errors
+        self.block_errors = errors
+        self._run = replace(self._run, errors=errors)
         self.blocks_revision += 1
 
     def _mark(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport
+from nep.i18n import listed
 
 MOST_NAMED = 4
 WIDEST_NAMES = 24
@@ -14,13 +15,13 @@ WIDEST_NAMES = 24
 NOTHING = "Take “when started” from Events and hang blocks below it"
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class RunState:
-    """Where the run is. ``state`` is ready, running, paused, stopping, proven or unanswered.
+    """Where the run is, as a value: what happens makes another one.
 
-    ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the
-    program's clock stands while it is paused (``held_s``, ``pause_began_s``). ``again``: the stop before this
-    one is not proven.
+    ``state`` is ready, running, paused, stopping, proven or unanswered. ``warning`` is what a person should
+    know before a paused program goes on. Times are monotonic seconds; the program's clock stands while it is
+    paused (``held_s``, ``pause_began_s``). ``again``: the stop before this one is not proven.
     """
 
     state: str = "ready"
@@ -35,7 +36,7 @@ class RunState:
     pressed_s: float = 0.0
     again: bool = False
     asked: tuple[str, ...] = ()
-    answered: list[RobotStop] = field(default_factory=list)
+    answered: tuple[RobotStop, ...] = ()
     report: StopReport | None = None
     finished: bool = False
     dashed: bool = False
@@ -211,13 +212,6 @@ def seconds(value: float) -> str:
     """``14 s``, ``2 min 5 s``: whole seconds, as a person reads a clock."""
     whole = int(value)
     return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
-
-
-def listed(names: Sequence[str]) -> str:
-    """``Pepper``, ``Pepper and Turtle``, ``Pepper, NAO and Turtle``."""
-    if len(names) <= 1:
-        return "".join(names)
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def connected_words(names: Sequence[str]) -> str:

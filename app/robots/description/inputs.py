@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from app.robots.description.json_access import as_part, names, number, number_of, part, text
+from nep.i18n import listed
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
@@ -132,10 +133,10 @@ def kind_of(data: Mapping[str, object]) -> str:
 
 def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
     """The values that a data schema lists, with their words; empty when it lists none."""
-    listed = data.get("enum")
+    enum = data.get("enum")
     pairs: list[tuple[object, object]] = []
-    if isinstance(listed, (list, tuple)):
-        pairs = [(value, None) for value in listed]
+    if isinstance(enum, (list, tuple)):
+        pairs = [(value, None) for value in enum]
     named = data.get("oneOf")
     if isinstance(named, (list, tuple)):
         pairs = [(as_part(item).get("const"), as_part(item).get("title")) for item in named]
@@ -213,7 +214,7 @@ def wrong_value(parameter: Parameter, value: object) -> str | None:
     if parameter.choices:
         if any(_same(choice.value, value) for choice in parameter.choices):
             return None
-        return f"must be {_listed([choice.title for choice in parameter.choices])}"
+        return f"must be {listed([choice.title for choice in parameter.choices], 'or')}"
     if parameter.kind in {"number", "integer", "angle"}:
         return _wrong_number(parameter, value)
     if parameter.kind == "boolean":
@@ -319,7 +320,3 @@ def _wrong_text(parameter: Parameter, value: object) -> str | None:
     if parameter.max_length is not None and len(value) > parameter.max_length:
         return f"must be at most {parameter.max_length} characters long"
     return None
-
-
-def _listed(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"

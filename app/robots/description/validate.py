@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from app import resources
 from app.robots.description.inputs import parameter_of, wrong_value
 from app.robots.description.json_access import as_part, names, part
+from nep.i18n import listed
 from nep.text import control_in
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ def _sentence(error: ValidationError) -> str:
         return f"{place} has no '{error.message.split(chr(39))[1]}'"
     if rule == "type":
         kinds = limit if isinstance(limit, list) else [limit]
-        return f"{place} must be {' or '.join(_TYPE_WORDS.get(str(kind), str(kind)) for kind in kinds)}"
+        return f"{place} must be {listed([_TYPE_WORDS.get(str(kind), str(kind)) for kind in kinds], 'or')}"
     if rule == "enum":
         return f"{place} must be one of {', '.join(names(limit))}"
     if rule == "const":

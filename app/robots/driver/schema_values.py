@@ -15,6 +15,7 @@ from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
 
 from app.errors import RobotValueError
+from nep.i18n import listed
 
 _LONGEST_SHOWN = 40
 _DEEPEST = 40
@@ -142,7 +143,7 @@ def told(annotation: object, value: object) -> object:
         found = [json for json, python, _ in choices if python is value or same(json, value)]
         if not found:
             words = [str(json) for json, _, _ in choices]
-            raise RobotValueError(f"must be {' or '.join(words)}, not {_shown_value(value)}")
+            raise RobotValueError(f"must be {listed(words, 'or')}, not {_shown_value(value)}")
         return found[0]
     if kind in (float, int, bool, str):
         return _simple(kind, value)
@@ -164,7 +165,9 @@ def told_fields(
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
     if not isinstance(value, Mapping):
-        raise RobotValueError(f"must have {_listed(list(kinds))}, not be {_shown_value(value)}")
+        raise RobotValueError(
+            f"must have {listed(list(kinds)) or 'named values'}, not be {_shown_value(value)}"
+        )
     made: dict[str, object] = {}
     for name, each in value.items():
         try:
@@ -281,13 +284,3 @@ def _out_of_numpy(value: object) -> object:
 def _shown_value(value: object) -> str:
     words = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else type(value).__name__
     return words if len(words) <= _LONGEST_SHOWN else f"{words[:_LONGEST_SHOWN]}…"
-
-
-def _listed(words: Sequence[str]) -> str:
-    return (
-        words[0]
-        if len(words) == 1
-        else f"{', '.join(words[:-1])} and {words[-1]}"
-        if words
-        else "named values"
-    )

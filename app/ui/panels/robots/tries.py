@@ -19,6 +19,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
+from nep.i18n import listed
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation
@@ -95,8 +96,8 @@ def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) 
         return "asked"
     if made.state == "accepted":
         if made.waits_for:
-            return f"waits for {_listed([title_of(name) for name in made.waits_for])}"
-        return f"replaces {_listed([title_of(name) for name in made.replaces])}" if made.replaces else "asked"
+            return f"waits for {listed([title_of(name) for name in made.waits_for])}"
+        return f"replaces {listed([title_of(name) for name in made.replaces])}" if made.replaces else "asked"
     return feedback_words(action, made.feedback) or f"for {seconds_words(made.elapsed_s)}"
 
 
@@ -124,10 +125,6 @@ def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, st
 
 def _sentence(words: str) -> str:
     return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') or not words else '.'}"
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _number(value: object) -> float | None:
