@@ -10,7 +10,7 @@ import pytest
 
 from app.core.messages import reader as reader_module
 from app.core.messages.lazy_json import LazyObject
-from app.core.messages.reader import Reader, Reading, read
+from app.core.messages.reader import LARGE_BYTES, Reader, Reading, read
 from nep.messages.message import Message
 
 WAIT_S = 30.0  # a busy computer may take long; the test ends as soon as it is there
@@ -37,13 +37,27 @@ def taken(reader: Reader) -> Reading:
     raise AssertionError("nothing was read")
 
 
-def test_json_is_looked_into_and_other_messages_are_decoded() -> None:
+def large(text: bytes) -> bytes:
+    """The same JSON, so large that it is looked into."""
+    return text + b" " * LARGE_BYTES
+
+
+def test_a_small_message_is_decoded_and_a_bad_one_says_why_it_cant_be() -> None:
     found = read(message(b'{"a": [1, 2]}'))
+    assert (found.value, found.index, found.error) == ({"a": [1, 2]}, None, None)
+    bad = read(message(b"{bad"))
+    assert bad.error
+    assert bad.value is None
+    assert read(message(b"{}", seq=2)).error is None
+
+
+def test_large_json_is_looked_into_and_other_messages_are_decoded() -> None:
+    found = read(message(large(b'{"a": [1, 2]}')))
     assert isinstance(found.value, LazyObject)
     assert found.index is not None
     assert read(message(b"text", "string")).value == "text"
     assert read(message(b"\xff", "string")).error is not None
-    assert read(message(b'{"a": ')).error == "its brackets do not match"
+    assert read(message(large(b'{"a": '))).error == "its brackets do not match"
 
 
 def test_it_reads_in_another_thread(reader: Reader, monkeypatch) -> None:

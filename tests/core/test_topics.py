@@ -134,16 +134,6 @@ def test_newest_and_previous_message_and_all_that_arrived() -> None:
     assert topic.newest is None
 
 
-def test_a_message_that_cant_be_decoded_gives_its_sentence_and_a_good_one_cures_it() -> None:
-    topics = Topics()
-    topics.add("/a", Batch([message(1, b"{bad")]), 0)
-    assert not topics.check(topics["/a"])
-    assert topics["/a"].decode_error
-    topics.add("/a", Batch([message(2)]), 0)
-    assert topics.check(topics["/a"])
-    assert topics["/a"].decode_error is None
-
-
 def test_age_without_stamps_counts_from_the_arrival() -> None:
     topics = Topics()
     topics.update(view(info("/a", last_stamp_ns=None)), 0)

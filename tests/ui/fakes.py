@@ -51,7 +51,6 @@ class Topic:
     received: int = 0
     dropped: int = 0
     missed: int = 0
-    decode_error: str | None = None
     watched: bool = False
 
     @property
@@ -100,17 +99,6 @@ class Topics:
         if name in self and self[name].new:
             self[name].new = False
             self.revision += 1
-
-    def check(self, topic: Topic) -> bool:
-        if topic.newest is None:
-            return True
-        try:
-            _ = topic.newest.payload
-        except Exception as error:  # noqa: BLE001
-            topic.decode_error = str(error)
-            return False
-        topic.decode_error = None
-        return True
 
 
 class Watch:

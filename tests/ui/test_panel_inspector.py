@@ -12,12 +12,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
 from app.core.messages import lazy_json
+from app.core.messages.reader import LARGE_BYTES
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE
 from app.ui.panels.inspector.diff import OFF, changes_words, count_changes
 from app.ui.panels.inspector.footer import message_facts
 from app.ui.panels.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.inspector.tree_model import TreeNode
-from app.ui.panels.inspector.values import LARGE_BYTES, image_summary, plain_words
+from app.ui.panels.inspector.values import image_summary, plain_words
 from nep.messages.message import Message, kind_of
 from tests.ui.fakes import Session, blackboard
 from tests.ui.panel_case import Window, button, press, ticks

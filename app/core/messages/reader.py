@@ -1,4 +1,4 @@
-"""Decodes large messages in a thread of its own: one at a time, the newest only."""
+"""Reads a message for people: a small one at once, large ones in a thread, one at a time, the newest only."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from app.core.messages.lazy_json import JsonIndex
 from nep.errors import NepError
 from nep.messages.message import Message
 
+LARGE_BYTES = 1_000_000
+"""JSON above this is looked into, not decoded; what is larger is never read in the window's thread."""
 EVERY_S = 1.0
 
 
@@ -16,7 +18,7 @@ EVERY_S = 1.0
 class Reading:
     """A message that was read: its ``value``, or the sentence why it can't be (``error``).
 
-    ``index`` tells where things are in a JSON text; None for other messages.
+    ``index`` tells where things are in a large JSON text; None for other messages.
     """
 
     message: Message
@@ -26,17 +28,16 @@ class Reading:
 
 
 def read(message: Message) -> Reading:
-    """Read a message, in any thread; JSON is not decoded but looked into (`app.core.messages.lazy_json`)."""
-    if message.codec == "json":
-        try:
-            index = JsonIndex(message.data)
-        except ValueError as error:
-            return Reading(message, error=str(error))
-        return Reading(message, index.root, index=index)
+    """Read a message, in any thread; large JSON is looked into (`app.core.messages.lazy_json`)."""
     try:
+        if message.codec == "json" and message.size_bytes > LARGE_BYTES:
+            index = JsonIndex(message.data)
+            return Reading(message, index.root, index=index)
         return Reading(message, message.payload)
-    except NepError as error:
+    except (NepError, ValueError) as error:
         return Reading(message, error=str(error))
+    except MemoryError:
+        return Reading(message, error="there is not enough memory for it")
 
 
 class Reader:
@@ -108,14 +109,7 @@ class Reader:
                     return
                 message = self._reading = self._waiting
                 self._waiting = None
-            done = _read_or_say(message)
+            done = read(message)
             with self._wake:
                 if self._reading is message:  # else nobody wants it any more
                     self._done, self._reading = done, None
-
-
-def _read_or_say(message: Message) -> Reading:
-    try:
-        return read(message)
-    except MemoryError:
-        return Reading(message, error="there is not enough memory for it")

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 from app.core.network.mailbox import Batch
-from nep.errors import NepError
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, TopicInfo
 
@@ -55,7 +54,6 @@ class Topic:
     received: int = 0
     dropped: int = 0
     missed: int = 0
-    decode_error: str | None = None
     watched: bool = False
     gone_since: float | None = None
     last_stamp_ns: int | None = None
@@ -210,27 +208,11 @@ class Topics:
         topic.last_received = topic.moved_at = now
         self.values_revision += 1
 
-    def check(self, topic: Topic) -> bool:
-        """Decode the newest message of a topic that somebody reads; the sentence is kept.
-
-        Whether it is good.
-        """
-        if topic.newest is None:
-            return True
-        try:
-            _ = topic.newest.payload
-        except NepError as error:
-            topic.decode_error = str(error)
-            return False
-        topic.decode_error = None
-        return True
-
     def unwatch(self, name: str) -> None:
         """Nobody looks any more: forget its messages."""
         topic = self._topics.get(name)
         if topic is not None:
             topic.newest = topic.previous = None
-            topic.decode_error = None
             topic.received = topic.dropped = topic.missed = 0
             topic.last_received = None
             topic.watched = False

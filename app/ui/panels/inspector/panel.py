@@ -10,16 +10,15 @@ from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QVBoxLayout
 
-from app.core.messages.reader import Reader, Reading
+from app.core.messages.reader import LARGE_BYTES, Reader, Reading
 from app.ui.panels.base import ANY_TYPE, Panel, PanelContext, PanelWidget
 from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE, InspectorBody
 from app.ui.panels.inspector.diff import OFF, count_changes
 from app.ui.panels.inspector.footer import message_facts
-from app.ui.panels.inspector.values import LARGE_BYTES, image_summary, payload_or, tells_its_shape
+from app.ui.panels.inspector.values import payload_or, read_at_once
 from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.menus import Menu
-from nep.errors import NepError
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
@@ -41,7 +40,7 @@ class InspectorPanel(PanelWidget):
         self._watch: Watch | None = None
         self._shown: Message | None = None
         self._allowed: Message | None = None  # a large message that a person wants to read
-        self._reading: Reading | None = None  # what the tree shows, when it was read elsewhere
+        self._reading: Reading | None = None  # what the tree shows
         self._raw_wanted = False
         self._since_ns = 0  # when the panel began to look
         self._facts_of: tuple[Message | None, str] = (None, "")
@@ -113,7 +112,7 @@ class InspectorPanel(PanelWidget):
         self.live.set(*chip_words(topic, self.frozen))
         newest = topic.newest if topic is not None and topic.gone_s is None else None
         if topic is not None and newest is not None and newest is not self._shown and not self.frozen:
-            self._take(topic, newest)
+            self._take(newest)
         if self.body.page == NOTHING:
             self.body.say_waiting(self._topic, topic is not None and topic.publishers > 0)
         done = self.reader.take()
@@ -123,7 +122,7 @@ class InspectorPanel(PanelWidget):
         if self.body.page == TREE and self.tree.fading():
             self.tree.viewport().update()
 
-    def _take(self, topic: Topic, message: Message) -> None:
+    def _take(self, message: Message) -> None:
         large = message.size_bytes > LARGE_BYTES and message.codec != "image"
         if self._raw_wanted:
             self._show_raw(message, "")
@@ -131,19 +130,8 @@ class InspectorPanel(PanelWidget):
             self._offer_large(message)
         elif large:
             self._read_elsewhere(message)
-        elif tells_its_shape(message) or message is not topic.newest or self.session.topics.check(topic):
-            self._show_decoded(message)
         else:
-            self._show_raw(message, topic.decode_error or "")
-
-    def _show_decoded(self, message: Message) -> None:
-        """Show it as a tree; a message that is held may be bad although the newest one is not."""
-        try:
-            value = image_summary(message) if message.codec == "image" else message.payload
-        except NepError as error:
-            self._show_raw(message, str(error))
-        else:
-            self._show_tree(message, value, None)
+            self._show_read(read_at_once(message))
 
     def _read_elsewhere(self, message: Message) -> None:
         """Let the reader's thread look into it; until then what was there stays."""
@@ -154,21 +142,20 @@ class InspectorPanel(PanelWidget):
             self._page(LARGE)
 
     def _show_read(self, done: Reading) -> None:
+        """Show it as a tree, or as bytes with the sentence why it can't be read."""
+        message = done.message
         if done.error is not None:
-            self._show_raw(done.message, done.error)
-        else:
-            self._show_tree(done.message, done.value, done)
-
-    def _show_tree(self, message: Message, value: object, reading: Reading | None) -> None:
+            self._show_raw(message, done.error)
+            return
         fresh = message is not self._shown
-        self._shown, self._reading = message, reading
+        self._shown, self._reading = message, done
         if fresh:
-            self._before, self._value = (self._value if self._value is not None else OFF), value
+            self._before = self._value if self._value is not None else OFF
             topic = self.session.topics.get(self._topic)
-            if reading is None and topic is not None and topic.previous is not None:
+            if message.size_bytes <= LARGE_BYTES and topic is not None and topic.previous is not None:
                 self._before = payload_or(topic.previous, self._before)
             self.finder.forget()
-        self._value = value
+        self._value = done.value
         self._show_value()
         self.foot.show_facts(self._facts(message), self.clock())
         self._page(TREE)
@@ -245,13 +232,13 @@ class InspectorPanel(PanelWidget):
 
     def _set_mode(self, mode: str) -> None:
         self._raw_wanted = mode == "raw"
-        topic, shown = self.session.topics.get(self._topic), self._shown
+        shown = self._shown
         if shown is None:
             return
         if self._reading is not None and self._reading.message is shown and not self._raw_wanted:
             self._show_read(self._reading)
-        elif topic is not None:
-            self._take(topic, shown)
+        elif self.session.topics.get(self._topic) is not None:
+            self._take(shown)
 
     def _chosen(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")

@@ -8,6 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from app.core.messages.lazy_json import LazyList, LazyObject
+from app.core.messages.reader import LARGE_BYTES, Reading, read
 from app.ui.text.numbers import size_words
 from nep.errors import NepError
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 TEXT_LIMIT = 400
 SEARCH_LIMIT = 20_000
-LARGE_BYTES = 1_000_000  # above, a message is never decoded in the window's thread
 
 
 def is_container(value: object) -> bool:
@@ -94,19 +94,22 @@ def plain_words(value: object) -> str:
     return json.dumps(value, indent=2, ensure_ascii=False, default=str)
 
 
+def read_at_once(message: Message) -> Reading:
+    """A small message, or what is worth reading of a picture; in the window's thread."""
+    if message.codec != "image":
+        return read(message)
+    try:
+        return Reading(message, image_summary(message))
+    except NepError as error:
+        return Reading(message, error=str(error))
+
+
 def payload_or(message: Message, otherwise: object) -> object:
     """A message's decoded value; ``otherwise`` for what can't be read or is too large to be read here."""
     if message.size_bytes > LARGE_BYTES or message.codec == "image":
         return otherwise
-    try:
-        return message.payload
-    except NepError:
-        return otherwise
-
-
-def tells_its_shape(message: Message) -> bool:
-    """Whether it is a picture that can be summed up without decoding it."""
-    return message.codec == "image" and message.extension.get("shape") is not None
+    found = read(message)
+    return otherwise if found.error is not None else found.value
 
 
 def image_summary(message: Message) -> Mapping[str, object]:
