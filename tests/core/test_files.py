@@ -161,7 +161,7 @@ def modes(folder: Path) -> dict[str, int]:
 def test_what_concerns_only_its_user_is_private_whatever_the_umask(tmp_path: Path) -> None:
     home = tmp_path / "home"
     Settings(home).set("a", 1)
-    Journal(home / "journal").write("x", None, {}, {})
+    Journal(home / "journal").write("x", None, "{}", {})
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"{}")
     kept = keep_earlier(document, home / "earlier")

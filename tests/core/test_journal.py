@@ -13,6 +13,7 @@ import pytest
 from app.core.documents.journal import Journal, left_behind
 
 WORKSPACE: dict[str, object] = {"blocks": {"blocks": [{"type": "events_started", "id": "é\ud800"}]}}
+TEXT = json.dumps(WORKSPACE, ensure_ascii=False)
 
 
 def _killed_writer(folder: Path) -> None:
@@ -21,7 +22,7 @@ def _killed_writer(folder: Path) -> None:
         "from app.core.documents.journal import Journal\n"
         "j = Journal(pathlib.Path(sys.argv[1]), clock=lambda: 123.0)\n"
         "j.write('Greeting', pathlib.Path('/a/greeting.nepb'),"
-        " {'blocks': 1}, {'Pepper': {'title': 'Pepper'}})\n"
+        " '{\"blocks\": 1}', {'Pepper': {'title': 'Pepper'}})\n"
         "os.kill(os.getpid(), 9)\n"
     )
     subprocess.run([sys.executable, "-c", code, str(folder)], check=False)
@@ -29,7 +30,7 @@ def _killed_writer(folder: Path) -> None:
 
 def test_work_of_a_living_process_is_not_offered(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
-    journal.write("Greeting", None, WORKSPACE, {})
+    journal.write("Greeting", None, TEXT, {})
     assert left_behind(tmp_path) == []
     journal.discard()
     assert list(tmp_path.iterdir()) == []
@@ -48,10 +49,10 @@ def test_work_of_a_killed_process_is_offered(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="Windows does not replace a file that is open")
 def test_a_journal_is_replaced_whole(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
-    journal.write("first", None, WORKSPACE, {})
+    journal.write("first", None, TEXT, {})
     (file,) = tmp_path.iterdir()
     with file.open("rb") as reader:
-        journal.write("second, which is longer", None, WORKSPACE, {})
+        journal.write("second, which is longer", None, TEXT, {})
         assert json.loads(reader.read())["name"] == "first"
     assert json.loads(file.read_bytes())["name"] == "second, which is longer"
     journal.discard()
@@ -59,7 +60,7 @@ def test_a_journal_is_replaced_whole(tmp_path: Path) -> None:
 
 def test_a_pid_that_another_program_got_does_not_hide_the_work(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
-    journal.write("Greeting", None, WORKSPACE, {})
+    journal.write("Greeting", None, TEXT, {})
     (file,) = tmp_path.glob("*.json")
     entry = json.loads(file.read_bytes())
     entry["born_s"] -= 1000
@@ -84,6 +85,6 @@ def test_a_folder_that_takes_no_files_ends_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     journal = Journal(tmp_path / "file" / "journal")
     with pytest.raises(OSError, match=r"[Nn]ot a directory|cannot find|exists"):
-        journal.write("a", None, {}, {})
+        journal.write("a", None, "{}", {})
     journal.discard()
     assert left_behind(tmp_path / "file" / "journal") == []

@@ -12,6 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from app import resources
+from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.blockly.view import BlocklyView
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "blockly"
@@ -64,10 +65,10 @@ class Person:
         self._qtbot.waitUntil(seen, timeout=WAIT_MS)
 
     def newest(self) -> dict:
-        got: list[dict] = []
+        got: list[WorkspaceJson] = []
         self.view.flush(got.append)
         self._qtbot.waitUntil(lambda: bool(got), timeout=WAIT_MS)
-        return got[0]
+        return dict(got[0].blocks)
 
     def tops(self) -> list[dict]:
         return self.newest().get("blocks", {}).get("blocks", [])

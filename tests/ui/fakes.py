@@ -18,6 +18,7 @@ import numpy as np
 from app.blocks import Problem, editor_definitions
 from app.core.alerts import Alerts
 from app.core.console import Console
+from app.core.documents.workspace_json import WorkspaceJson
 from app.core.messages.picture import Picture
 from app.core.network.nodes import Nodes
 from app.core.robots.known import KnownRobots
@@ -341,7 +342,12 @@ class Document:
         self._newest: tuple[object, SimpleNamespace] | None = None
         self.absent_blocks: tuple[str, ...] = ("b8", "b9")
 
-    def edited(self, workspace: Mapping[str, object]) -> None:
+    @property
+    def has_blocks(self) -> bool:
+        return WorkspaceJson.of(self.workspace).has_blocks
+
+    def edited(self, workspace: Mapping[str, object] | WorkspaceJson) -> None:
+        workspace = workspace.blocks if isinstance(workspace, WorkspaceJson) else workspace
         self.calls.append(("edited", workspace))
         self.workspace, self.edits, self.dirty = workspace, self.edits + 1, True
 

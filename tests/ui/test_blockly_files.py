@@ -8,6 +8,7 @@ import random
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
+from app.core.documents.workspace_json import WorkspaceJson
 from app.core.storage import deep_json
 from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, UNKNOWN, WAIT_MS, workspace
 
@@ -50,10 +51,10 @@ def test_a_damaged_file_is_kept_as_it_is(person):
 
 
 def test_before_the_page_exists_the_view_knows_its_program(qtbot, view):
-    got: list[dict] = []
+    got: list[WorkspaceJson] = []
     view.load(PICTURE)
     view.flush(got.append)
-    assert got == [PICTURE]
+    assert [each.blocks for each in got] == [PICTURE]
 
 
 def test_blocks_nobody_knows_come_back_as_they_were(person):

@@ -25,10 +25,10 @@ def test_a_block_dragged_under_the_hat_snaps_there(qtbot, view, person):
         them.move(start, QPoint(700, 300))
         them.move(QPoint(700, 300), end)
         them.drop(end)
-    (top,) = changed.args[1]["blocks"]["blocks"]
+    (top,) = changed.args[1].blocks["blocks"]["blocks"]
     assert top["next"]["block"]["type"] == "control_wait"
     assert top["next"]["block"]["inputs"]["SECONDS"]["shadow"]["fields"] == {"NUMBER": 1}
-    assert them.newest() == changed.args[1]
+    assert them.newest() == changed.args[1].blocks
 
 
 def test_what_is_flushed_while_a_block_is_in_the_hand_is_a_program(qtbot, view, person):

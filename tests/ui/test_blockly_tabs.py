@@ -9,7 +9,8 @@ import signal
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.ui.blockly.tabs import EMPTY, Tabs
+from app.core.documents.workspace_json import EMPTY, WorkspaceJson
+from app.ui.blockly.tabs import Tabs
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
@@ -23,26 +24,26 @@ TABS = "document.querySelectorAll('.nepTab').length"
 
 def test_the_first_tab_goes_when_a_real_one_comes() -> None:
     tabs = Tabs()
-    assert tabs.shown.workspace == EMPTY
-    assert tabs.show("a", A) == ""
+    assert tabs.shown.program.blocks == EMPTY
+    assert tabs.show("a", WorkspaceJson.of(A)) == ""
     assert tabs[""] is None
-    assert tabs.show("b", B) is None
-    assert tabs.show("a", {}) is None
-    assert tabs.shown.workspace == A
+    assert tabs.show("b", WorkspaceJson.of(B)) is None
+    assert tabs.show("a", WorkspaceJson.of({})) is None
+    assert tabs.shown.program.blocks == A
 
 
 def test_edits_of_a_closed_or_replaced_program_do_not_count() -> None:
     tabs = Tabs()
-    tabs.show("a", A)
+    tabs.show("a", WorkspaceJson.of(A))
     before = tabs.shown.generation
     assert tabs.edited("a", before) is tabs.shown
-    tabs.replace(B)
+    tabs.replace(WorkspaceJson.of(B))
     assert tabs.edited("a", before) is None
     generation = tabs.shown.generation
     assert tabs.close("a")
     assert tabs.edited("a", generation) is None
     assert not tabs.close("a")
-    assert tabs.shown.workspace == EMPTY
+    assert tabs.shown.program.blocks == EMPTY
 
 
 @pytest.fixture
@@ -105,7 +106,7 @@ def test_zoom_and_place_stay_with_the_tab(qtbot, view, two) -> None:
 @pytest.mark.web
 def test_an_edit_just_before_leaving_is_told_with_its_tab(qtbot, view, two) -> None:
     two.open_category("Control")
-    told: list[tuple[str, dict]] = []
+    told: list[tuple[str, WorkspaceJson]] = []
     view.changed.connect(lambda *each: told.append(each))
     two.drag(".nepTab:not([hidden]) .blocklyFlyout .control_wait", QPoint(700, 400))
     qtbot.waitUntil(lambda: len(two.tops()) == 2, timeout=WAIT_MS)  # the page has seen the drop
@@ -182,7 +183,7 @@ def test_the_keys_go_to_the_tab_that_is_shown(qtbot, view, two) -> None:
 
 
 def test_a_change_from_outside_is_one_edit_that_undo_takes_back(qtbot, two, view) -> None:
-    told: list[tuple[str, object]] = []
+    told: list[tuple[str, WorkspaceJson]] = []
     view.changed.connect(lambda key, program: told.append((key, program)))
     here = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklyDraggable')].map(e => e.dataset.id)"
     before = two.ask(here)
@@ -195,6 +196,6 @@ def test_a_change_from_outside_is_one_edit_that_undo_takes_back(qtbot, two, view
     assert two.ask(here) == before
     qtbot.waitUntil(lambda: bool(told), timeout=WAIT_MS)
     assert told[-1][0] == "a"
-    assert "added" not in str(told[-1][1])
+    assert "added" not in told[-1][1].text
     view.redo()
     two.wait_for(f"({here}).includes('added')")

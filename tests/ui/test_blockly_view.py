@@ -14,6 +14,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 
+from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.blockly.view import BlocklyView
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, Person, outlined, workspace
 
@@ -151,11 +152,11 @@ def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
     before = them.newest()
     view.set_theme(TOKENS, dark=True)
     view.highlight(["start"])
-    got: list[dict] = []
+    got: list[WorkspaceJson] = []
     with qtbot.waitSignal(view.ready, timeout=60_000):
         os.kill(view.web.page.renderProcessPid(), signal.SIGKILL)
         view.flush(got.append)
-    qtbot.waitUntil(lambda: got == [before], timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: [each.blocks for each in got] == [before], timeout=WAIT_MS)
     assert them.newest() == before
     them.wait_for(outlined("running"), ["start"])
     dark = QColor(TOKENS["colour"]["dark"]["workspace"]).getRgb()[:3]

@@ -138,7 +138,7 @@ def test_everything_that_shows_first_has_our_fonts(
     application.setStyleSheet("")
     application.setFont(QFont("DejaVu Serif"))  # as the system gives it: nothing of ours is applied yet
     journal = Journal(tmp_path / "journal")
-    journal.write("Walk", None, {"blocks": {"blocks": [{"type": "x", "id": "a"}]}}, {})
+    journal.write("Walk", None, '{"blocks": {"blocks": [{"type": "x", "id": "a"}]}}', {})
     monkeypatch.setattr("app.core.documents.journal._alive", lambda _pid, _born_s: False)
     (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
     window = make_window(Session(Settings(tmp_path), start_companions=False), Options())

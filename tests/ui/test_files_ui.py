@@ -8,6 +8,7 @@ import pytest
 
 from app.core.documents.document import Document
 from app.core.documents.versions import free_path
+from app.core.run.view import RunState
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 from tests.ui.shell_parts import Answers
@@ -277,7 +278,7 @@ def test_a_tab_that_can_not_be_saved_stays(commands, window, tmp_path: Path) -> 
 def test_closing_the_tab_of_a_program_stops_it(commands, window, monkeypatch) -> None:
     runs, stopped = window.session.runs, []
     window.session.document.edited(BLOCKS)
-    runs.document, runs._run.state = window.session.document, "running"
+    runs.document, runs._run = window.session.document, RunState("running")
     monkeypatch.setattr(runs, "stop", lambda: stopped.append(True))
     commands.run("tab.close")
     assert stopped == [True]

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
 
 from app.core.documents.journal import Journal, left_behind
 from app.core.faults import SaidOnce
-from app.core.run.view import RunView
+from app.core.run.view import RunState, RunView
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
@@ -535,7 +535,7 @@ def test_closing_while_a_program_runs_stops_the_robots_at_once(
 ) -> None:
     done: list[str] = []
     show(qtbot, window)
-    monkeypatch.setattr(window.session.runs._run, "state", "running")
+    monkeypatch.setattr(window.session.runs, "_run", RunState("running"))
     monkeypatch.setattr(window.session.runs, "stop", lambda: done.append("stop"))
     monkeypatch.setattr(window.session, "close", lambda: done.append("close"))
     window.close()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -15,7 +15,6 @@ END_S = 2.0
 
 QUICK_S = 0.02
 """A behaviour that compiles faster than this is compiled at once, in the window's thread."""
-LONG_CHARACTERS = 20_000
 Key = tuple[int, int, int]
 
 
@@ -99,13 +98,3 @@ def compiled(key: Key, compiling: Callable[[], Program], timer: Callable[[], flo
     """Compile, and take the time."""
     began = timer()
     return Compiled(key, compiling(), timer() - began)
-
-
-def is_long(workspace: Mapping[str, object]) -> bool:
-    """Whether a behaviour that was never compiled is worth a thread."""
-    inner = workspace.get("blocks")
-    tops = inner.get("blocks") if isinstance(inner, Mapping) else None
-    try:
-        return tops is not None and len(repr(tops)) > LONG_CHARACTERS
-    except RecursionError:
-        return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import json
 import time
@@ -13,7 +12,13 @@ from pathlib import Path
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.fixes.fixes import mend
 from app.blocks.fixes.replace_robot import blocks_of, use_robot
-from app.core.documents.background_compile import QUICK_S, BackgroundWorker, Compiled, Key, compiled, is_long
+from app.core.documents.background_compile import (
+    QUICK_S,
+    BackgroundWorker,
+    Compiled,
+    Key,
+    compiled,
+)
 from app.core.documents.file_format import (
     TOO_DEEP,
     BehaviourFile,
@@ -24,6 +29,7 @@ from app.core.documents.file_format import (
 )
 from app.core.documents.journal import Journal, Unsaved
 from app.core.documents.versions import Stamp, stamp_of
+from app.core.documents.workspace_json import LONG_CHARACTERS, WorkspaceJson
 from app.core.storage import deep_json
 from app.errors import DescriptionError, DocumentError
 from app.robots.description.description import Robot, parse
@@ -52,7 +58,7 @@ class Document:
         self.path: Path | None = None
         self.name = UNNAMED
         self.others: Mapping[str, object] = {}
-        self.workspace: Workspace = {}
+        self._json = WorkspaceJson.of({})
         self.robots: dict[str, Mapping[str, object]] = {}
         self.dirty = False
         self.saved_at: float | None = None
@@ -72,16 +78,30 @@ class Document:
 
     # -- editing and files -----------------------------------------------------------------------------------
 
-    def edited(self, workspace: Workspace) -> None:
-        """The editor changed the blocks. They are in the journal when this returns."""
-        with contextlib.suppress(RecursionError):  # too deep to compare: take it as changed
-            if deep_json.same(workspace, self.workspace):
-                return
-        self.workspace = workspace
+    @property
+    def workspace(self) -> Workspace:
+        """Its blocks; parsed when they are asked for, if the editor told them as text."""
+        return self._json.blocks
+
+    @workspace.setter
+    def workspace(self, blocks: Workspace) -> None:
+        self._json = WorkspaceJson.of(blocks)
+
+    @property
+    def has_blocks(self) -> bool:
+        """Whether there is any block in it."""
+        return self._json.has_blocks
+
+    def edited(self, workspace: Workspace | WorkspaceJson) -> None:
+        """The editor changed the blocks. They are in the journal when this returns, as they came."""
+        told = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.of(workspace)
+        if told.same_as(self._json):
+            return
+        self._json = told
         self.dirty = True
         self.edits += 1
-        text = self._keep_used_robots()
-        self._write_journal(text)
+        self._keep_used_robots()
+        self._write_journal()
 
     def new(self, name: str = UNNAMED) -> None:
         """Begin an empty behaviour."""
@@ -235,14 +255,14 @@ class Document:
         """Whether compiling holds the window up so little that it may be done at once."""
         if self._compile_s is not None:
             return self._compile_s < QUICK_S
-        return self._asked is None and not is_long(self.workspace)
+        return self._asked is None and not self._json.is_longer_than(LONG_CHARACTERS)
 
     def _key(self) -> Key:
         return self.revision, self.edits, self.definitions_revision
 
     def _compiling(self) -> Callable[[], Program]:
-        """The compilation of what is here now; it may run in any thread."""
-        return partial(compile_behaviour, self.workspace, self._connected, absent=self.absent, name=self.name)
+        """The compilation of what is here now; it may run in any thread, and parses there."""
+        return partial(_compile, self._json, self._connected, self.absent, self.name)
 
     def problems(self) -> tuple[Problem, ...]:
         """What the compiler says of the blocks."""
@@ -269,10 +289,9 @@ class Document:
         self.revision += 1
         self.definitions_revision += 1
 
-    def _write_journal(self, text: str | None = None) -> None:
-        """``text`` is the JSON of the blocks when it is made already."""
+    def _write_journal(self) -> None:
         try:
-            self._journal.write(self.name, self.path, self.workspace, self.robots, text, self.others)
+            self._journal.write(self.name, self.path, self._json.text, self.robots, self.others)
         except OSError as error:
             self.journal_error = f"unsaved work can't be kept ({error.strerror or error}); save the file now"
         except RecursionError:
@@ -280,23 +299,23 @@ class Document:
         else:
             self.journal_error = None
 
-    def _keep_used_robots(self) -> str | None:
-        """Keep the descriptions of the robots that the blocks name: they are known without them later.
-
-        The JSON of the blocks is returned, if they have any.
-        """
+    def _keep_used_robots(self) -> None:
+        """Keep the descriptions of the robots that the blocks name: they are known without them later."""
         try:
-            text = deep_json.dumps(self.workspace)
+            text = self._json.text
         except RecursionError:
-            return None  # the journal, which comes next, says so
+            return  # the journal, which comes next, says so
         for robot in self._connected:
             if json.dumps(robot.name, ensure_ascii=False) in text:
                 self.robots[robot.name] = dict(robot.source)
-        return text
 
     def _known(self) -> list[Robot]:
         found = (_parsed(description) for description in self.robots.values())
         return [robot for robot in found if robot is not None]
+
+
+def _compile(told: WorkspaceJson, robots: Sequence[Robot], absent: Sequence[Robot], name: str) -> Program:
+    return compile_behaviour(told.blocks, robots, absent=absent, name=name)
 
 
 def _parsed(description: Mapping[str, object]) -> Robot | None:

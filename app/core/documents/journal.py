@@ -13,6 +13,7 @@ import time
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,26 +62,24 @@ class Journal:
         self,
         name: str,
         path: Path | None,
-        workspace: Mapping[str, object],
+        text: str,
         robots: Mapping[str, Mapping[str, object]],
-        text: str | None = None,
         others: Mapping[str, object] | None = None,
     ) -> None:
-        """Keep the newest state; ``text`` is the JSON of the workspace when it is made already.
+        """Keep the newest state; ``text`` is the JSON of the workspace, taken as it is.
 
         ``others`` is what else its file says. It survives the death of this process. Raises OSError.
         """
         entry = {
             "pid": os.getpid(),
-            "born_s": _born(os.getpid()),
+            "born_s": _own_birth(os.getpid()),
             "name": name,
             "path": str(path) if path is not None else None,
             "edited_s": self._clock(),
             "robots": robots,
             "others": dict(others or {}),
         }
-        blocks = text if text is not None else deep_json.dumps(workspace)
-        whole = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {blocks}}}'
+        whole = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {text}}}'
         data = whole.encode("utf-8", "surrogatepass")
         write_atomically(self._file, data, durable=False, private=True)
 
@@ -122,7 +121,9 @@ def _read(file: Path) -> Unsaved | None:
         return None
 
 
-def _born(pid: int) -> float:
+@lru_cache(maxsize=1)
+def _own_birth(pid: int) -> float:
+    """When this process began; the id is given because a fork is another one."""
     return psutil.Process(pid).create_time()
 
 

@@ -14,6 +14,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 LEVELS = 9_000
+SHALLOW = 8_000
+"""So many brackets can't be nested too deep."""
 STACK_BYTES = 256 * 1024 * 1024
 
 T = TypeVar("T")

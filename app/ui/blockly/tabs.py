@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-Json = dict[str, object]
-EMPTY: Json = {"blocks": {"languageVersion": 0, "blocks": []}}
+from app.core.documents.workspace_json import EMPTY, WorkspaceJson
 
 
 @dataclass
@@ -14,7 +12,7 @@ class Tab:
     """One behaviour: its newest program, and what its blocks show of a run."""
 
     key: str
-    workspace: Json
+    program: WorkspaceJson
     generation: int
     in_page: bool = False  # the page holds it, with its undo, zoom and scroll position
     states: dict[str, object] = field(default_factory=dict)
@@ -29,15 +27,15 @@ class Tabs:
     def __init__(self) -> None:
         self._generations = 0
         self._tabs: dict[str, Tab] = {}
-        self.shown = self._make("", EMPTY)
+        self.shown = self._make("", WorkspaceJson.of(EMPTY))
 
     def __getitem__(self, key: str) -> Tab | None:
         return self._tabs.get(key)
 
-    def show(self, key: str, workspace: Mapping[str, object]) -> str | None:
-        """Turn to this one; ``workspace`` counts the first time. The key of a tab that went for it."""
+    def show(self, key: str, program: WorkspaceJson) -> str | None:
+        """Turn to this one; ``program`` counts the first time. The key of a tab that went for it."""
         before = self.shown
-        self.shown = self._tabs.get(key) or self._make(key, workspace)
+        self.shown = self._tabs.get(key) or self._make(key, program)
         if before.key or before is self.shown:
             return None
         del self._tabs[""]
@@ -47,14 +45,14 @@ class Tabs:
         """Forget this one; whether there was such a one."""
         gone = self._tabs.pop(key, None)
         if gone is not None and gone is self.shown:
-            self.shown = self._make("", EMPTY)
+            self.shown = self._make("", WorkspaceJson.of(EMPTY))
         return gone is not None
 
-    def replace(self, workspace: Mapping[str, object]) -> None:
+    def replace(self, program: WorkspaceJson) -> None:
         """Put another program in the place of the shown one; edits of the old one no longer count."""
         self._generations += 1
         self.shown.generation = self._generations
-        self.shown.workspace = dict(workspace)
+        self.shown.program = program
         self.shown.states.clear()
 
     def edited(self, key: str, generation: int) -> Tab | None:
@@ -67,7 +65,7 @@ class Tabs:
         for tab in self._tabs.values():
             tab.in_page = False
 
-    def _make(self, key: str, workspace: Mapping[str, object]) -> Tab:
+    def _make(self, key: str, program: WorkspaceJson) -> Tab:
         self._generations += 1
-        self._tabs[key] = Tab(key, dict(workspace), self._generations)
+        self._tabs[key] = Tab(key, program, self._generations)
         return self._tabs[key]

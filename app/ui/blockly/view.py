@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from app.core.storage import deep_json
+from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.blockly.bridge import Json
 from app.ui.blockly.host import BlocklyHost
 from app.ui.blockly.scheme import register_scheme as register_scheme
@@ -27,7 +27,7 @@ class BlocklyView(BlocklyHost):
     one behaviour, with the key "".
     """
 
-    changed = Signal(str, dict)  # a tab's key and its newest workspace, 150 ms after the last real edit
+    changed = Signal(str, object)  # a tab's key and its newest program (WorkspaceJson), 150 ms after an edit
     history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
     block_selected = Signal(str)  # a block's id; "" when nothing is selected
     sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
@@ -38,7 +38,7 @@ class BlocklyView(BlocklyHost):
         self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
         self._live: Json = {"values": {}, "old": []}
         self._alarms: Json = {}
-        self._waiting: dict[int, Callable[[Json], None]] = {}
+        self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._tokens = 0
         self._bridge.edited.connect(self._edited)
         self._bridge.undo_changed.connect(self.history_changed)
@@ -49,21 +49,21 @@ class BlocklyView(BlocklyHost):
     # -- the program ------------------------------------------------------------------------------
 
     @property
-    def workspace(self) -> Json:
+    def workspace(self) -> Mapping[str, object]:
         """The newest program of the shown tab; call `flush` for one without the last 150 ms missing."""
-        return self._tabs.shown.workspace
+        return self._tabs.shown.program.blocks
 
-    def workspace_of(self, key: str) -> Json | None:
+    def workspace_of(self, key: str) -> Mapping[str, object] | None:
         """The newest program of a tab; None when there is no such tab."""
         tab = self._tabs[key]
-        return tab.workspace if tab is not None else None
+        return tab.program.blocks if tab is not None else None
 
     def show_tab(self, key: str, workspace: Mapping[str, object]) -> None:
         """Show the behaviour kept under this key, with its own undo, zoom and scroll position.
 
         The first time it is ``workspace``; afterwards what became of it.
         """
-        gone = self._tabs.show(key, workspace)
+        gone = self._tabs.show(key, WorkspaceJson.of(workspace))
         self._send_tab()
         if gone is not None:
             self._tell("close", gone)
@@ -81,23 +81,23 @@ class BlocklyView(BlocklyHost):
 
         Forgets its undo; edits of the old one that are still under way are dropped.
         """
-        self._tabs.replace(workspace)
+        self._tabs.replace(WorkspaceJson.of(workspace))
         self._tabs.shown.in_page = False
         self._send_tab()
 
     def change(self, workspace: Mapping[str, object]) -> None:
         """Change the shown tab's program as one edit, which undo takes back; `changed` does not tell it."""
-        self._tabs.shown.workspace = dict(workspace)
-        self._tell("change", self._tabs.shown.workspace)
+        self._tabs.shown.program = WorkspaceJson.of(workspace)
+        self._tell("change", workspace)
 
-    def flush(self, done: Callable[[Json], None]) -> None:
+    def flush(self, done: Callable[[WorkspaceJson], None]) -> None:
         """Ask for the newest program of the shown tab now.
 
         `done` is called once, also if the page is absent or dies. The other tabs have told their newest when
         they were left.
         """
         if not self._up:
-            done(self.workspace)
+            done(self._tabs.shown.program)
             return
         self._tokens += 1
         self._waiting[self._tokens] = done
@@ -200,7 +200,7 @@ class BlocklyView(BlocklyHost):
     def _page_went(self) -> None:
         waiting, self._waiting = self._waiting, {}
         for done in waiting.values():
-            done(self.workspace)
+            done(self._tabs.shown.program)
         self.history_changed.emit(False, False)
         self.sensors_offered.emit(())
 
@@ -211,7 +211,7 @@ class BlocklyView(BlocklyHost):
         tab = self._tabs.shown
         here: Json = {"key": tab.key}
         if not tab.in_page:
-            here |= {"generation": tab.generation, "workspace": tab.workspace}
+            here |= {"generation": tab.generation, "workspace": tab.program.blocks}
             tab.in_page = True
         self._bridge.tell("tab", here)
         for name, value in tab.states.items():
@@ -227,19 +227,13 @@ class BlocklyView(BlocklyHost):
     def _edited(self, key: str, generation: int, workspace: str) -> None:
         tab = self._tabs.edited(key, generation)
         if tab is not None:
-            tab.workspace = _program(workspace)
-            self.changed.emit(key, tab.workspace)
+            tab.program = WorkspaceJson(workspace)
+            self.changed.emit(key, tab.program)
 
     def _answered(self, token: int, workspace: str) -> None:
         done = self._waiting.pop(token, None)
         if done is not None:
-            done(_program(workspace))
-
-
-def _program(text: str) -> dict[str, object]:
-    """The page's JSON, however long its stacks are."""
-    made = deep_json.loads(text)
-    return made if isinstance(made, dict) else {}
+            done(WorkspaceJson(workspace))
 
 
 def _pairs(text: str) -> tuple[tuple[str, str], ...]:

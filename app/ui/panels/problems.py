@@ -146,7 +146,7 @@ class ProblemsPanel(PanelWidget):
         self.checked.setText("Checked while you build")
         found = listed(
             program.problems,
-            document.workspace,
+            document.workspace if document.absent else {},  # parsed only when somebody is missing
             document.absent,
             [link.robot for link in self.session.fleet.connected],
             VIRTUAL_ROBOTS,

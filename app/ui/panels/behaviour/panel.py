@@ -23,6 +23,7 @@ from app.ui.widgets.indicators import ROBOT_STATUS
 if TYPE_CHECKING:
     from app.blocks import Program
     from app.core.documents.document import Document
+    from app.core.documents.workspace_json import WorkspaceJson
     from app.core.network.watches import Look, Watch
     from app.core.robots.robot_link import RobotLink
     from app.core.run.control import Runs
@@ -191,7 +192,7 @@ class BehaviourPanel(PanelWidget):
     def _show_empty(self) -> None:
         """Over the empty workspace, while there is no robot to build for."""
         building = self.mode == "blocks" and self.editor is not None and self.editor.is_ready
-        wanted = building and not self.session.fleet.connected and not _blocks(self.session.document)
+        wanted = building and not self.session.fleet.connected and not self.session.document.has_blocks
         if wanted != self.empty.isVisibleTo(self._place):
             self.empty.setVisible(wanted)
         if wanted:
@@ -264,7 +265,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.show_block(block)
 
-    def _edited(self, key: str, workspace: dict[str, object]) -> None:
+    def _edited(self, key: str, workspace: WorkspaceJson) -> None:
         document = self.session.documents.with_key(key)
         if document is not None:
             document.edited(workspace)
@@ -331,13 +332,6 @@ def tab_facts(document: Document, runs: Runs) -> TabFacts:
     running = runs.active and runs.document is document
     where = str(document.path) if document.path is not None else "Not saved in a file yet"
     return TabFacts(document.key, document.name, document.dirty, running, f"{document.name}\n{where}")
-
-
-def _blocks(document: object) -> bool:
-    """Whether there is any block in the workspace."""
-    workspace = getattr(document, "workspace", {})
-    inner = workspace.get("blocks") if isinstance(workspace, Mapping) else None
-    return bool(inner.get("blocks")) if isinstance(inner, Mapping) else False
 
 
 PANEL = Panel("behaviour", "Behaviour", "blocks", (), BehaviourPanel)

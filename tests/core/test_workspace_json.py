@@ -1,0 +1,70 @@
+"""A workspace as the page's text or as blocks: parsed when it is asked for, compared without parsing."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app.core.documents.workspace_json import LONG_CHARACTERS, WorkspaceJson
+from app.core.storage import deep_json
+
+ONE = {"blocks": {"blocks": [{"type": "events_started", "id": "\u00e9\ud800"}]}}
+
+
+@pytest.fixture
+def parsed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The texts that were parsed."""
+    seen: list[str] = []
+    before = deep_json.loads
+
+    def loads(text: str) -> object:
+        seen.append(text)
+        return before(text)
+
+    monkeypatch.setattr(deep_json, "loads", loads)
+    return seen
+
+
+def test_text_is_kept_as_it_came_and_parsed_once(parsed: list[str]) -> None:
+    text = json.dumps(ONE, separators=(",", ":"))
+    told = WorkspaceJson(text)
+    assert told.text is text
+    assert parsed == []
+    assert told.blocks == ONE
+    assert told.blocks == ONE
+    assert parsed == [text]
+
+
+def test_texts_of_the_page_are_compared_as_they_are(parsed: list[str]) -> None:
+    text = json.dumps(ONE)
+    one, same, other = WorkspaceJson(text), WorkspaceJson(text), WorkspaceJson("{}")
+    assert one.blocks  # the compiler has looked into it
+    del parsed[:]
+    assert one.same_as(same)
+    assert not one.same_as(other)
+    assert parsed == []
+
+
+def test_the_page_writes_what_a_file_says_another_way() -> None:
+    assert WorkspaceJson(json.dumps(ONE, indent=2)).same_as(WorkspaceJson.of(ONE))
+    assert not WorkspaceJson.of({}).same_as(WorkspaceJson(json.dumps(ONE)))
+
+
+def test_whether_there_is_any_block_costs_nothing_for_a_long_text(parsed: list[str]) -> None:
+    assert not WorkspaceJson("{}").has_blocks
+    assert not WorkspaceJson('{"blocks": {"blocks": []}}').has_blocks
+    assert WorkspaceJson.of(ONE).has_blocks
+    del parsed[:]
+    assert WorkspaceJson(json.dumps(ONE) + " " * LONG_CHARACTERS).has_blocks
+    assert parsed == []
+
+
+def test_what_holds_no_object_has_no_blocks() -> None:
+    assert WorkspaceJson("[]").blocks == {}
+
+
+def test_what_is_nested_too_deep_is_refused_when_it_comes() -> None:
+    text = "[" * 200_000 + "]" * 200_000
+    with pytest.raises(RecursionError):
+        WorkspaceJson(text)
