@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from typing import Protocol
 
+from app.blocks.runtime.heartbeat import Heartbeat
 from app.blocks.runtime.link import LAST_STATES, STATES, Call
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
@@ -20,7 +21,6 @@ from nep.errors import NepError
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
-ALIVE_S = 0.2
 LOOK_S = 0.2
 """The master is asked so often at most who sent what came from an unknown publisher."""
 MOST_UNKNOWN = 256
@@ -135,8 +135,10 @@ class Network:
             self._subscribe(topic)
         with suppress(NepError):  # the master has gone since: what is not known yet is looked for later
             self._look()
-        self._alive = threading.Thread(target=self._beat, name="program alive", daemon=True)
-        self._alive.start()
+        self._alive = Heartbeat(program, "program alive")
+        for robot in self._robots.values():
+            if robot.dialect != "rize":
+                self._alive.beat(robot.name, self._publishers[robot.topics.command].publish)
 
     def _meet(self, robot: Robot) -> None:
         self._publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
@@ -151,7 +153,7 @@ class Network:
         """End the heartbeat; the node is closed by who made it."""
         self._closed.set()
         self._asks.set()
-        self._alive.join(timeout=1.0)
+        self._alive.close()
         if self._finder is not None:
             self._finder.join(timeout=3.0)
 
@@ -458,17 +460,6 @@ class Network:
 
     def _send(self, robot: Robot, command: Mapping[str, object]) -> None:
         self._publishers[robot.topics.command].publish(command)
-
-    def _beat(self) -> None:
-        """Say five times a second that the program lives; robots stop by themselves without it."""
-        while not self._closed.wait(ALIVE_S):
-            for robot in self._robots.values():
-                if robot.dialect == "rize":
-                    continue
-                try:
-                    self._send(robot, self._command(new_id("alive"), "alive"))
-                except NepError:
-                    return
 
 
 def _nothing() -> None:

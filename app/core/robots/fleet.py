@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+from app.blocks.runtime.heartbeat import Heartbeat
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
-from app.core.robots.heartbeat import Heartbeat
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_permission import MayNotMoveError, Moving
 from app.core.robots.robot_link import SENDER, Invocation, Payload, RobotLink, topics_of
@@ -97,7 +97,7 @@ class Fleet:
         self._notes: list[str] = []
         self._rize = RizeNames()
         self._rize_events: Watch | None = None
-        self._alive = Heartbeat(SENDER)
+        self._alive = Heartbeat(SENDER, "studio-alive")
         self.moving, self.known = Moving(settings, self._identity_of), KnownRobots(settings)
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
@@ -172,7 +172,7 @@ class Fleet:
             raise MayNotMoveError([name])
         invocation = self._tries.begin(link, described, input)
         if invocation.running and link.publisher is not None and link.robot.dialect == "native":
-            self._alive.beat(name, link.publisher)
+            self._alive.beat(name, link.publisher.publish)
         return invocation
 
     def _try_again(self, name: str, action: str, input: Payload) -> None:

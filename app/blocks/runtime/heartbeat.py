@@ -1,0 +1,65 @@
+"""Tells robots that the program which moves them lives; a robot that hears nothing stops by itself."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from collections.abc import Callable, Mapping
+
+from nep.errors import NepError
+
+ALIVE_S = 0.2
+
+Publish = Callable[[Mapping[str, object]], object]
+
+
+class Heartbeat:
+    """Sends ``alive`` five times a second to each robot that is to go on, in a thread of its own."""
+
+    def __init__(self, sender: str, thread: str) -> None:
+        """``sender`` is the program id of the commands, ``thread`` the thread's name."""
+        self._sender, self._name = sender, thread
+        self._lock = threading.Lock()
+        self._robots: dict[str, Publish] = {}
+        self._changed = threading.Event()
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def beat(self, robot: str, publish: Publish) -> None:
+        """Keep this robot going until `rest`; ``publish`` sends on its command topic."""
+        with self._lock:
+            self._robots[robot] = publish
+            if self._thread is None and not self._closing:
+                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+                self._thread.start()
+        self._changed.set()
+
+    def rest(self, robot: str) -> None:
+        """This robot is not kept going any more."""
+        with self._lock:
+            self._robots.pop(robot, None)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._closing = True
+        self._changed.set()
+        if self._thread is not None:
+            self._thread.join(timeout=2)
+
+    def _run(self) -> None:
+        while True:
+            self._changed.clear()
+            if self._closing:
+                return
+            with self._lock:
+                robots = list(self._robots.values())
+            for publish in robots:
+                self._tell(publish)
+            self._changed.wait(ALIVE_S if robots else None)
+
+    def _tell(self, publish: Publish) -> None:
+        alive = {"id": uuid.uuid4().hex, "op": "alive", "from": self._sender, "action": "", "input": {}}
+        try:
+            publish(alive)
+        except NepError:
+            return  # it has gone, or this node has; the robot's watchdog does the rest
