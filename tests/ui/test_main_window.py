@@ -377,7 +377,8 @@ def test_what_a_dead_studio_left_is_offered_without_a_dialog(
     qtbot, window: MainWindow, commands: Commands, home: Path
 ) -> None:
     for name in ("Story", "Tale", "Song"):
-        Journal(home / "journal").write(name, None, {"blocks": {"blocks": [{"type": "events_started"}]}}, {})
+        text = '{"blocks": {"blocks": [{"type": "events_started"}]}}'
+        Journal(home / "journal").write(name, None, text, {})
     for file in (home / "journal").glob("*.json"):
         entry = json.loads(file.read_text("utf-8"))
         file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
