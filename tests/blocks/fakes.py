@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
-from app.blocks.runtime.link import Call
+from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.runtime import Runtime
 from app.robots.description.description import Robot
 from tests.blocks.samples import robot
@@ -19,8 +19,8 @@ class FakeLink:
 
     def __init__(self) -> None:
         self.invoked: list[tuple[str, str, dict[str, object]]] = []
-        self.calls: list[Call] = []
-        self.canceled: list[Call] = []
+        self.calls: list[RobotCall] = []
+        self.canceled: list[RobotCall] = []
         self.published: list[tuple[str, object]] = []
         self.sensors: dict[tuple[str, str], object] = {}
         self.topics: dict[str, object] = {}
@@ -33,9 +33,9 @@ class FakeLink:
     def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
         self.poke, self.stopped_outside = poke, stopped_outside
 
-    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> Call:
+    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         self.invoked.append((robot, action, dict(input)))
-        call = Call(f"c{len(self.calls)}", robot, action)
+        call = RobotCall(f"c{len(self.calls)}", robot, action)
         self.calls.append(call)
         if action in self.held:
             call.state = "running"
@@ -44,14 +44,14 @@ class FakeLink:
         return call
 
     def answer(
-        self, call: Call, state: str, output: Mapping[str, object] | None = None, error: str = ""
+        self, call: RobotCall, state: str, output: Mapping[str, object] | None = None, error: str = ""
     ) -> None:
         call.output, call.error = output or {}, error
         call.state = state
         if call.action in self.held:
             self.poke()
 
-    def cancel(self, call: Call) -> None:
+    def cancel(self, call: RobotCall) -> None:
         self.canceled.append(call)
 
     def sensor(self, robot: str, name: str) -> object:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from app.blocks.runtime.link import Call
+from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.scheduler import Stopped
 from app.robots.description.description import Robot, parse, td_for
@@ -37,7 +37,7 @@ class Bench:
 
     def do(self, action: str, state: str = "succeeded", **given: object) -> None:
         self.count += 1
-        call = Call(f"c{self.count}", "Turtle", action)
+        call = RobotCall(f"c{self.count}", "Turtle", action)
         self.going.asked(call, TURTLE, given)
         call.state = state
         self.going.ended(call)
@@ -103,7 +103,7 @@ def test_another_script_that_stays_holds_nobody_up(bench) -> None:
 
 @pytest.mark.parametrize("state", ["succeeded", "canceled"])
 def test_what_is_answered_while_its_script_stays_stands_and_is_not_forgotten(bench, state) -> None:
-    call = Call("c", "Turtle", "drive")
+    call = RobotCall("c", "Turtle", "drive")
     bench.going.asked(call, TURTLE, {"speed": 0.2})
     with bench.going.slow():
         assert bench.stood == ["Turtle"]

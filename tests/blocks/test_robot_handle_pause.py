@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.runtime.link import Call
+from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.robot_handle import is_unknown, measured_by, rest_of
 from app.robots import simulated
 from app.robots.description.description import parse, td_for
@@ -23,8 +23,8 @@ def action(name: str):
     return found
 
 
-def held(name: str, **feedback: object) -> Call:
-    return Call("1", "Pepper", name, state="canceled", began=True, held=True, feedback=feedback)
+def held(name: str, **feedback: object) -> RobotCall:
+    return RobotCall("1", "Pepper", name, state="canceled", began=True, held=True, feedback=feedback)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from app.core.network.topics import Topic
 from app.core.robots.health_facts import LOW_PERCENT, HealthFact, facts_of
 from app.core.robots.robot_link import RobotLink
 from app.robots import rize, simulated
-from app.robots.description.description import Field, Sensor, parse, td_for
+from app.robots.description.description import DataField, Sensor, parse, td_for
 
 PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
 NOW = 1000.0
@@ -105,7 +105,7 @@ def test_a_low_battery_comes_first(case: Case) -> None:
 def test_the_warmest_part_is_named(case: Case) -> None:
     joints = Sensor(
         "joints", "joints", "object", "/joints",
-        fields=(Field("knee", "left knee", "number", "°C"), Field("hip", "hip", "number", "°C")),
+        fields=(DataField("knee", "left knee", "number", "°C"), DataField("hip", "hip", "number", "°C")),
     )  # fmt: skip
     case.with_sensor(joints, {"knee": 44.2, "hip": 39.0})
     assert case.says("Temperature") == ("ok", "left knee 44 °C")

@@ -12,7 +12,7 @@ import pytest
 import nep
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import RobotStop, StopReport, not_reached
-from app.robots.description.description import Topics
+from app.robots.description.description import RobotTopics
 from app.robots.identity import first_to_announce, identity_of
 from nep.errors import AddressInUseError
 from nep.masters.master import Master
@@ -148,7 +148,7 @@ def test_whoever_announced_it_first_is_the_robot_also_when_nobody_said_so(master
 
 def test_a_stop_goes_to_the_topics_of_earlier_descriptions_too(master, stopper, pepper) -> None:
     """The robot says that its commands are elsewhere now, and still hears the old topic only."""
-    moved = Topics("/Pepper/description", "/Pepper/other_command", "/Pepper/other_answer")
+    moved = RobotTopics("/Pepper/description", "/Pepper/other_command", "/Pepper/other_answer")
     changed = replace(pepper.described, topics=moved)
     stopper.set_robots([StopTarget(changed, topics=(pepper.described.topics,))])
     report = stopper.stop_all(timeout_s=LONG_S)

@@ -10,7 +10,7 @@ import pytest
 import nep
 from app.core.run.control import STOP_TIMEOUT_S
 from app.robots.driver.driver import Driver
-from app.robots.driver.task import Program, Task
+from app.robots.driver.task import ProgramId, Task
 from app.robots.driver.tasks import STOP_ANSWER_S, Watchdog
 from app.robots.identity import program_of
 from app.robots.kit import Failed
@@ -395,7 +395,7 @@ def test_a_forged_sign_of_life_keeps_no_robot_going(turtle, node):
 def test_a_forged_sign_of_life_keeps_no_speed_going():
     """Also after the action: what it left in motion is its own program's, whoever writes its name."""
     dog = Watchdog(1.0)
-    program, forger = Program("p", 1), Program("p", 2)
+    program, forger = ProgramId("p", 1), ProgramId("p", 2)
     drive = Task(
         "1", "drive", lambda _call: None, lambda _answer: None, ("base",), program=program, goes_on=True
     )

@@ -24,8 +24,7 @@ from app.core.network.nodes import Nodes
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_permission import Moving
 from app.robots.description.inputs import Choice, Parameter
-from app.robots.description.model import Action, Event, Field, Robot, SafeStop, Sensor
-from app.robots.description.model import Topics as RobotTopics
+from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from nep.doctor import Finding
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
@@ -735,8 +734,8 @@ SENSORS = (
     Sensor("sound", "sound", "number", "/Pepper/sound", "dB", 0, 150, icon="volume-2"),
     Sensor("heard_word", "heard word", "text", "/Pepper/heard_word", icon="ear"),
     Sensor("pose", "position", "object", "/Pepper/pose", icon="navigation", fields=(
-        Field("x", "x", "number", "m"), Field("y", "y", "number", "m"),
-            Field("theta", "facing", "number", "°"))),
+        DataField("x", "x", "number", "m"), DataField("y", "y", "number", "m"),
+            DataField("theta", "facing", "number", "°"))),
     Sensor("camera", "camera", "image", "/Pepper/camera", rate_hz=15, icon="camera"),
 )  # fmt: skip
 

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.robots.description.inputs import Parameter
-from app.robots.description.model import Action, Field
+from app.robots.description.model import Action, DataField
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.tries import field_words, progress_of
 from app.ui.theme.theme import Theme
@@ -19,8 +19,8 @@ MOVE = Action(
     "go_far", "go far", "move", "Movement",
     (Parameter("distance", "distance", "number", -1, 1, 0.05, "m", 0.5),),
     "%robot go far", None, "/c", "/a", risk="moves", cancellable=True, timeout_s=10,
-    feedback=(Field("moved", "moved", "number", "m"),),
-    output=(Field("moved", "moved", "number", "m"), Field("seconds", "seconds", "number", "s")),
+    feedback=(DataField("moved", "moved", "number", "m"),),
+    output=(DataField("moved", "moved", "number", "m"), DataField("seconds", "seconds", "number", "s")),
 )  # fmt: skip
 
 
@@ -102,12 +102,12 @@ def test_a_share_of_what_was_asked_is_a_bar(card, feedback, share) -> None:
 
 
 @pytest.mark.parametrize(
-    "field", [Field("percent", "done", "number"), Field("charge", "charge", "number", "%")]
+    "field", [DataField("percent", "done", "number"), DataField("charge", "charge", "number", "%")]
 )
 def test_per_cents_are_bars_too(field) -> None:
     action = Action("load", "load", "x", "X", (), "load", None, "/c", "/a", feedback=(field,))
     assert progress_of(action, {}, {field.name: 40}) == 0.4
-    assert field_words((Field("open", "open", "boolean"),), {"open": True}) == "open yes"
+    assert field_words((DataField("open", "open", "boolean"),), {"open": True}) == "open yes"
 
 
 def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:

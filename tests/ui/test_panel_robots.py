@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.core.robots.known import KEY
-from app.robots.description.model import Field
+from app.robots.description.model import DataField
 from app.ui.panels.robots.list import seen_words
 from app.ui.panels.robots.panel import PANEL, RobotsPanel
 from app.ui.panels.robots.tries import feedback_words, progress_of
@@ -100,7 +100,8 @@ def test_what_cannot_be_cancelled_waits_for_its_end(panel, window) -> None:
 
 def test_feedback_is_said_in_the_words_of_the_description() -> None:
     walk = next(action for action in ACTIONS if action.name == "walk")
-    walk = replace(walk, feedback=(Field("to_go", "to go", "number", "m"), Field("word", "word", "text")))
+    fields = DataField("to_go", "to go", "number", "m"), DataField("word", "word", "text")
+    walk = replace(walk, feedback=fields)
     assert feedback_words(walk, {"to_go": 0.301, "progress": 0.5, "other": 1}) == "0.30 m to go"
     assert feedback_words(walk, {"word": "hello"}) == "“hello”"
     assert progress_of(walk, {"distance": 0.5}, {"progress": 0.25}) == 0.25

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.robots.description.inputs import Choice
-from app.robots.description.model import Field, Sensor
+from app.robots.description.model import DataField, Sensor
 from app.ui.panels import sensors
 from app.ui.panels.sensors import PANEL, SensorsPanel
 from app.ui.text.sensor_values import ReadingWords, number_words, reading_of
@@ -11,8 +11,8 @@ from tests.ui.fakes import RobotLink, Session, pepper
 from tests.ui.panel_case import Window
 
 POSE = Sensor("pose", "position", "object", "/p", fields=(
-    Field("x", "x", "number", "m"), Field("y", "y", "number", "m"),
-        Field("theta", "facing", "number", "°")))  # fmt: skip
+    DataField("x", "x", "number", "m"), DataField("y", "y", "number", "m"),
+        DataField("theta", "facing", "number", "°")))  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ class Subscription(Protocol):
         ...
 
 
-class Node(Protocol):
+class GraphNode(Protocol):
     """What is needed of NEP's node."""
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
@@ -80,7 +80,7 @@ class _Topic:
 
 
 def find_robots(
-    node: Node,
+    node: GraphNode,
     timeout_s: float,
     *,
     wanted: Sequence[str] = (),
@@ -120,7 +120,7 @@ def find_robots(
             each.subscription.close()
 
 
-def _follow(node: Node, view: GraphView, asked: dict[str, _Topic]) -> None:
+def _follow(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
     """Subscribe new descriptions; whoever announces one first is the robot while it does so."""
     for topic, info in view.topics.items():
         nodes = publishing(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()

@@ -12,7 +12,7 @@ STATES = ("accepted", "running", *LAST_STATES)
 
 
 @dataclass
-class Call:
+class RobotCall:
     """One command to a robot and what it answered; written by the network's thread, read by a script."""
 
     id: str
@@ -33,18 +33,18 @@ class Call:
         return self.state in LAST_STATES
 
 
-class Link(Protocol):
+class ProgramLink(Protocol):
     """Robots and topics, as a program sees them. Callbacks come from the network's thread."""
 
     def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
         """Call `poke` for each answer and message, `stopped_outside` when somebody else stops a robot."""
         ...
 
-    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> Call:
+    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         """Send a command."""
         ...
 
-    def cancel(self, call: Call) -> None:
+    def cancel(self, call: RobotCall) -> None:
         """Take a command back."""
         ...
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from app.blocks.runtime.link import Call
+from app.blocks.runtime.link import RobotCall
 from app.robots.description.description import Robot
 
 
@@ -41,7 +41,7 @@ class Motions:
         self._slow: set[int] = set()  # scripts that stay at a block
         self._for = threading.local()
 
-    def asked(self, call: Call, robot: Robot, input: Mapping[str, object]) -> None:
+    def asked(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
         """A command goes out: what it uses is not in the earlier motion any more."""
         action = robot.action(call.action)
         if action is None:
@@ -56,12 +56,12 @@ class Motions:
             if action.repeat_s is not None:
                 self._asked[call.id] = motion
 
-    def is_motion(self, call: Call) -> bool:
+    def is_motion(self, call: RobotCall) -> bool:
         """Whether a command that is not answered yet begins a motion."""
         with self._lock:
             return call.id in self._asked
 
-    def ended(self, call: Call) -> None:
+    def ended(self, call: RobotCall) -> None:
         """A command has had its last answer."""
         with self._lock:
             motion = self._asked.pop(call.id, None)

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, suppress
 from typing import Protocol
 
 from app.blocks.runtime.heartbeat import Heartbeat
-from app.blocks.runtime.link import LAST_STATES, STATES, Call
+from app.blocks.runtime.link import LAST_STATES, STATES, RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
 from app.robots import rize
@@ -28,7 +28,7 @@ MOST_UNKNOWN = 256
 Told = Callable[[object], None]
 
 
-class Publisher(Protocol):
+class ProgramPublisher(Protocol):
     """What is needed of NEP's publisher."""
 
     def publish(self, payload: object) -> None:
@@ -36,10 +36,10 @@ class Publisher(Protocol):
         ...
 
 
-class Node(Protocol):
+class ProgramNode(Protocol):
     """What is needed of NEP's node."""
 
-    def new_pub(self, topic: str, msg_type: str = "json") -> Publisher:
+    def new_pub(self, topic: str, msg_type: str = "json") -> ProgramPublisher:
         """A publisher."""
         ...
 
@@ -84,7 +84,7 @@ class Network:
 
     def __init__(
         self,
-        node: Node,
+        node: ProgramNode,
         program: str,
         robots: Sequence[Robot],
         *,
@@ -110,7 +110,7 @@ class Network:
         self._robot_of = {sensor.topic: robot.name for robot in robots for sensor in robot.sensors}
         self._robot_of |= {event.topic: robot.name for robot in robots for event in robot.events}
         self._lock = threading.RLock()
-        self._calls: dict[str, Call] = {}
+        self._calls: dict[str, RobotCall] = {}
         self._stops: dict[
             str, tuple[str, set[str]]
         ] = {}  # stop's id -> robot, and the nodes that must answer
@@ -118,7 +118,7 @@ class Network:
         self._newest: dict[str, Message] = {}
         self._told: dict[str, list[Told]] = {}
         self._subscribed: set[str] = set()
-        self._publishers: dict[str, Publisher] = {}
+        self._publishers: dict[str, ProgramPublisher] = {}
         self._poke: Callable[[], None] = _nothing
         self._stopped_outside: Callable[[str], None] = _ignore
         self._arrived = threading.Condition()
@@ -168,10 +168,10 @@ class Network:
         """Tell of every answer and message, and of stops that are not ours."""
         self._poke, self._stopped_outside = poke, stopped_outside
 
-    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> Call:
+    def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         """Send a command; the call changes as answers arrive."""
         described = self._robots[robot]
-        call = Call(new_id("cmd"), robot, action)
+        call = RobotCall(new_id("cmd"), robot, action)
         with self._lock:
             self._calls[call.id] = call
         self._motions.asked(call, described, input)
@@ -181,7 +181,7 @@ class Network:
             self._send(described, self._command(call.id, "invoke", action, input))
         return call
 
-    def cancel(self, call: Call) -> None:
+    def cancel(self, call: RobotCall) -> None:
         """Take a command back; RIZE robots know no such thing."""
         described = self._robots[call.robot]
         if described.dialect != "rize":
@@ -292,7 +292,7 @@ class Network:
             raise KeyError(name)
         return found.topic
 
-    def _publisher(self, topic: str, msg_type: str = "json") -> Publisher:
+    def _publisher(self, topic: str, msg_type: str = "json") -> ProgramPublisher:
         with self._lock:
             if topic not in self._publishers:
                 self._publishers[topic] = self._node.new_pub(topic, msg_type)

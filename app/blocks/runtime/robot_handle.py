@@ -13,7 +13,7 @@ from typing import Protocol
 
 from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError
-from app.blocks.runtime.link import Call, Link
+from app.blocks.runtime.link import ProgramLink, RobotCall
 from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.status_text import StatusText
 from app.robots.description.description import Action, Parameter, Robot
@@ -47,7 +47,7 @@ class Stage(Protocol):
         """The description of a robot that is there."""
         ...
 
-    def linked(self) -> Link:
+    def linked(self) -> ProgramLink:
         """The network."""
         ...
 
@@ -107,7 +107,7 @@ class RobotHandle:
         """The script below runs each time the sensor passes the limit: "below" or "above" it."""
         return self._runtime.on_pass(self._name, sensor, side, limit)
 
-    def _invoke(self, name: str, given: Mapping[str, object]) -> Call:
+    def _invoke(self, name: str, given: Mapping[str, object]) -> RobotCall:
         robot = self._runtime.described(self._name)
         action = robot.action(name)
         if action is None:
@@ -126,7 +126,7 @@ class RobotHandle:
             raise BehaviourError(_ended(f"{self._name}: {call.error or f'“{action.title}” failed'}"))
         return call
 
-    def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> Call:
+    def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> RobotCall:
         """One command, or several when a pause takes it back and what is left is done afterwards."""
         while True:
             call = self._runtime.linked().invoke(self._name, action.name, input)
@@ -149,7 +149,7 @@ class RobotHandle:
         if unknown:
             self._runtime.write(f"{known}, so it was left out")
 
-    def _await(self, robot: Robot, action: Action, call: Call, words: str) -> None:
+    def _await(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
         scheduler = self._runtime.scheduler
         if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
             raise BehaviourError(f"{self._name} does not answer. {_check(robot)}")
@@ -177,7 +177,7 @@ class RobotHandle:
         if not call.done:
             self._hold(call)
 
-    def _broken(self, robot: Robot, call: Call) -> str | None:
+    def _broken(self, robot: Robot, call: RobotCall) -> str | None:
         """The sentence when a robot that always tells that it lives does so no more."""
         if robot.beat_s is None:
             return None
@@ -186,7 +186,7 @@ class RobotHandle:
             return None
         return f"{self._name} has stopped answering. {_check(robot)}"
 
-    def _hold(self, call: Call) -> None:
+    def _hold(self, call: RobotCall) -> None:
         """The pause takes the command back; a robot that does not end it is no longer under control."""
         call.held = True
         self._runtime.linked().cancel(call)
@@ -194,7 +194,7 @@ class RobotHandle:
             raise BehaviourError(f"{self._name} does not hold still, so the behaviour was stopped.")
 
 
-def _waiting(robot: Robot, call: Call) -> str:
+def _waiting(robot: Robot, call: RobotCall) -> str:
     """What the robot does first: "Pepper waits for “say”"."""
     found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
     titles = [f"“{action.title if action is not None else name}”" for action, name in found]
@@ -249,7 +249,7 @@ def _check(robot: Robot) -> str:
     return "Check that it is on and in the same Wi-Fi."
 
 
-def rest_of(action: Action, input: Mapping[str, object], call: Call) -> dict[str, object] | None:
+def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:
     """The input for what is left of a call that was taken back; None when nothing is to be done any more.
 
     An action that tells what is left does the rest, another one begins again. One that moves the robot to
@@ -268,7 +268,7 @@ def rest_of(action: Action, input: Mapping[str, object], call: Call) -> dict[str
     return {**input, name: math.copysign(min(abs(left), abs(whole)), whole)}
 
 
-def is_unknown(action: Action, input: Mapping[str, object], call: Call) -> bool:
+def is_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:
     """Whether the robot was on its way to another place, and does not tell how much of it is left."""
     name = measured_by(action, input)
     if not call.began or name is None:

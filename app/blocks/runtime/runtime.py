@@ -14,7 +14,7 @@ from functools import partial
 from app.blocks.runtime import lists, values
 from app.blocks.runtime.calls import Calls, EndScript, stop_script
 from app.blocks.runtime.errors import BehaviourError, explain
-from app.blocks.runtime.link import Link
+from app.blocks.runtime.link import ProgramLink
 from app.blocks.runtime.robot_handle import RobotHandle
 from app.blocks.runtime.scheduler import Scheduler, Stopped
 from app.blocks.runtime.status_text import StatusText
@@ -56,11 +56,11 @@ class Runtime:
     ) -> None:
         self._printed = printed
         self._labels = labels or {}
-        self._link: Link | None = None
+        self._link: ProgramLink | None = None
         self._robots: Mapping[str, Robot] = {}
         self._starts: list[Script] = []
         self._hats: list[tuple[Hat, Script]] = []
-        self._subscriptions: list[Callable[[Link], None]] = []
+        self._subscriptions: list[Callable[[ProgramLink], None]] = []
         self._count_lock = threading.Lock()
         self._running = 0
         self.scheduler = Scheduler()
@@ -80,7 +80,7 @@ class Runtime:
 
     # ---- beginning and end
 
-    def start(self, link: Link, robots: Sequence[Robot]) -> None:
+    def start(self, link: ProgramLink, robots: Sequence[Robot]) -> None:
         """Begin all scripts; the program's text has run, so its hats are known."""
         self._link = link
         self._robots = {robot.name: robot for robot in robots}
@@ -210,7 +210,7 @@ class Runtime:
     def on_message(self, topic: str) -> Decorator:
         """The script runs for each message."""
 
-        def prepare(hat: Hat, link: Link) -> None:
+        def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_message(topic, lambda payload: hat.happened((payload,)))
 
         return self._hat(f"when a message arrives on {topic}", prepare, MESSAGES_WAITING)
@@ -227,7 +227,7 @@ class Runtime:
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
         """The script runs each time this happens to the robot."""
 
-        def prepare(hat: Hat, link: Link) -> None:
+        def prepare(hat: Hat, link: ProgramLink) -> None:
             description = self._robots[robot].event(event)
             source = self._robots[robot].source
 
@@ -242,7 +242,7 @@ class Runtime:
     def on_change(self, robot: str, sensor: str) -> Decorator:
         """The script runs each time the sensor tells another value."""
 
-        def prepare(hat: Hat, link: Link) -> None:
+        def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, changes(lambda: hat.happened(())))
 
         return self._hat(f"when {robot} {sensor} changes", prepare, EVENTS_WAITING)
@@ -250,12 +250,12 @@ class Runtime:
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
         """The script runs each time the sensor passes the limit to that side."""
 
-        def prepare(hat: Hat, link: Link) -> None:
+        def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, PassGate(side, limit, lambda: hat.happened(())))
 
         return self._hat(f"when {robot} {sensor} goes {side} {limit:g}", prepare, EVENTS_WAITING)
 
-    def _hat(self, title: str, prepare: Callable[[Hat, Link], None], waiting: int) -> Decorator:
+    def _hat(self, title: str, prepare: Callable[[Hat, ProgramLink], None], waiting: int) -> Decorator:
         def decorate(script: Script) -> Script:
             hat = Hat(title, most=waiting)
             self._hats.append((hat, script))
@@ -276,11 +276,11 @@ class Runtime:
             raise BehaviourError(f"{name} is not connected.")
         return self._robots[name]
 
-    def linked(self) -> Link:
+    def linked(self) -> ProgramLink:
         """The network."""
         return self._linked()
 
-    def _linked(self) -> Link:
+    def _linked(self) -> ProgramLink:
         if self._link is None:
             raise BehaviourError("the program has not begun yet.")
         return self._link

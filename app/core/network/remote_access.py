@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from app.core.alerts import Alerts
+from app.core.storage.settings import KeepsLists
 from app.errors import SettingsError
 from nep.errors import NepError
 from nep.masters.master import listen
@@ -16,16 +16,6 @@ from nep.system.addresses import OwnAddress, host_of, is_loopback, own_addresses
 
 KEPT = "listen_at"
 ALERT, NOT_KEPT = "reach", "reach:kept"
-
-
-class Keeps(Protocol):
-    """What is needed of the settings."""
-
-    def get(self, key: str, default: list[str]) -> list[str]:
-        """A list that was kept."""
-
-    def set(self, key: str, value: object) -> None:
-        """Keep it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +32,7 @@ class Reach:
     def __init__(
         self,
         address: str,
-        settings: Keeps,
+        settings: KeepsLists,
         alerts: Alerts,
         post_event: Callable[[object], None],
         *,
@@ -99,7 +89,8 @@ class Reach:
         self.hosts = view.listens
         if view.epoch != self._epoch:
             self._epoch = view.epoch
-            kept = tuple(str(host) for host in self._settings.get(KEPT, []))
+            hosts: list[object] = self._settings.get(KEPT, [])
+            kept = tuple(map(str, hosts))
             if kept and self.is_near and set(kept) - set(self.hosts):
                 self._tell(kept)
 

@@ -45,7 +45,7 @@ MOST_HELD = 256
 MOST_EARLIER = 4
 
 
-class Processes(Protocol):
+class RobotProcesses(Protocol):
     """What is needed to know about the processes of robots."""
 
     def is_ours(self, identity: Identity) -> bool:
@@ -76,7 +76,7 @@ class Fleet:
         submit: Callable[[str, Callable[[Node], None]], None],
         clock: Callable[[], float] = time.monotonic,
         settings: Settings | None = None,
-        processes: Processes | None = None,
+        processes: RobotProcesses | None = None,
     ) -> None:
         """``watches`` subscribes topics, ``submit`` does something with the node in the source's thread.
 

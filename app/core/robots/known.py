@@ -6,8 +6,8 @@ import contextlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
+from app.core.storage.settings import KeepsLists
 from app.errors import SettingsError
 from app.robots.description.description import Robot
 
@@ -15,16 +15,6 @@ KEY = "robots.known"
 LIMIT = 24
 
 Told = Mapping[str, object]
-
-
-class Keeps(Protocol):
-    """What is needed of the settings."""
-
-    def get(self, key: str, default: list[Told]) -> list[Told]:
-        """A list that was kept."""
-
-    def set(self, key: str, value: object) -> None:
-        """Keep it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +28,14 @@ class KnownRobot:
 class KnownRobots:
     """The real robots that were here, the one seen last first. Virtual ones come whenever they are wanted."""
 
-    def __init__(self, settings: Keeps | None = None, clock: Callable[[], float] = time.time) -> None:
+    def __init__(self, settings: KeepsLists | None = None, clock: Callable[[], float] = time.time) -> None:
         """``settings`` keep them; without it nothing is remembered."""
         self._settings, self._clock = settings, clock
 
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
         """All of them, the one seen last first; what does not look like a robot is left out."""
-        told = self._settings.get(KEY, []) if self._settings is not None else []
+        told: list[Told] = self._settings.get(KEY, []) if self._settings is not None else []
         found = {robot.name: robot for robot in map(_robot, told) if robot is not None}
         return tuple(sorted(found.values(), key=lambda robot: -robot.seen_s))
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from app.blocks.model.program import Program
+from app.core.storage.settings import KeepsLists
 from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
@@ -20,16 +20,6 @@ from nep.i18n import listed
 
 ALWAYS = "robots.may_move"
 MOST_NAMED = 4
-
-
-class Keeps(Protocol):
-    """What is needed of the settings."""
-
-    def get(self, key: str, default: list[str]) -> list[str]:
-        """A list that was kept."""
-
-    def set(self, key: str, value: object) -> None:
-        """Keep it."""
 
 
 class MayNotMoveError(AppError):
@@ -68,7 +58,7 @@ class Moving:
 
     def __init__(
         self,
-        settings: Keeps | None = None,
+        settings: KeepsLists | None = None,
         identity_of: Callable[[str], Identity | None] = lambda _name: None,
     ) -> None:
         """`settings` keep the robots that may always; `identity_of` tells the program that a robot is."""

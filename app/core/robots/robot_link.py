@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from app.core.network.watches import Watch
-from app.robots.description.description import Robot, Topics
+from app.robots.description.description import Robot, RobotTopics
 from app.robots.identity import Identity
 from nep.i18n import _, lazy
 from nep.nodes.publisher import Publisher
@@ -110,7 +110,7 @@ class RobotLink:
     stopping: bool = False
     identity: Identity | None = None
     earlier: tuple[Identity, ...] = ()
-    topics_before: tuple[Topics, ...] = ()
+    topics_before: tuple[RobotTopics, ...] = ()
     is_opening: bool = False
     was_real: bool = False
     left_busy: bool = False

@@ -17,7 +17,7 @@ from typing import Protocol
 
 from app.core.robots.stop_report import RobotStop, StopReport
 from app.robots import rize
-from app.robots.description.description import Robot, Topics
+from app.robots.description.description import Robot, RobotTopics
 from app.robots.identity import (
     Identity,
     Senders,
@@ -57,7 +57,7 @@ def patience_s(robots: Iterable[Robot]) -> float:
     return min(LONGEST_STOP_S, max(STOP_TIMEOUT_S, needed_s))
 
 
-class Publisher(Protocol):
+class StopPublisher(Protocol):
     """What is needed of NEP's publisher."""
 
     def publish(self, payload: object) -> None:
@@ -77,12 +77,12 @@ class Subscriber(Protocol):
         ...
 
 
-class Node(Protocol):
+class StopNode(Protocol):
     """What is needed of NEP's node."""
 
     id: str
 
-    def new_pub(self, topic: str, msg_type: str = "json") -> Publisher:
+    def new_pub(self, topic: str, msg_type: str = "json") -> StopPublisher:
         """A publisher."""
         ...
 
@@ -108,10 +108,10 @@ class StopTarget:
     robot: Robot
     identity: Identity | None = None
     earlier: tuple[Identity, ...] = ()
-    topics: tuple[Topics, ...] = ()
+    topics: tuple[RobotTopics, ...] = ()
 
     @property
-    def ways(self) -> tuple[Topics, ...]:
+    def ways(self) -> tuple[RobotTopics, ...]:
         """Where it is told to stop: the topics of its description first, then those that it had before."""
         return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MOST_TOPICS]
 
@@ -120,7 +120,7 @@ class StopTarget:
 class _Way:
     """Where one robot is told to stop, and where it answers."""
 
-    publisher: Publisher
+    publisher: StopPublisher
     subscriber: Subscriber | None
 
     def close(self) -> None:
@@ -134,7 +134,7 @@ class _Line:
     """The ways to one robot; ``error`` says why one of them is missing."""
 
     target: StopTarget
-    ways: dict[Topics, _Way] = field(default_factory=dict)
+    ways: dict[RobotTopics, _Way] = field(default_factory=dict)
     error: str = ""
 
     @property
@@ -189,7 +189,7 @@ class _Asked:
 class RobotStopper:
     """Keeps a way to each robot and stops them. Its methods may be called from any thread."""
 
-    def __init__(self, node: Node, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, node: StopNode, clock: Callable[[], float] = time.monotonic) -> None:
         """No robots yet: `set_robots`."""
         self._node = node
         self._clock = clock
@@ -342,7 +342,7 @@ class RobotStopper:
         with self._changed:
             line.error = error
 
-    def _connect(self, robot: Robot, topics: Topics) -> _Way:
+    def _connect(self, robot: Robot, topics: RobotTopics) -> _Way:
         if robot.dialect == RIZE:
             return _Way(self._node.new_pub(topics.command, "json"), None)
         publisher = self._node.new_pub(topics.command, "robot/command")
@@ -389,7 +389,7 @@ class RobotStopper:
         asked.error = self._tell(line, asked.id, ends)
         return asked
 
-    def _tell(self, line: _Line, id: str, ends: str | None, only: Iterable[Topics] | None = None) -> str:
+    def _tell(self, line: _Line, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None) -> str:
         """Send a stop on every topic of a robot; the sentence when it went out on none, or nothing."""
         robot = line.target.robot
         stop = robot.safe_stop.action

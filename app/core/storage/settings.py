@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import platformdirs
 
@@ -41,6 +41,16 @@ class RecentFile:
     name: str
     opened_s: float
     there: bool = True
+
+
+class KeepsLists(Protocol):
+    """What is needed of the settings to keep lists there."""
+
+    def get(self, key: str, default: list[T]) -> list[T]:
+        """A list that was kept."""
+
+    def set(self, key: str, value: object) -> None:
+        """Keep it."""
 
 
 class Settings:

@@ -13,14 +13,14 @@ from collections.abc import Mapping
 from app.errors import DescriptionError
 from app.robots.description.inputs import Choice, Parameter, pretty_unit
 from app.robots.description.json_access import as_part, part, text
-from app.robots.description.model import Action, Event, Field, Robot, SafeStop, Sensor, Topics
+from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from app.robots.description.parser import read
 from app.robots.description.validate import validate
 from nep.messages.message import Message
 from nep.text import harmless
 
 __all__ = [
-    "Action", "Choice", "Event", "Field", "Parameter", "Robot", "SafeStop", "Sensor", "Topics",
+    "Action", "Choice", "DataField", "Event", "Parameter", "Robot", "RobotTopics", "SafeStop", "Sensor",
     "announced", "parse", "pretty_unit", "td_for", "topic_of", "validate",
 ]  # fmt: skip
 
@@ -84,9 +84,9 @@ def announced(message: Message) -> Robot:
     return parse(payload)
 
 
-def default_topics(name: str, *, virtual: bool = False) -> Topics:
+def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
     """The topics of a robot of that name, as the kit uses them."""
-    return Topics(
+    return RobotTopics(
         description=topic_of(name, "description"),
         command=topic_of(name, "command"),
         answer=topic_of(name, "answer"),

@@ -9,7 +9,7 @@ from app.robots.description.inputs import Choice, Parameter, check_input
 
 
 @dataclass(frozen=True)
-class Field:
+class DataField:
     """One value inside a sensor's object or an action's output; the unit is as people write it."""
 
     name: str
@@ -40,8 +40,8 @@ class Action:
     uses: tuple[str, ...] = ()
     on_busy: str = "queue"
     synchronous: bool = False
-    feedback: tuple[Field, ...] = ()
-    output: tuple[Field, ...] = ()
+    feedback: tuple[DataField, ...] = ()
+    output: tuple[DataField, ...] = ()
     repeat_s: float | None = None
 
     def parameter(self, name: str) -> Parameter | None:
@@ -74,7 +74,7 @@ class Sensor:
     minimum: float | None = None
     maximum: float | None = None
     rate_hz: float | None = None
-    fields: tuple[Field, ...] = ()
+    fields: tuple[DataField, ...] = ()
     icon: str = "activity"
     category: str = "Sensors"
     text: str = ""
@@ -114,7 +114,7 @@ class SafeStop:
 
 
 @dataclass(frozen=True)
-class Topics:
+class RobotTopics:
     """Where a robot is talked to; ``state`` and ``world`` exist for virtual robots."""
 
     description: str
@@ -141,7 +141,7 @@ class Robot:
     events: tuple[Event, ...]
     safe_stop: SafeStop
     resources: tuple[str, ...]
-    topics: Topics
+    topics: RobotTopics
     source: Mapping[str, object] = field(compare=False, repr=False)
     beat_s: float | None = None
 

@@ -6,17 +6,17 @@ from collections.abc import Mapping
 
 from app.robots.description.inputs import Parameter, choices_of, kind_of, parameter_of, pretty_unit
 from app.robots.description.json_access import as_part, names, number, part, text
-from app.robots.description.model import Action, Event, Field, Robot, SafeStop, Sensor, Topics
+from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 
 _SCHEME = "nep:"
 _LANGUAGE = "en"
 _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 
-def read(document: Mapping[str, object], topics: Topics) -> Robot:
+def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
     """The robot of a document that has no problems; `topics` serve where the document names none."""
     own = part(document, "rb:topics")
-    topics = Topics(
+    topics = RobotTopics(
         description=text(own.get("description")) or topics.description,
         command=text(own.get("command")) or topics.command,
         answer=text(own.get("answer")) or topics.answer,
@@ -54,7 +54,7 @@ def _safe_stop(stop: Mapping[str, object]) -> SafeStop:
     )
 
 
-def _action(name: str, action: Mapping[str, object], topics: Topics) -> Action:
+def _action(name: str, action: Mapping[str, object], topics: RobotTopics) -> Action:
     given = part(action, "input")
     required = names(given.get("required"))
     parameters = _parameters(part(given, "properties"), required)
@@ -134,10 +134,11 @@ def _parameters(data: Mapping[str, object], required: tuple[str, ...]) -> tuple[
     return tuple(parameter_of(name, as_part(d), required=name in required) for name, d in data.items())
 
 
-def _fields(owner: Mapping[str, object]) -> tuple[Field, ...]:
+def _fields(owner: Mapping[str, object]) -> tuple[DataField, ...]:
+    parts = ((name, as_part(found)) for name, found in part(owner, "properties").items())
     return tuple(
-        Field(name, _title(name, as_part(d)), kind_of(as_part(d)), pretty_unit(text(as_part(d).get("unit"))))
-        for name, d in part(owner, "properties").items()
+        DataField(name, _title(name, each), kind_of(each), pretty_unit(text(each.get("unit"))))
+        for name, each in parts
     )
 
 

@@ -14,7 +14,7 @@ from app.robots.description.model import Action, Robot
 from app.robots.driver.call import Call, Failed
 from app.robots.driver.declare import ActionSpec
 from app.robots.driver.schema_values import given
-from app.robots.driver.task import Answer, Program, Task
+from app.robots.driver.task import Answer, ProgramId, Task
 from app.robots.driver.tasks import NOTHING_RUNS, Tasks
 from app.robots.identity import program_of
 
@@ -51,7 +51,7 @@ class Desk:
         message = as_part(command)
         wanted = text(message.get("id"))
         name = text(message.get("from"))
-        program = None if name is None else Program(name, publisher)
+        program = None if name is None else ProgramId(name, publisher)
         operation = message.get("op")
         if program is not None:
             self._tasks.sign_of_life(program, watch=operation == "invoke")
@@ -86,7 +86,7 @@ class Desk:
         action: Action,
         given: Mapping[str, object],
         answer: Callable[[Answer], None],
-        program: Program | None = None,
+        program: ProgramId | None = None,
         publisher: int | None = None,
     ) -> Task:
         """The task that runs an action of the body with an input that has been checked."""
@@ -121,7 +121,7 @@ class Desk:
         return f"{self._robot.name} can't “{name}”{near_miss(name, [a.name for a in self._robot.actions])}"
 
     def _invoke(
-        self, wanted: str, name: str, given: object, program: Program | None, publisher: int | None
+        self, wanted: str, name: str, given: object, program: ProgramId | None, publisher: int | None
     ) -> None:
         if wanted in self._open:
             return  # the same command a second time

@@ -32,7 +32,7 @@ class Answer:
         return self.state in {"succeeded", "failed", "canceled"}
 
 
-class Program(NamedTuple):
+class ProgramId(NamedTuple):
     """Who asks a robot to act: the name in ``from``, and the id of the publisher that the command came from.
 
     Anybody can write another's name; only both together are the program that must stay alive.
@@ -61,7 +61,7 @@ class Task:
     timeout_s: float | None = None
     cancellable: bool = True
     title: str = ""
-    program: Program | None = None
+    program: ProgramId | None = None
     publisher: int | None = None
     goes_on: bool = False
     call: Call | None = None

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
 from app.robots.driver.call import Call, Canceled, Clock, Failed
-from app.robots.driver.task import Answer, Program, Task
+from app.robots.driver.task import Answer, ProgramId, Task
 
 BEAT_S = 0.5
 """While something runs or waits, the robot says at least so often that it lives."""
@@ -38,10 +38,10 @@ class Watchdog:
     def __init__(self, patience_s: float | None) -> None:
         """`patience_s` may pass without a sign of life; None never bites."""
         self.patience_s = patience_s
-        self._heard: dict[Program, float] = {}
-        self._going_on: dict[str, Program] = {}  # resource -> the program that left it in motion
+        self._heard: dict[ProgramId, float] = {}
+        self._going_on: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
 
-    def hear(self, program: Program, now: float, *, watch: bool) -> None:
+    def hear(self, program: ProgramId, now: float, *, watch: bool) -> None:
         """A program said something; `watch` begins to expect more (it asked the robot to act)."""
         if self.patience_s is not None and (watch or program in self._heard):
             self._heard[program] = now
@@ -65,7 +65,7 @@ class Watchdog:
         """When to look again."""
         return [] if self.patience_s is None else [seen + self.patience_s for seen in self._heard.values()]
 
-    def bites(self, now: float, acting: Collection[Program | None]) -> bool:
+    def bites(self, now: float, acting: Collection[ProgramId | None]) -> bool:
         """Whether the robot is to stop; `acting` are the programs of what runs or waits now.
 
         A silent program for which nothing is done is forgotten: it may have ended long ago.
@@ -192,7 +192,7 @@ class Tasks:
             self._end(task, Answer("canceled"))
         return None
 
-    def sign_of_life(self, program: Program, *, watch: bool) -> None:
+    def sign_of_life(self, program: ProgramId, *, watch: bool) -> None:
         """A program said something; `watch` begins to expect more (it asked the robot to act)."""
         self._watchdog.hear(program, self._clock.now(), watch=watch)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from app.robots.description.description import Field, Sensor
+from app.robots.description.description import DataField, Sensor
 
 MINUS = "\u2212"
 
@@ -71,7 +71,7 @@ def _detections(value: Mapping[str, object]) -> ReadingWords:
 
 def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
     """Fields of one unit are said together ("1.3, 0.3 m"), the others beside ("facing 31°")."""
-    fields = sensor.fields or tuple(Field(str(name), str(name), "number") for name in value)
+    fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
     numbers = [(field, number) for field, number in known if _is_number(number)]
     if not numbers:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
-from app.robots.description.description import Field, Robot, Sensor
+from app.robots.description.description import DataField, Robot, Sensor
 from app.ui.text.sensor_values import number_words, reading_of
 
 SILENT = "silent"
@@ -61,7 +61,7 @@ def _words(key: str, sensor: Sensor, value: object) -> dict[str, str]:
     }
 
 
-def _part(field: Field, value: object) -> str:
+def _part(field: DataField, value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return number_words(value, field.unit) if isinstance(value, (int, float)) else str(value)

@@ -10,7 +10,7 @@ from PySide6.QtCore import QRectF, QSize, Signal
 from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
-from app.robots.description.description import Action, Field
+from app.robots.description.description import Action, DataField
 from app.ui.panels.robots.input_text import input_words
 from app.ui.text import plain
 from app.ui.text.numbers import seconds_words
@@ -32,7 +32,7 @@ ROW = 28
 SHOWN = 5
 
 
-def field_words(fields: Sequence[Field], told: Mapping[str, object]) -> str:
+def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
     """The fields that a description names, with their values: "0.3 m to go", "moved 0.5 m"."""
     parts = []
     for field in fields:
