@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from difflib import get_close_matches
 
+from nep.i18n import _
 from nep.text import escaped, shortened
 
 __all__ = [
@@ -48,6 +49,7 @@ __all__ = [
     "WireError",
     "WrongTypeError",
     "did_you_mean",
+    "nearest",
 ]
 
 _LONGEST = 500
@@ -56,10 +58,15 @@ _LONGEST = 500
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
     """`did you mean 'zeromq'?` for the nearest known word, else `known are 'a', 'b'`."""
-    near = get_close_matches(word, known, n=1)
-    if near:
-        return f"did you mean '{near[0]}'?"
-    return "known are " + ", ".join(f"'{name}'" for name in known)
+    near = nearest(word, known)
+    if near is not None:
+        return _("did you mean '{near}'?").format(near=near)
+    return _("known are {names}").format(names=", ".join(f"'{name}'" for name in known))
+
+
+def nearest(word: str, known: Sequence[str]) -> str | None:
+    """The known word that is nearly this one."""
+    return next(iter(get_close_matches(word, known, n=1)), None)
 
 
 class NepError(Exception):
@@ -72,7 +79,7 @@ class WaitTimeoutError(NepError):
     def __init__(self, what: str, timeout_s: float) -> None:
         self.what = what
         self.timeout_s = timeout_s
-        super().__init__(f"{what} did not come within {timeout_s:g} s")
+        super().__init__(_("{what} did not come within {seconds:g} s").format(what=what, seconds=timeout_s))
 
 
 class ClosedError(NepError):
@@ -86,11 +93,13 @@ class ClosedError(NepError):
         self.is_forked = is_forked
         if is_forked:
             super().__init__(
-                f"{what} stayed with the program when it was forked, and is closed here; "
-                "make a new node in the child"
+                _(
+                    "{what} stayed with the program when it was forked, and is closed here; make a new "
+                    "node in the child"
+                ).format(what=what)
             )
         else:
-            super().__init__(f"{what} is closed; make a new one")
+            super().__init__(_("{what} is closed; make a new one").format(what=what))
 
 
 class BadTopicError(NepError, ValueError):
@@ -99,7 +108,9 @@ class BadTopicError(NepError, ValueError):
     def __init__(self, topic: str, reason: str) -> None:
         self.topic = topic
         self.reason = reason
-        super().__init__(f"'{escaped(topic)}' cannot be a topic; {reason}")
+        super().__init__(
+            _("'{topic}' cannot be a topic; {reason}").format(topic=escaped(topic), reason=reason)
+        )
 
 
 class BadNameError(NepError, ValueError):
@@ -108,7 +119,11 @@ class BadNameError(NepError, ValueError):
     def __init__(self, name: str, reason: str) -> None:
         self.name = name
         self.reason = reason
-        super().__init__(f"'{escaped(shortened(name, 200))}' cannot be a node's name; {reason}")
+        super().__init__(
+            _("'{name}' cannot be a node's name; {reason}").format(
+                name=escaped(shortened(name, 200)), reason=reason
+            )
+        )
 
 
 class UnknownBackendError(NepError):
@@ -117,7 +132,11 @@ class UnknownBackendError(NepError):
     def __init__(self, name: str, known: Sequence[str]) -> None:
         self.name = name
         self.known = tuple(known)
-        super().__init__(f"no back end '{name}'; {did_you_mean(name.lower(), self.known)}")
+        super().__init__(
+            _("no back end '{name}'; {did_you_mean}").format(
+                name=name, did_you_mean=did_you_mean(name.lower(), self.known)
+            )
+        )
 
 
 class BackendUnavailableError(NepError):
@@ -126,7 +145,7 @@ class BackendUnavailableError(NepError):
     def __init__(self, name: str, needs: str) -> None:
         self.name = name
         self.needs = needs
-        super().__init__(f"the back end '{name}' is not installed; {needs}")
+        super().__init__(_("the back end '{name}' is not installed; {needs}").format(name=name, needs=needs))
 
 
 class PluginsMissingError(NepError):
@@ -136,8 +155,10 @@ class PluginsMissingError(NepError):
         self.package = package
         self.attribute = attribute
         super().__init__(
-            f"no module of '{package}' binds '{attribute}'; "
-            "name the package to the tool that froze this program"
+            _(
+                "no module of '{package}' binds '{attribute}'; name the package to the tool that "
+                "froze this program"
+            ).format(package=package, attribute=attribute)
         )
 
 
@@ -150,12 +171,16 @@ class MasterUnreachable(NepError):  # noqa: N818 - the name that the specificati
         self.is_known = is_known
         if not is_known:
             super().__init__(
-                f"no computer is called '{address.rpartition(':')[0]}' here; "
-                "look for a typing error, or write its address in numbers",
+                _(
+                    "no computer is called '{address}' here; look for a typing error, or write its "
+                    "address in numbers"
+                ).format(address=address.rpartition(":")[0]),
             )
             return
         super().__init__(
-            f"no master answers at '{address}' (waited {waited_s:g} s); start one with 'nep master'",
+            _("no master answers at '{address}' (waited {seconds:g} s); start one with 'nep master'").format(
+                address=address, seconds=waited_s
+            ),
         )
 
 
@@ -174,13 +199,23 @@ class AddressInUseError(NepError):
         self.address = address
         if not is_own:
             super().__init__(
-                f"'{address}' is no address of this computer; use one of its own, or '127.0.0.1'"
+                _("'{address}' is no address of this computer; use one of its own, or '127.0.0.1'").format(
+                    address=address
+                )
             )
             return
         if address.endswith(":*"):
-            super().__init__(f"no port of '{address[:-2]}' is free; end programs that have many connections")
+            super().__init__(
+                _("no port of '{address}' is free; end programs that have many connections").format(
+                    address=address[:-2]
+                )
+            )
             return
-        super().__init__(f"'{address}' is in use by another program; close it or choose another port")
+        super().__init__(
+            _("'{address}' is in use by another program; close it or choose another port").format(
+                address=address
+            )
+        )
 
 
 class TooManyFilesError(NepError):
@@ -190,12 +225,13 @@ class TooManyFilesError(NepError):
         self.what = what
         self.opened = opened
         self.limit = limit
-        known = opened is not None and limit is not None
-        has = f"{opened} of {limit}" if known else "as many files as it may"
-        super().__init__(
-            f"no room for {what}: this program has {has}{' files' * known} open; "
-            f"close what it no longer needs, or start it after 'ulimit -n {max(8192, 2 * (limit or 0))}'"
-        )
+        if opened is not None and limit is not None:
+            has = _("this program has {opened} of {limit} files open").format(opened=opened, limit=limit)
+        else:
+            has = _("this program has as many files open as it may")
+        step = _("close what it no longer needs, or start it after 'ulimit -n {files}'")
+        step = step.format(files=max(8192, 2 * (limit or 0)))
+        super().__init__(_("no room for {what}: {has}; {step}").format(what=what, has=has, step=step))
 
 
 class EncodeError(NepError, ValueError):
@@ -205,7 +241,9 @@ class EncodeError(NepError, ValueError):
         self.codec = codec
         self.kind = kind
         self.reason = reason
-        super().__init__(f"cannot encode a '{kind}' as '{codec}'; {reason}")
+        super().__init__(
+            _("cannot encode a '{kind}' as '{codec}'; {reason}").format(kind=kind, codec=codec, reason=reason)
+        )
 
 
 class DecodeError(NepError, ValueError):
@@ -215,7 +253,11 @@ class DecodeError(NepError, ValueError):
         self.codec = codec
         self.size_bytes = size_bytes
         self.reason = reason = escaped(shortened(reason, _LONGEST))  # it may repeat what a stranger wrote
-        super().__init__(f"cannot decode {size_bytes} bytes as '{codec}'; {reason}")
+        super().__init__(
+            _("cannot decode {size_bytes} bytes as '{codec}'; {reason}").format(
+                size_bytes=size_bytes, codec=codec, reason=reason
+            )
+        )
 
 
 class WireError(DecodeError):
@@ -231,7 +273,7 @@ class RecordingError(NepError):
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
         self.reason = reason
-        super().__init__(f"cannot use the recording '{path}'; {reason}")
+        super().__init__(_("cannot use the recording '{path}'; {reason}").format(path=path, reason=reason))
 
 
 class WrongTypeError(TypeError, ValueError):

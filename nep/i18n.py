@@ -69,8 +69,8 @@ LEAST_SHARE = 0.9
 """How much of a language is translated when it can be chosen."""
 LOCALE = Path(__file__).with_name("locale")
 
-_BLOCK_HOLE = re.compile(r"%[A-Z][A-Z0-9_]*")
-_PRINTF_HOLE = re.compile(r"%(?:(?:\(\w+\))?[sdr]|\d)")
+_BLOCK_HOLE = re.compile(r"%[A-Za-z_]\w*")
+_PRINTF_HOLE = re.compile(r"%(?:\(\w+\)[sdr]|\d)")
 _LISTS = {
     "and": {"2": "{0} and {1}", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "{0} and {1}"},
     "or": {"2": "{0} or {1}", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "{0} or {1}"},
@@ -257,7 +257,7 @@ def day_text(day: int, month: int, year: int | None = None) -> str:
 
 
 def holes(text: str) -> frozenset[str]:
-    """What stands for something else in a sentence: ``{name}``, ``%NAME`` of a block, ``%s``.
+    """What stands for something else in a sentence: ``{name}``, ``%NAME`` of a block, ``%(name)s``.
 
     Braces that are no holes count as they stand.
     """

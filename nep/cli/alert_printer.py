@@ -6,6 +6,7 @@ import logging
 from collections.abc import Sequence
 
 from nep.cli.screen import console, show_alerts
+from nep.i18n import _
 from nep.masters.master import Master
 from nep.nodes.node import Node
 from nep.protocol.graph_view import Alert, GraphView
@@ -49,7 +50,7 @@ class AlertPrinter:
         """See `Attachment`."""
         new, cured = self._changes.take(view)
         for alert in cured:
-            cured_now = escaped(f"cured: {alert.sentence}")
+            cured_now = escaped(_("cured: {sentence}").format(sentence=alert.sentence))
             console(out=self._out).print(cured_now, style="green", markup=False)
         show_alerts(new, self._out)
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from inspect import cleandoc
 from typing import Annotated
 
 import typer
+from typer.models import CommandInfo
 
 from nep.cli import doctor, log, masters, nodes, topics
 from nep.cli.screen import say_error, write
 from nep.errors import NepError
+from nep.i18n import _
 from nep.system.addresses import MASTER_VARIABLE, master_address
 from nep.system.streams import output_problem, words_given
 from nep.version import __version__
@@ -23,7 +27,7 @@ def _say_version(is_wanted: bool) -> None:
 
 app = typer.Typer(
     name="nep",
-    help="See and make messages between robots, programs and people.",
+    help=_("See and make messages between robots, programs and people."),
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
@@ -40,16 +44,29 @@ app.add_typer(topics.app, name="topic")
 def common(
     master: Annotated[
         str | None,
-        typer.Option("--master", metavar="ADDRESS", help="Where the master is.", show_default=False),
+        typer.Option("--master", metavar=_("ADDRESS"), help=_("Where the master is."), show_default=False),
     ] = None,
     version: Annotated[  # noqa: ARG001 - `_say_version` has done it
         bool,
-        typer.Option("--version", is_eager=True, callback=_say_version, help="Say the version, and end."),
+        typer.Option("--version", is_eager=True, callback=_say_version, help=_("Say the version, and end.")),
     ] = False,
 ) -> None:
     """See and make messages between robots, programs and people."""
     if master is not None:
         os.environ[MASTER_VARIABLE] = master_address(master)  # for the command, and for what it starts
+
+
+def docstrings(group: typer.Typer) -> Iterator[tuple[CommandInfo, str]]:
+    """Each command with what its docstring says, which is its help."""
+    for command in group.registered_commands:
+        yield command, cleandoc((command.callback and command.callback.__doc__) or "")
+    for inner in group.registered_groups:
+        if inner.typer_instance is not None:
+            yield from docstrings(inner.typer_instance)
+
+
+for _command, _english in docstrings(app):
+    _command.help = _(_english)
 
 
 def run() -> int:
@@ -69,7 +86,7 @@ def run() -> int:
         raised, code = error, 1
     problem = output_problem(raised)
     if problem:
-        say_error(f"the output cannot be written: {problem}")
+        say_error(_("the output cannot be written: {problem}").format(problem=problem))
     return code if problem is None else code or 1
 
 

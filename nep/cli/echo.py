@@ -20,6 +20,7 @@ from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json
 from nep.cli.table_file import Fields, Table
 from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
+from nep.i18n import _, listed, ngettext
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
@@ -36,8 +37,8 @@ _SLICE_S = 0.02
 _MoreArgument = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="TOPIC|FIELD",
-        help="More topics; or show these fields only, such as pose.x or joints\\[3].",
+        metavar=_("TOPIC|FIELD"),
+        help=_("More topics; or show these fields only, such as pose.x or joints\\[3]."),
         show_default=False,
         autocompletion=complete_more,
     ),
@@ -47,20 +48,20 @@ _MoreArgument = Annotated[
 def echo(
     topic: Annotated[
         str,
-        typer.Argument(help="The topic to look into.", show_default=False, autocompletion=complete_topic),
+        typer.Argument(help=_("The topic to look into."), show_default=False, autocompletion=complete_topic),
     ],
     more: _MoreArgument = None,
     count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N messages; 0 goes on.")
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N messages; 0 goes on."))
     ] = 0,
     timeout_s: TimeoutOption = None,
     master: MasterOption = None,
     as_json: JsonOption = False,
     as_csv: Annotated[
-        bool, typer.Option("--csv", help="Write the fields as comma-separated values, with their time.")
+        bool, typer.Option("--csv", help=_("Write the fields as comma-separated values, with their time."))
     ] = False,
     full: Annotated[
-        bool, typer.Option("--full", help="Show long lists and texts whole, on a terminal too.")
+        bool, typer.Option("--full", help=_("Show long lists and texts whole, on a terminal too."))
     ] = False,
 ) -> None:
     """Show the messages of topics as they come. Ctrl+C ends it.
@@ -69,12 +70,14 @@ def echo(
     long lists and texts; files and other programs get all of them.
     """
     if as_csv and as_json:
-        raise typer.BadParameter("--csv and --json are two ways to write; choose one")
+        raise typer.BadParameter(_("--csv and --json are two ways to write; choose one"))
     with ExitStack() as opened, node_for("echo", master) as node:
         graph = node.graph()
         topics, fields = sorted_out(topic, more or (), graph)
         if as_csv and not fields:
-            raise typer.BadParameter(f"name the fields: nep topic echo {topic} pose.x pose.y --csv")
+            raise typer.BadParameter(
+                _("name the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
+            )
         picked = Fields(fields)
         waiting = Waiting(node, topics)
         waiting.look(graph)
@@ -103,7 +106,7 @@ def sorted_out(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[
             fields.append(word)
     both = [word for word in more if word in graph.topics and not word.startswith("/")]
     for word in both:
-        say(f"'{word}' is a topic; write .{word} for a field of that name")
+        say(_("'{word}' is a topic; write .{word} for a field of that name").format(word=word))
     return list(dict.fromkeys(topics)), fields
 
 
@@ -125,13 +128,17 @@ def _coming(
                 missing = (each.lost or 0) - lost[each.topic]
                 if missing > 0:
                     lost[each.topic] += missing
-                    said = "1 message" if missing == 1 else f"{missing} messages"
-                    say(f"{said} of '{each.topic}' did not arrive here")
+                    said = ngettext(
+                        "{count} message of '{topic}' did not arrive here",
+                        "{count} messages of '{topic}' did not arrive here",
+                        missing,
+                    )
+                    say(said.format(count=missing, topic=each.topic))
             yield from came
             waiting.heard({message.topic for message in came})
         elif timeout_s is not None and now - last >= timeout_s:
-            names = " or ".join(f"'{each.topic}'" for each in subscribers)
-            raise WaitTimeoutError(f"a message on {names}", timeout_s)
+            names = listed([f"'{each.topic}'" for each in subscribers], "or")
+            raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         else:
             waiting.look_again()
 
@@ -214,8 +221,11 @@ def _body(message: Message, room: int, *, whole: bool) -> str:
     try:
         payload = message.payload
     except DecodeError as error:
-        said = (
-            f"{size(message.size_bytes)}, no {message.codec}: {_hexadecimal(message.data)} ({error.reason})"
+        said = _("{size_bytes}, no {codec}: {hexadecimal} ({reason})").format(
+            size_bytes=size(message.size_bytes),
+            codec=message.codec,
+            hexadecimal=_hexadecimal(message.data),
+            reason=error.reason,
         )
         return cleaned(said)
     if isinstance(payload, str):
@@ -244,7 +254,7 @@ def _hexadecimal(data: bytes | memoryview) -> str:
 
 
 def _picture(message: Message) -> str:
-    shape, told = message.extension.get("shape"), message.extension.get("encoding", "picture")
+    shape, told = message.extension.get("shape"), message.extension.get("encoding", _("picture"))
     encoding = escaped(shortened(str(told), 40))
     if (
         isinstance(shape, (list, tuple))

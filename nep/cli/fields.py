@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from nep.errors import NepError
+from nep.i18n import _
 
 __all__ = ["MISSING", "Path", "leaves", "parse_path", "pick"]
 
@@ -26,7 +27,11 @@ def parse_path(text: str) -> Path:
     while at < len(text):
         found = _STEP.match(text, at)
         if found is None or (text[at] != "." and text[at] != "[" and at > 0):
-            raise NepError(f"'{text}' is no field; write it like 'pose.x', 'joints[3]' or '.' for everything")
+            raise NepError(
+                _("'{text}' is no field; write it like 'pose.x', 'joints[3]' or '.' for everything").format(
+                    text=text
+                )
+            )
         index, quoted, plain = found.groups()
         if index is not None:
             steps.append(int(index))
@@ -34,7 +39,7 @@ def parse_path(text: str) -> Path:
             steps.append(plain if quoted is None else re.sub(r"\\(.)", r"\1", quoted))
         at = found.end()
     if not steps:
-        raise NepError("a field needs a name, like 'pose.x'")
+        raise NepError(_("a field needs a name, like 'pose.x'"))
     return tuple(steps)
 
 

@@ -8,7 +8,8 @@ from collections.abc import Collection, Sequence
 from contextlib import suppress
 
 from nep.cli.screen import say
-from nep.errors import NepError, did_you_mean
+from nep.errors import NepError, nearest
+from nep.i18n import _
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.protocol.wire import check_topic
@@ -57,9 +58,12 @@ class Waiting:
                 self._silent.discard(topic)
             elif topic not in self._silent:
                 self._silent.add(topic)
-                since = "any more" if topic in self._had else "yet"
                 others = [name for name, other in graph.topics.items() if name != topic and other.publishers]
-                say(f"nobody publishes '{topic}' {since}; {_meant(topic, others)}waiting, Ctrl+C ends it")
+                if topic in self._had:
+                    said = _("nobody publishes '{topic}' any more; {meant}waiting, Ctrl+C ends it")
+                else:
+                    said = _("nobody publishes '{topic}' yet; {meant}waiting, Ctrl+C ends it")
+                say(said.format(topic=topic, meant=_meant(topic, others)))
         self._look_at = time.monotonic() + _AGAIN_S
 
     def heard(self, topics: Collection[str]) -> None:
@@ -82,5 +86,5 @@ class Waiting:
 
 def _meant(topic: str, names: Sequence[str]) -> str:
     """Whether another topic was meant."""
-    near = did_you_mean(topic, names)
-    return f"{near} " if near.startswith("did") else ""
+    near = nearest(topic, names)
+    return "" if near is None else _("did you mean '{near}'?").format(near=near) + " "

@@ -16,6 +16,7 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, say, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import DecodeError, did_you_mean
+from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.log_handler import (
     LAST_ERRORS_TOPIC,
@@ -46,17 +47,21 @@ def log(
     level: Annotated[
         str,
         typer.Option(
-            "--level", "-l", metavar="LEVEL", help="From this level on.", autocompletion=_complete_level
+            "--level", "-l", metavar=_("LEVEL"), help=_("From this level on."), autocompletion=_complete_level
         ),
     ] = "info",
     node: Annotated[
         str | None,
         typer.Option(
-            "--node", metavar="NAME", help="Of this node.", show_default=False, autocompletion=complete_node
+            "--node",
+            metavar=_("NAME"),
+            help=_("Of this node."),
+            show_default=False,
+            autocompletion=complete_node,
         ),
     ] = None,
     count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N records; 0 goes on.")
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N records; 0 goes on."))
     ] = 0,
     master: MasterOption = None,
     as_json: JsonOption = False,
@@ -66,11 +71,16 @@ def log(
     Robots' drivers, behaviours and the master log here; in a program of your own use node.log.
     """
     if level.lower() not in {*LEVELS, "warn"}:
-        raise typer.BadParameter(f"no level '{level}'; {did_you_mean(level, LEVELS)}", param_hint="--level")
+        raise typer.BadParameter(
+            _("no level '{level}'; {did_you_mean}").format(
+                level=level, did_you_mean=did_you_mean(level, LEVELS)
+            ),
+            param_hint="--level",
+        )
     least = LEVELS.index(level_of(level))
     with node_for("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
         if not as_json:
-            say("waiting for log records; Ctrl+C ends it")
+            say(_("waiting for log records; Ctrl+C ends it"))
         wanted = (
             record
             for record in _coming(own, subscriber)

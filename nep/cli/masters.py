@@ -15,6 +15,7 @@ from nep.cli.alert_printer import AlertLog, AlertPrinter
 from nep.cli.options import MasterOption
 from nep.cli.screen import console, say
 from nep.errors import AddressInUseError, NepError
+from nep.i18n import _
 from nep.masters.master import Attachment, Master, is_running
 from nep.system.addresses import ANY, host_of, is_loopback, master_address, own_addresses
 from nep.system.descriptors import allow_many
@@ -33,9 +34,11 @@ else:  # the other commands need not wait for them
 _ListenOption = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="ADDRESS",
-        help="Serve other computers, too, at this address of this one; 0.0.0.0 is all of them. There is"
-        " no password: whoever is in that network can read and command everything.",
+        metavar=_("ADDRESS"),
+        help=_(
+            "Serve other computers, too, at this address of this one; 0.0.0.0 is all of them. "
+            "There is no password: whoever is in that network can read and command everything."
+        ),
         show_default=False,
     ),
 ]
@@ -43,7 +46,7 @@ _OwnerOption = Annotated[
     int | None,
     typer.Option(
         metavar="PID",
-        help="End when this process is gone and no program needs the master.",
+        help=_("End when this process is gone and no program needs the master."),
         show_default=False,
     ),
 ]
@@ -56,7 +59,7 @@ def master(
         typer.Option(
             min=1,
             max=65535,
-            help="The port; else that of --master or NEP_MASTER, else 7780.",
+            help=_("The port; else that of --master or NEP_MASTER, else 7780."),
             show_default=False,
         ),
     ] = None,
@@ -65,7 +68,7 @@ def master(
     gateway: Annotated[
         bool,
         typer.Option(
-            "--gateway/--no-gateway", envvar="NEP_GATEWAY", help="Join programs of the original NEP."
+            "--gateway/--no-gateway", envvar="NEP_GATEWAY", help=_("Join programs of the original NEP.")
         ),
     ] = True,
 ) -> None:
@@ -83,7 +86,9 @@ def master(
             problem = collect.loopback_problem()
             if problem:
                 say(
-                    f"but programs of this computer cannot reach it: {problem}; 'nep doctor' says more",
+                    _(
+                        "but programs of this computer cannot reach it: {problem}; 'nep doctor' says more"
+                    ).format(problem=problem),
                     terminal,
                 )
             _warn_of_others(running.address, listen or (), terminal)
@@ -104,7 +109,9 @@ def _started(address: str, owner_pid: int | None, terminal: Terminal, *, joins_o
     except AddressInUseError as error:
         if is_running(address):
             raise NepError(
-                f"a master already runs at '{address}'; use it, or choose another --port"
+                _("a master already runs at '{address}'; use it, or choose another --port").format(
+                    address=address
+                )
             ) from error
         hindered = doctor.hindrance(address)
         if hindered is None:
@@ -118,17 +125,19 @@ def _address(master: str | None, port: int | None) -> str:
         address = f"{host_of(address)}:{port}"
     if not is_loopback(address):
         raise NepError(
-            f"a master answers at 127.0.0.1; use that and add --listen {host_of(address)} for other computers"
+            _(
+                "a master answers at 127.0.0.1; use that and add --listen {host_of} for other computers"
+            ).format(host_of=host_of(address))
         )
     return address
 
 
 def _say_running(address: str, terminal: Terminal, *, joins_originals: bool) -> None:
     out = console(out=terminal)
-    out.print(f"[bold green]●[/] master at [bold]{address}[/]")
+    out.print(_("[bold green]●[/] master at [bold]{address}[/]").format(address=address))
     if joins_originals:
-        out.print("  programs of the original NEP join it too", style="dim")
-    out.print("  Ctrl+C ends it", style="dim")
+        out.print(_("  programs of the original NEP join it too"), style="dim")
+    out.print(_("  Ctrl+C ends it"), style="dim")
 
 
 def _warn_of_others(address: str, hosts: Sequence[str], terminal: Terminal) -> None:
@@ -137,9 +146,15 @@ def _warn_of_others(address: str, hosts: Sequence[str], terminal: Terminal) -> N
     port = address.rpartition(":")[2]
     chosen = [own.host for own in own_addresses()] if ANY in hosts else hosts
     for host in chosen:
-        out.print(f"[bold yellow]●[/] other computers connect with [bold]NEP_MASTER={host}:{port}[/]")
+        out.print(
+            _("[bold yellow]●[/] other computers connect with [bold]NEP_MASTER={host}:{port}[/]").format(
+                host=host, port=port
+            )
+        )
     if hosts:
-        out.print("  whoever is in that network can read and command everything: no password", style="yellow")
+        out.print(
+            _("  whoever is in that network can read and command everything: no password"), style="yellow"
+        )
 
 
 def _end(_signal: int, _frame: FrameType | None) -> None:

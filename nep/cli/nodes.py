@@ -9,27 +9,28 @@ import typer
 
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import UNKNOWN, Column, duration, say, show_alerts, show_json, show_table
+from nep.i18n import _, lazy
 from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import escaped
 
-app = typer.Typer(no_args_is_help=True, help="The programs that are there.")
+app = typer.Typer(no_args_is_help=True, help=_("The programs that are there."))
 _COLUMNS = (
-    Column("node", style="bold", is_whole=True),
-    Column("language"),
-    Column("wire"),
-    Column("pid", "right"),
-    Column("since", "right"),
-    Column("cpu", "right"),
-    Column("publishes", style="green"),
-    Column("subscribes", style="cyan"),
+    Column(lazy("node"), style="bold", is_whole=True),
+    Column(lazy("language")),
+    Column(lazy("wire")),
+    Column(lazy("pid"), "right"),
+    Column(lazy("since"), "right"),
+    Column(lazy("cpu"), "right"),
+    Column(lazy("publishes"), style="green"),
+    Column(lazy("subscribes"), style="cyan"),
 )
 _WIRES = {
-    "native": "native",
+    "native": lazy("native"),
     "A": "NEP ≤ 0.5.4.5",
     "B": "NEP 0.5.4.8",
-    "0.5.4.6": "0.5.4.6, not served",
-    "0.5.4.7": "0.5.4.7, not served",
+    "0.5.4.6": lazy("0.5.4.6, not served"),
+    "0.5.4.7": lazy("0.5.4.7, not served"),
 }
 
 
@@ -44,7 +45,7 @@ def list_nodes(master: MasterOption = None, as_json: JsonOption = False) -> None
     if nodes:
         show_table(_COLUMNS, [_row(graph, node) for node in nodes])
     else:
-        say("no nodes yet; they appear as soon as a program makes one")
+        say(_("no nodes yet; they appear as soon as a program makes one"))
     show_alerts(graph.alerts)
 
 
@@ -53,7 +54,7 @@ def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
     return (
         escaped(node.name),
         escaped(node.language) or UNKNOWN,
-        escaped(_WIRES.get(node.generation, node.generation)),
+        escaped(_(wire) if (wire := _WIRES.get(node.generation)) else node.generation),
         str(node.pid) if node.pid is not None else UNKNOWN,
         duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
         UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",

@@ -6,24 +6,25 @@ from typing import Annotated
 
 import typer
 
+from nep.i18n import _
 from nep.system.addresses import DEFAULT_MASTER
 
 MasterOption = Annotated[
     str | None,
     typer.Option(
         "--master",
-        metavar="ADDRESS",
+        metavar=_("ADDRESS"),
         envvar="NEP_MASTER",
-        help=f"Where the master is; {DEFAULT_MASTER} when nothing is said.",
+        help=_("Where the master is; {address} when nothing is said.").format(address=DEFAULT_MASTER),
         show_default=False,
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Write JSON, for programs.")]
+JsonOption = Annotated[bool, typer.Option("--json", help=_("Write JSON, for programs."))]
 
 
 def _time(given: float | None) -> float | None:
     if given is not None and not given >= 0.0:  # also what is not a number
-        raise typer.BadParameter(f"{given:g} is no time; give seconds, 0 or more")
+        raise typer.BadParameter(_("{given:g} is no time; give seconds, 0 or more").format(given=given))
     return given
 
 
@@ -31,8 +32,8 @@ TimeoutOption = Annotated[
     float | None,
     typer.Option(
         "--timeout",
-        metavar="SECONDS",
-        help="End when no message came for so long.",
+        metavar=_("SECONDS"),
+        help=_("End when no message came for so long."),
         show_default=False,
         callback=_time,
     ),

@@ -20,6 +20,7 @@ from nep.cli.graphs import node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say, size
 from nep.errors import EncodeError, NepError
+from nep.i18n import _, ngettext
 from nep.messages.codecs import CODECS, codec_for
 from nep.messages.encoded import Encoded
 from nep.nodes.arguments import text
@@ -36,8 +37,10 @@ _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 _Payload = Annotated[
     str,
     typer.Argument(
-        help="What to publish: JSON, or plain text for the type string; @FILE takes it from a file, "
-        "- takes each line of the standard input.",
+        help=_(
+            "What to publish: JSON, or plain text for the type string; @FILE takes it from a "
+            "file, - takes each line of the standard input."
+        ),
         show_default=False,
     ),
 ]
@@ -55,8 +58,8 @@ _TypeOption = Annotated[
     typer.Option(
         "--type",
         "-t",
-        metavar="TYPE",
-        help="The topic's type; else the one it has, else json.",
+        metavar=_("TYPE"),
+        help=_("The topic's type; else the one it has, else json."),
         show_default=False,
         callback=_type,
     ),
@@ -67,7 +70,7 @@ _RateOption = Annotated[
         "--rate",
         "-r",
         metavar="HZ",
-        help="Publish again and again, so often a second.",
+        help=_("Publish again and again, so often a second."),
         show_default=False,
     ),
 ]
@@ -76,22 +79,22 @@ _RateOption = Annotated[
 def publish(
     topic: Annotated[
         str,
-        typer.Argument(help="The topic to publish.", show_default=False, autocompletion=complete_topic),
+        typer.Argument(help=_("The topic to publish."), show_default=False, autocompletion=complete_topic),
     ],
     payload: _Payload,
     msg_type: _TypeOption = None,
     rate_hz: _RateOption = None,
     count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help="With --rate: end after N.")
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("With --rate: end after N."))
     ] = 0,
     latched: Annotated[
-        bool, typer.Option("--latched", help="Stay, and give it to whoever subscribes later.")
+        bool, typer.Option("--latched", help=_("Stay, and give it to whoever subscribes later."))
     ] = False,
     master: MasterOption = None,
 ) -> None:
     """Publish once, or with --rate again and again. Ctrl+C ends it."""
     if rate_hz is not None and not 0 < rate_hz <= 10_000:
-        raise typer.BadParameter("a rate is more than 0 and at most 10000 a second", param_hint="--rate")
+        raise typer.BadParameter(_("a rate is more than 0 and at most 10000 a second"), param_hint="--rate")
     with node_for("pub", master) as node:
         known = node.graph().topics.get(topic)
         kind = msg_type or (known.msg_type if known else "json")
@@ -102,20 +105,26 @@ def publish(
                 _publish_lines(publisher, kind)
             else:
                 _repeat(publisher, value, rate_hz or 1.0, count if rate_hz is not None else 1)
-            say(f"published {publisher.count} on '{topic}' ({kind}) to {_people(publisher.subscribers)}")
+            said = _("published {count} on '{topic}' ({kind}) to {people}")
+            people = _people(publisher.subscribers)
+            say(said.format(count=publisher.count, topic=topic, kind=kind, people=people))
             if latched:
-                say("kept for whoever subscribes later; Ctrl+C ends it")
+                say(_("kept for whoever subscribes later; Ctrl+C ends it"))
                 _wait_for_ever()
 
 
 def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
     """Say that others publish the topic with another type, or that a type is nearly the name of a codec."""
     if known is not None and known.publishers and known.msg_type != kind:
-        say(f"'{topic}' is published with the type '{known.msg_type}'; yours is '{kind}'")
+        say(
+            _("'{topic}' is published with the type '{msg_type}'; yours is '{kind}'").format(
+                topic=topic, msg_type=known.msg_type, kind=kind
+            )
+        )
     elif (
         codec_for(kind).name == "json" and (near := get_close_matches(kind, CODECS, n=1)) and near[0] != kind
     ):
-        say(f"the type '{kind}' is sent as JSON; did you mean '{near[0]}'?")
+        say(_("the type '{kind}' is sent as JSON; did you mean '{near}'?").format(kind=kind, near=near[0]))
 
 
 def encoded_of(text: str, msg_type: str) -> Encoded:
@@ -132,19 +141,23 @@ def value_of(text: str, msg_type: str) -> object:
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            raise NepError(f"byte {error.start + 1} of '{text[1:]}' is no UTF-8; save it as UTF-8") from error
+            raise NepError(
+                _("byte {start} of '{text}' is no UTF-8; save it as UTF-8").format(
+                    start=error.start + 1, text=text[1:]
+                )
+            ) from error
     if msg_type in _TEXT_TYPES:
         return text
     if msg_type == "bytes":
         return text.encode()
     if msg_type in _BYTE_TYPES:
-        raise EncodeError(msg_type, "str", "name a JPEG or PNG file: @picture.jpg")
+        raise EncodeError(msg_type, "str", _("name a JPEG or PNG file: @picture.jpg"))
     try:
         return orjson.loads(text)
     except orjson.JSONDecodeError as error:
         shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]} …"
-        reason = f"put a text into quotes ('\"{text[:20]}\"'), or use --type string"
-        raise NepError(f"'{shown}' is no JSON; {reason}") from error
+        said = _("'{shown}' is no JSON; put a text into quotes ('{quoted}'), or use --type string")
+        raise NepError(said.format(shown=shown, quoted=f'"{text[:20]}"')) from error
 
 
 def _read(file: Path, msg_type: str) -> bytes:
@@ -152,12 +165,20 @@ def _read(file: Path, msg_type: str) -> bytes:
         with file.open("rb") as opened:  # it may be a pipe, or a device that has no end
             data = opened.read(_MOST_BYTES + 1)
     except OSError as error:
-        raise EncodeError(msg_type, "file", f"'{file}' cannot be read: {error.strerror}") from error
+        raise EncodeError(
+            msg_type, "file", _("'{file}' cannot be read: {reason}").format(file=file, reason=error.strerror)
+        ) from error
     except ValueError as error:  # letters that no file's name has here
-        raise EncodeError(msg_type, "file", f"'{file}' is no name of a file here") from error
+        raise EncodeError(
+            msg_type, "file", _("'{file}' is no name of a file here").format(file=file)
+        ) from error
     if len(data) > _MOST_BYTES:
         raise EncodeError(
-            msg_type, "file", f"'{file}' has more than the {size(_MOST_BYTES)} that a message may have"
+            msg_type,
+            "file",
+            _("'{file}' has more than the {most} that a message may have").format(
+                file=file, most=size(_MOST_BYTES)
+            ),
         )
     return data
 
@@ -172,8 +193,8 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
         try:
             text = data.decode()
         except UnicodeDecodeError as error:
-            where = f"byte {error.start + 1} of line {number}"
-            raise NepError(f"{where} is no UTF-8; save the text as UTF-8, or use --type bytes") from error
+            said = _("byte {byte} of line {line} is no UTF-8; save the text as UTF-8, or use --type bytes")
+            raise NepError(said.format(byte=error.start + 1, line=number)) from error
         publisher.publish(encoded_of(text, msg_type))
 
 
@@ -185,8 +206,8 @@ def _lines() -> Iterator[bytes]:
         else:
             yield from sys.stdin.buffer
     except OSError as error:
-        why = "it is closed" if error.errno == errno.EBADF else (error.strerror or str(error)).lower()
-        raise NepError(f"the standard input cannot be read: {why}") from error
+        why = _("it is closed") if error.errno == errno.EBADF else (error.strerror or str(error)).lower()
+        raise NepError(_("the standard input cannot be read: {why}").format(why=why)) from error
 
 
 def _repeat(publisher: Publisher, value: object, rate_hz: float, count: int) -> None:
@@ -207,6 +228,6 @@ def _wait_for_ever() -> None:
 
 
 def _people(subscribers: int) -> str:
-    return (
-        "nobody" if subscribers == 0 else "1 subscriber" if subscribers == 1 else f"{subscribers} subscribers"
-    )
+    if subscribers == 0:
+        return _("nobody")
+    return ngettext("{count} subscriber", "{count} subscribers", subscribers).format(count=subscribers)

@@ -18,6 +18,7 @@ from nep.cli.measure import Frequency, Traffic, Window
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
 from nep.errors import WaitTimeoutError
+from nep.i18n import _, lazy, listed
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
@@ -29,8 +30,8 @@ _NARROWEST = 12
 TopicsArgument = Annotated[
     list[str],
     typer.Argument(
-        help="The topics to measure.",
-        metavar="TOPIC",
+        help=_("The topics to measure."),
+        metavar=_("TOPIC"),
         show_default=False,
         autocompletion=complete_topic,
     ),
@@ -38,11 +39,11 @@ TopicsArgument = Annotated[
 WindowOption = Annotated[
     float,
     typer.Option(
-        "--window", "-w", metavar="SECONDS", help="Measure over the last seconds.", min=1.0, max=3600.0
+        "--window", "-w", metavar=_("SECONDS"), help=_("Measure over the last seconds."), min=1.0, max=3600.0
     ),
 ]
 CountOption = Annotated[
-    int, typer.Option("--count", "-n", min=0, metavar="N", help="End after N reports; 0 goes on.")
+    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N reports; 0 goes on."))
 ]
 Figures = Mapping[str, object]
 
@@ -60,7 +61,7 @@ def hz(
     Gaps are told by the publishers' clocks, so this program's own pace does not count; of programs of the
     original NEP, which send no time, by when their messages arrive here.
     """
-    heads = ("rate", "shortest", "longest", "std dev", "messages", "lost")
+    heads = (lazy("rate"), lazy("shortest"), lazy("longest"), lazy("std dev"), lazy("messages"), lazy("lost"))
     _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, as_json=as_json)
 
 
@@ -73,7 +74,14 @@ def bw(
     timeout_s: TimeoutOption = None,
 ) -> None:
     """Show how much topics carry: bytes a second, and how large their messages are. Ctrl+C ends it."""
-    heads = ("bandwidth", "mean", "smallest", "largest", "messages", "lost")
+    heads = (
+        lazy("bandwidth"),
+        lazy("mean"),
+        lazy("smallest"),
+        lazy("largest"),
+        lazy("messages"),
+        lazy("lost"),
+    )
     _Report(topics, window_s, heads, _traffic_cells).run(count, timeout_s, master, as_json=as_json)
 
 
@@ -104,8 +112,8 @@ class _Report:
                 heard = self._listen(node, topic, waiting.msg_type(topic))
                 self._subscribers[topic] = opened.enter_context(heard)
             if not as_json:
-                say("measuring; Ctrl+C ends it")
-                write(f"{self._line('topic', self._heads)}\n")
+                say(_("measuring; Ctrl+C ends it"))
+                write(f"{self._line(_('topic'), [_(head) for head in self._heads])}\n")
             never, started = threading.Event(), time.monotonic()
             for number in itertools.count(1):
                 while (left := started + number * _EVERY_S - time.monotonic()) > 0:
@@ -125,7 +133,8 @@ class _Report:
             self._totals, self._heard_at = totals, now
             waiting.heard(came)
         if timeout_s is not None and now - self._heard_at >= timeout_s:
-            raise WaitTimeoutError(f"a message on {' or '.join(map(repr, totals))}", timeout_s)
+            names = listed([repr(topic) for topic in totals], "or")
+            raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         if len(came) < len(totals):
             waiting.look_again()
 

@@ -7,11 +7,12 @@ import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import IO, TYPE_CHECKING, Literal, cast
 
 from nep.cli.values import json_of
+from nep.i18n import _
 from nep.system.streams import tell
 from nep.text import escaped
 
@@ -56,7 +57,7 @@ def _console_class() -> type[Console]:
         """Tells of a reader that has left as every stream does."""
 
         def on_broken_pipe(self) -> None:
-            raise BrokenPipeError(errno.EPIPE, "nobody reads the output any more")
+            raise BrokenPipeError(errno.EPIPE, _("nobody reads the output any more"))
 
     return OpenConsole
 
@@ -78,6 +79,7 @@ def json_painter() -> Callable[[str, str], Text]:
 
 def show_table(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> None:
     """A table on the standard output."""
+    columns = [replace(column, head=_(column.head)) for column in columns]
     is_terminal = sys.stdout.isatty()  # else a file or a program: nothing to fold for
     room = shutil.get_terminal_size().columns if is_terminal else _ENDLESS
     lines = [[escaped(cell, lines=True) for cell in row] for row in rows]

@@ -12,6 +12,7 @@ from nep.cli.fields import MISSING, Path, parse_path, pick
 from nep.cli.screen import say
 from nep.cli.values import json_of
 from nep.errors import DecodeError
+from nep.i18n import _, ngettext
 from nep.messages.message import Message
 from nep.text import escaped
 
@@ -61,10 +62,18 @@ class Fields:
         """What was missing, on the error stream."""
         for name in self.names:
             if self.missing[name]:
-                say(f"'{name}' was missing in {self.missing[name]} of {self.messages} messages")
+                say(
+                    _("'{name}' was missing in {missing} of {messages} messages").format(
+                        name=name, missing=self.missing[name], messages=self.messages
+                    )
+                )
         if self.unreadable:
-            said = "1 message" if self.unreadable == 1 else f"{self.unreadable} messages"
-            say(f"{said} could not be read and left out")
+            said = ngettext(
+                "{count} message could not be read and left out",
+                "{count} messages could not be read and left out",
+                self.unreadable,
+            )
+            say(said.format(count=self.unreadable))
 
 
 class Table:

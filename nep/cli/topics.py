@@ -12,23 +12,26 @@ from nep.cli.publish import publish
 from nep.cli.rates import bw, hz
 from nep.cli.screen import UNKNOWN, Column, rate, say, show_alerts, show_json, show_table, size
 from nep.cli.values import ids_as_text
+from nep.i18n import _, lazy
 from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.text import escaped
 
-app = typer.Typer(no_args_is_help=True, help="What is published: list it, look into it, measure it, publish.")
+app = typer.Typer(
+    no_args_is_help=True, help=_("What is published: list it, look into it, measure it, publish.")
+)
 app.command("echo")(echo)
 app.command("pub")(publish)
 app.command("hz")(hz)
 app.command("bw")(bw)
 _COLUMNS = (
-    Column("topic", style="bold", is_whole=True),
-    Column("type"),
-    Column("publishers", style="green"),
-    Column("subscribers", style="cyan"),
-    Column("rate", "right"),
-    Column("bandwidth", "right"),
-    Column("lost", "right"),
+    Column(lazy("topic"), style="bold", is_whole=True),
+    Column(lazy("type")),
+    Column(lazy("publishers"), style="green"),
+    Column(lazy("subscribers"), style="cyan"),
+    Column(lazy("rate"), "right"),
+    Column(lazy("bandwidth"), "right"),
+    Column(lazy("lost"), "right"),
 )
 
 
@@ -43,7 +46,7 @@ def list_topics(master: MasterOption = None, as_json: JsonOption = False) -> Non
     if topics:
         show_table(_COLUMNS, [_row(graph, topic) for topic in topics])
     else:
-        say("no topics yet; they appear as soon as a program publishes or subscribes one")
+        say(_("no topics yet; they appear as soon as a program publishes or subscribes one"))
     show_alerts(graph.alerts)
 
 

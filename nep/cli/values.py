@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import orjson
 
+from nep.i18n import _
 from nep.text import escaped, shortened
 
 __all__ = ["ids_as_text", "json_of", "presented"]
@@ -106,7 +107,7 @@ def _map(value: Mapping[object, object], items: float, fields: float, letters: f
     shown: dict[str, object] = {}
     for number, (key, each) in enumerate(value.items()):
         if number >= fields:
-            shown["…"] = f"{len(value) - number} more"
+            shown["…"] = _("{count} more").format(count=len(value) - number)
             break
         shown[_key(key)] = _presented(each, items, fields, letters, depth - 1)
     return shown
@@ -116,7 +117,7 @@ def _list(value: Sequence[object], items: float, fields: float, letters: float, 
     count = len(value) if len(value) <= items else int(items)
     shown = [_presented(each, items, fields, letters, depth - 1) for each in value[:count]]
     if count < len(value):
-        shown.append(orjson.Fragment(f"… {len(value) - count} more".encode()))
+        shown.append(orjson.Fragment(_("… {count} more").format(count=len(value) - count).encode()))
     return shown
 
 
