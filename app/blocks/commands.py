@@ -14,6 +14,7 @@ from app.blocks.runtime.interrupts import without_interrupts
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.runtime import Runtime
 from nep import node as new_node
+from nep.i18n import _
 from nep.system.streams import prepare_streams
 
 __all__ = [
@@ -91,6 +92,6 @@ def run(name: str) -> None:
                 wrong = [network.stop_words(robot) for robot in moving]
                 network.close()
     for words in wrong:
-        _say(f"{words}. Switch it off by hand.")
+        _say(_("{words}. Switch it off by hand.").format(words=words))
     if _runtime.error is not None:
         sys.exit(_runtime.error.sentence)

@@ -12,6 +12,7 @@ from app.blocks.model.category import Category, Entry, Group
 from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
 from app.blocks.model.robot_text import TextParts, about, field_of, input_of, type_of
 from app.robots.description.description import Action, Event, Robot, Sensor
+from app.robots.description.json_access import spoken
 from nep.i18n import _, pgettext
 
 _ICONS = {
@@ -97,9 +98,8 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
 
 
 def _tooltip(robot: Robot, action: Action) -> str:
-    document = _member(robot, "actions", action.name).get("description")
-    if not isinstance(document, str):
-        document = f"{robot.title}: {action.title}."
+    document = spoken(_member(robot, "actions", action.name), "description")
+    document = document or f"{robot.title}: {action.title}."
     return _("{what_it_does} The next block waits until it is done.").format(what_it_does=document)
 
 

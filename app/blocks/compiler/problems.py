@@ -11,15 +11,15 @@ from app.blocks.model.program import Problem, Severity
 from app.blocks.model.workspace import Placed, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Action
-from nep.i18n import listed
+from nep.i18n import _, lazy, listed, pgettext
 
 _ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
 _NEEDS = {
-    "Number": "a number",
-    "String": "a text",
-    "Boolean": "a condition",
-    "List": "a list",
-    None: "a value",
+    "Number": lazy("a number"),
+    "String": lazy("a text"),
+    "Boolean": lazy("a condition"),
+    "List": lazy("a list"),
+    None: lazy("a value"),
 }
 _LITERALS = {"values_number": "NUMBER", "values_text": "TEXT"}
 _STARTER = "events_started"
@@ -45,21 +45,24 @@ class Notes:
         """Nothing starts: an empty workspace is no problem, blocks without a start are."""
         if starts or not self._workspace.scripts:
             return
-        subject = "when started"
+        subject = pgettext("block", "when started")
         self._note(
-            "warning", None, None, subject, f"Nothing starts these blocks. Put “{subject}” above them.",
-            mend="Add “when started”", mend_action=f"add:{_STARTER}",
+            "warning", None, None, subject,
+            _("Nothing starts these blocks. Put “{start}” above them.").format(start=subject),
+            mend=_("Add “when started”"), mend_action=f"add:{_STARTER}",
         )  # fmt: skip
 
     def unattached(self, placed: Placed, block: Block) -> None:
         """Blocks that hang under nothing."""
         name = self.label(placed, block)
-        self._note("info", placed, block, name, f"{name} hangs under no start, so it does not run.")
+        sentence = _("{block} hangs under no start, so it does not run.")
+        self._note("info", placed, block, name, sentence.format(block=name))
 
     def misplaced(self, placed: Placed, block: Block) -> None:
         """A block where it can't stand; the editor does not let this happen, a file may."""
         name = self.label(placed, block)
-        self._note("warning", placed, block, name, f"{name} can't stand there. It is kept and skipped.")
+        sentence = _("{block} can't stand there. It is kept and skipped.")
+        self._note("warning", placed, block, name, sentence.format(block=name))
 
     def too_deep(self, placed: Placed) -> None:
         """Nested too deep for Python."""
@@ -67,7 +70,10 @@ class Notes:
         name = self.label(placed, block)
         self._note(
             "error", placed, block, name,
-            f"{name} is nested too deep to run. Put inner parts into variables or scripts of their own.",
+            _(
+                "{block} is nested too deep to run. Put inner parts into variables or scripts of "
+                "their own."
+            ).format(block=name),
         )  # fmt: skip
 
     def no_message(self, placed: Placed, block: Block) -> None:
@@ -75,54 +81,62 @@ class Notes:
         name = self.label(placed, block)
         self._note(
             "warning", placed, block, name,
-            f"{name} is known only under “when a message arrives”.",
+            _("{block} is known only under “when a message arrives”.").format(block=name),
         )  # fmt: skip
 
     def no_input(self, placed: Placed, block: Block) -> None:
         """An input of a function outside of it, or one that was taken away."""
         name = reading(placed, self._catalogue.blocks, self._workspace.variables)
-        sentence = f"“{name}” is known only inside the function that has it. It is kept and skipped."
+        sentence = _(
+            "“{name}” is known only inside the function that has it. It is kept and skipped."
+        ).format(name=name)
         self._note("warning", placed, block, name, sentence)
 
     def undefined(self, placed: Placed, block: Block) -> None:
         """A call of a function that nobody defined here."""
         self._note(
             "error", placed, block, self.label(placed, block), block.undefined,
-            mend="Define it", mend_action=f"define:{placed.id}",
+            mend=_("Define it"), mend_action=f"define:{placed.id}",
         )  # fmt: skip
 
     def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
         """A field with something that its block can't use."""
         name = self.label(placed, block)
-        self._note("error", placed, block, name, f"{name} {error}. It is kept and skipped.")
+        sentence = _("{block} {what_is_wrong}. It is kept and skipped.")
+        self._note("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
 
     def absent(self, placed: Placed, block: Block | None, holder: Placed | None) -> bool:
         """Whether nobody here can do this block; then it is noted."""
         robot = placed.fields.get("ROBOT")
         name = self.label(placed, block)
-        skipped = f"{name} will be skipped"
+        skipped = name
         if holder is not None:
             outer = self.label(holder, self._catalogue.blocks.get(holder.type))
-            skipped = f"{outer} with {name} will be skipped"
+            skipped = _("{outer_block} with {inner_block}").format(outer_block=outer, inner_block=name)
         if (
             isinstance(robot, str)
             and robot not in self._catalogue.connected
             and placed.type.startswith("robot_")
         ):
+            sentence = _("{robot} is not connected, so {block} will be skipped.")
             self._note(
-                "warning", placed, block, name, f"{robot} is not connected, so {skipped}.",
-                mend=f"Connect {robot}", mend_action=f"connect:{robot}", style="robot",
+                "warning", placed, block, name, sentence.format(robot=robot, block=skipped),
+                mend=_("Connect {robot}").format(robot=robot), mend_action=f"connect:{robot}", style="robot",
             )  # fmt: skip
             return True
         if block is None:
             self._note(
                 "warning", placed, None, name,
-                f"This file uses “{name}”, which no connected robot can do. It is kept and skipped.",
+                _(
+                    "This file uses “{block}”, which no connected robot can do. "
+                    "It is kept and skipped."
+                ).format(block=name),
                 style="robot" if placed.type.startswith("robot_") else None,
             )  # fmt: skip
             return True
         if isinstance(robot, str) and block.robot is not None and not self._can(robot, block):
-            self._note("warning", placed, block, name, f"{robot} can't do this, so {skipped}.")
+            sentence = _("{robot} can't do this, so {block} will be skipped.")
+            self._note("warning", placed, block, name, sentence.format(robot=robot, block=skipped))
             return True
         return False
 
@@ -162,7 +176,9 @@ class Notes:
             if (inner and inner[0].enabled) or not argument.is_there(placed.fields):
                 continue
             name = self.label(placed, block)
-            sentence = f"{name} needs {_NEEDS[argument.check]}. Put one into the gap."
+            sentence = _("{block} needs {what}. Put one into the gap.").format(
+                block=name, what=_(_NEEDS[argument.check])
+            )
             self._note("error", placed, block, name, sentence)
             return sentence
         return None
@@ -171,9 +187,8 @@ class Notes:
         """What is worth saying about a block that will run."""
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
             self._note(
-                "info", placed, block, "wait until",
-                f"wait until may wait for ever if {self._never(placed)}.",
-                mend="Add a time limit", mend_action=f"limit:{placed.id}",
+                "info", placed, block, self.label(placed, block), self._for_ever(placed, block),
+                mend=_("Add a time limit"), mend_action=f"limit:{placed.id}",
             )  # fmt: skip
         robot = self._catalogue.connected.get(str(placed.fields.get("ROBOT")))
         action = robot.action(block.robot.name) if robot and block.robot else None
@@ -185,15 +200,16 @@ class Notes:
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
             who, name = listed(real), self.label(placed, block)
-            sentence = f"{name} on {topic} moves {who}: you are asked before it does, and Stop stops it."
-            self._note("info", placed, block, name, sentence)
+            said = _("{block} on {topic} moves {robots}: you are asked before it does, and Stop stops it.")
+            self._note("info", placed, block, name, said.format(block=name, topic=topic, robots=who))
 
-    def _never(self, placed: Placed) -> str:
+    def _for_ever(self, placed: Placed, block: Block) -> str:
+        name = self.label(placed, block)
         condition = placed.inputs["CONDITION"][0]
         words = reading(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
         if any(word in words for word in ("face", "person", "people")):
-            return "nobody comes"
-        return "that never happens"
+            return _("{block} may wait for ever if nobody comes.").format(block=name)
+        return _("{block} may wait for ever if that never happens.").format(block=name)
 
     def _check_input(self, placed: Placed, block: Block, action: Action) -> None:
         """What the robot would refuse, as far as it is written in the block."""

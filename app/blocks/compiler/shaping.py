@@ -16,6 +16,7 @@ from app.blocks.model.growing import FunctionInput, Inputs, Items, inputs_of, na
 from app.blocks.model.names import Names
 from app.blocks.model.workspace import Placed, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
+from nep.i18n import _
 
 PLAIN, RESULT = "functions_define", "functions_define_result"
 CALL, CALL_RESULT = "functions_call", "functions_result"
@@ -104,7 +105,9 @@ class Shaping:
         text = " ".join((name, *(f"{_plain(each.name)} %{gap.name}" for each, gap in gaps)))
         made = replace(block, type=f"{block.type}:{placed.id}", text=text)
         if function is None:
-            sentence = f"“{name}” has no definition in this behaviour. Make one, or take this block away."
+            sentence = _(
+                "“{name}” has no definition in this behaviour. Make one, or take this block away."
+            ).format(name=name)
             made = replace(
                 made, text=name, arguments=(), python="fail(%X_SENTENCE)",
                 constants={"X_SENTENCE": sentence}, undefined=sentence,

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
+from nep.i18n import _
+
 Say = Callable[[str | None, str], str]
 """(context, English) -> what a person reads, see `app.blocks.model.block.Block.translated`."""
 Check = Literal["Number", "String", "Boolean", "List"]
@@ -137,9 +139,9 @@ class NumberField(Field):
         """A finite number inside the limits; text that reads as one is taken too."""
         number = _number(self.value if saved is None else saved)
         if self.minimum is not None and number < self.minimum:
-            raise FieldError(f"needs a number of at least {self.minimum:g}")
+            raise FieldError(_("needs a number of at least {minimum:g}").format(minimum=self.minimum))
         if self.maximum is not None and number > self.maximum:
-            raise FieldError(f"needs a number of at most {self.maximum:g}")
+            raise FieldError(_("needs a number of at most {maximum:g}").format(maximum=self.maximum))
         return number
 
 
@@ -187,12 +189,12 @@ class ChoiceField(Field):
         """The chosen value; FieldError if it is none of the options."""
         if saved is None and self.options:
             return self.options[0][1]
-        for _, value in self.options:
+        for _words, value in self.options:
             if _key(value) == _key(saved):
                 return value
         if self.source is not None:
             return "" if saved is None else str(saved)
-        raise FieldError(f"has no choice “{saved}”")
+        raise FieldError(_("has no choice “{saved}”").format(saved=saved))
 
     def translated(self, say: Say) -> Argument:
         """What people choose from, unless these are names of robots."""
@@ -219,11 +221,11 @@ class TopicField(Field):
         """A valid topic name (`WIRE`: no white space, control characters or "{", 1 to 200 bytes)."""
         topic = self.value if saved is None else str(saved)
         if not topic:
-            raise FieldError("needs the name of a topic")
+            raise FieldError(_("needs the name of a topic"))
         if any(character.isspace() or character == "{" or not character.isprintable() for character in topic):
-            raise FieldError("needs a topic without spaces")
+            raise FieldError(_("needs a topic without spaces"))
         if len(topic.encode("utf-8", "replace")) > _TOPIC_LIMIT:
-            raise FieldError("needs a shorter topic")
+            raise FieldError(_("needs a shorter topic"))
         return topic
 
 
@@ -257,7 +259,7 @@ class ColourField(Field):
         """Six digits after a number sign."""
         colour = self.value if saved is None else str(saved)
         if not _COLOUR.fullmatch(colour):
-            raise FieldError("needs a colour")
+            raise FieldError(_("needs a colour"))
         return colour.lower()
 
 
@@ -280,7 +282,7 @@ class VariableField(Field):
         if isinstance(saved, Mapping):
             saved = saved.get("id", saved.get("name"))
         if not isinstance(saved, str) or not saved:
-            raise FieldError("needs a variable")
+            raise FieldError(_("needs a variable"))
         return saved
 
 
@@ -311,13 +313,13 @@ def _key(value: object) -> str:
 
 def _number(saved: object) -> int | float:
     if isinstance(saved, bool) or not isinstance(saved, (int, float, str)):
-        raise FieldError("needs a number")
+        raise FieldError(_("needs a number"))
     try:
         number = float(saved)
     except (ValueError, OverflowError):
-        raise FieldError("needs a number") from None
+        raise FieldError(_("needs a number")) from None
     if not math.isfinite(number):
-        raise FieldError("needs a number that is not endless")
+        raise FieldError(_("needs a number that is not endless"))
     return int(number) if number.is_integer() and abs(number) < 2**53 else number
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.scheduler import Scheduler, Stopped
+from nep.i18n import _
 
 MOST_DEEP = 200
 _FRAMES = 6000  # Python's own limit: a call of ours with its values takes up to a dozen of its calls
@@ -38,7 +39,10 @@ class Calls:
         depth = int(getattr(self._mine, "depth", 0))
         if depth >= MOST_DEEP:
             raise BehaviourError(
-                f"“{name}” uses itself more than {MOST_DEEP} times, one inside the other.", block
+                _("“{name}” uses itself more than {count} times, one inside the other.").format(
+                    name=name, count=MOST_DEEP
+                ),
+                block,
             )
         self._mine.depth = depth + 1
         before = self._scheduler.block()

@@ -31,6 +31,7 @@ from app.blocks.runtime.runtime import Runtime
 from app.errors import AppError
 from app.robots.description.description import Robot, parse
 from nep.errors import NepError
+from nep.i18n import _
 
 SAMPLE_S = 1 / 30
 STOP_ANSWER_S = 1.0
@@ -80,9 +81,14 @@ class Out:
                 break
             self._left -= 1
             if self._left == 0:
-                self.send("print", text=f"nothing more is shown: {MOST_LINES} lines are enough")
+                self.send(
+                    "print",
+                    text=_("nothing more is shown: {count} lines are enough").format(count=MOST_LINES),
+                )
         if self._dropped:
-            self.send("print", text=f"{self._dropped} lines were left out: too many at once")
+            self.send(
+                "print", text=_("{count} lines were left out: too many at once").format(count=self._dropped)
+            )
             self._dropped = 0
 
 
@@ -275,9 +281,9 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
     except BehaviourError as error:
         out.send("error", block=error.block, sentence=error.sentence)
     except (AppError, NepError) as error:
-        out.send("error", block=None, sentence=f"The program can't begin: {error}.")
+        out.send("error", block=None, sentence=_("The program can't begin: {error}.").format(error=error))
     except (KeyError, TypeError, ValueError, SyntaxError) as error:
-        out.send("error", block=None, sentence=f"The program can't be read: {error}.")
+        out.send("error", block=None, sentence=_("The program can't be read: {error}.").format(error=error))
     out.send("ended", ok=False, elapsed_s=0.0, silent=[])
     return 1
 

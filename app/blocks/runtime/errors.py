@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from app.errors import AppError
-from nep.i18n import listed
+from nep.i18n import _, lazy, listed
 
 _KINDS = {
-    "int": "a number",
-    "float": "a number",
-    "bool": "true or false",
-    "str": "a text",
-    "list": "a list",
-    "dict": "a message",
-    "NoneType": "nothing",
+    "int": lazy("a number"),
+    "float": lazy("a number"),
+    "bool": lazy("true or false"),
+    "str": lazy("a text"),
+    "list": lazy("a list"),
+    "dict": lazy("a message"),
+    "NoneType": lazy("nothing"),
 }
 
 
@@ -34,28 +34,32 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
     if isinstance(error, BehaviourError):
         error.block = error.block or block
         return error
-    name = f"“{label}”" if label else "this block"
+    name = f"“{label}”" if label else _("this block")
     if isinstance(error, AppError):
         return BehaviourError(f"{name}: {error.sentence}.", block)
     if isinstance(error, ZeroDivisionError):
-        return BehaviourError(f"{name} can't divide by 0.", block)
+        return BehaviourError(_("{name} can't divide by 0.").format(name=name), block)
     if isinstance(error, (OverflowError, MemoryError)):
-        return BehaviourError(f"{name} gives something too large.", block)
+        return BehaviourError(_("{name} gives something too large.").format(name=name), block)
     if isinstance(error, RecursionError):
-        return BehaviourError(f"{name} is nested too deep.", block)
+        return BehaviourError(_("{name} is nested too deep.").format(name=name), block)
     if isinstance(error, TypeError):
         if "NoneType" in str(error):
-            return BehaviourError(f"{name} needs a value that is not known yet.", block, unknown=True)
-        return BehaviourError(f"{name} can't do this with {_kinds(str(error))}.", block)
-    return BehaviourError(f"{name} failed: {error}.", block)
+            return BehaviourError(
+                _("{name} needs a value that is not known yet.").format(name=name), block, unknown=True
+            )
+        return BehaviourError(
+            _("{name} can't do this with {kinds}.").format(name=name, kinds=_kinds(str(error))), block
+        )
+    return BehaviourError(_("{name} failed: {error}.").format(name=name, error=error), block)
 
 
 def kind(value: object) -> str:
     """What a value is, in words: "a text"."""
-    return _KINDS.get(type(value).__name__, "something else")
+    return _(_KINDS.get(type(value).__name__, lazy("something else")))
 
 
 def _kinds(sentence: str) -> str:
     """The kinds that Python names in its sentence: "a text and a number"."""
     words = [word for quoted, word in _KINDS.items() if f"'{quoted}'" in sentence]
-    return listed(list(dict.fromkeys(words))) or "these values"
+    return listed([_(word) for word in dict.fromkeys(words)]) or _("these values")

@@ -20,7 +20,7 @@ from app.robots.identity import (
     wrong_topic,
 )
 from nep.errors import NepError
-from nep.i18n import listed
+from nep.i18n import _, listed
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
@@ -158,8 +158,15 @@ def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> Found:
     """The result, with what is not believed in words; a robot with another one's topics is left out."""
     claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
     claims += [
-        f"{len(each.twins) + 1} programs say that they are {each.robot.name}: {each.owner.words} was first "
-        f"and is the robot; {listed(each.twins)} changes nothing."
+        _(
+            "{count} programs say that they are {robot}: {first} was first and is the robot; "
+            "{others} changes nothing."
+        ).format(
+            count=len(each.twins) + 1,
+            robot=each.robot.name,
+            first=each.owner.words,
+            others=listed(list(each.twins)),
+        )
         for each in asked.values()
         if each.twins and each.robot is not None
     ]
@@ -169,7 +176,7 @@ def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> Found:
         if claim is None:
             robots[name] = there[name]
         else:
-            claims.append(f"{claim}; {name} is left out.")
+            claims.append(_("{claim}; {robot} is left out.").format(claim=claim, robot=name))
     owners = {
         each.robot.name: each.owner
         for each in asked.values()

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from app.blocks.runtime.errors import BehaviourError, kind
 from app.blocks.runtime.values import LONGEST_TEXT, number, text
+from nep.i18n import _, lazy, ngettext
 
 MOST_ITEMS = 10_000
 FIRST, LAST, RANDOM = "first", "last", "random"
@@ -82,7 +83,9 @@ def join_items(of: object, between: object) -> str:
         pieces.append(text(one))
         size += len(pieces[-1]) + len(joint)
         if size > LONGEST_TEXT:
-            raise BehaviourError(f"This text is too long: more than {LONGEST_TEXT} characters.")
+            raise BehaviourError(
+                _("This text is too long: more than {most} characters.").format(most=LONGEST_TEXT)
+            )
     return joint.join(pieces)
 
 
@@ -99,37 +102,40 @@ def _read(of: object) -> Sequence[object]:
     if isinstance(of, (list, tuple)):
         return of
     if of is None:
-        raise BehaviourError("This list is not known yet.", unknown=True)
-    hint = " Set the variable to an empty list first." if of == 0 and isinstance(of, int) else ""
-    raise BehaviourError(f"This needs a list, not {kind(of)}.{hint}")
+        raise BehaviourError(_("This list is not known yet."), unknown=True)
+    said = _("This needs a list, not {kind}.")
+    if of == 0 and isinstance(of, int):
+        said = _("This needs a list, not {kind}. Set the variable to an empty list first.")
+    raise BehaviourError(said.format(kind=kind(of)))
 
 
 def _changed(of: object) -> list[object]:
     items = _read(of)
     if not isinstance(items, list):
-        raise BehaviourError("This list can't be changed.")
+        raise BehaviourError(_("This list can't be changed."))
     return items
 
 
 def _index(items: Sequence[object], where: object) -> int:
     if not items:
-        raise BehaviourError("The list is empty.")
+        raise BehaviourError(_("The list is empty."))
     if where == FIRST:
         return 0
     if where == LAST:
         return len(items) - 1
     if where == RANDOM:
         return random.randrange(len(items))  # noqa: S311 (a game, no secret)
-    place = number(where, "“item number”")
+    place = number(where, lazy("“item number”"))
     if place != int(place):
-        raise BehaviourError(f"“item number” needs a whole number, not {text(place)}.")
+        raise BehaviourError(_("“item number” needs a whole number, not {place}.").format(place=text(place)))
     if not 1 <= place <= len(items):
-        raise BehaviourError(f"The list has {_many(len(items))}; there is no item {text(place)}.")
+        said = ngettext(
+            "The list has {count} item; there is no item {number}.",
+            "The list has {count} items; there is no item {number}.",
+            len(items),
+        )
+        raise BehaviourError(said.format(count=len(items), number=text(place)))
     return int(place) - 1
-
-
-def _many(count: int) -> str:
-    return "1 item" if count == 1 else f"{count} items"
 
 
 def _same(one: object, other: object) -> bool:
@@ -177,4 +183,4 @@ def _size(value: object, enough: int) -> int:
 
 
 def _full() -> BehaviourError:
-    return BehaviourError(f"The list is full: it has room for {MOST_ITEMS} items.")
+    return BehaviourError(_("The list is full: it has room for {most} items.").format(most=MOST_ITEMS))

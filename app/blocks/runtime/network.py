@@ -18,6 +18,7 @@ from app.robots import rize
 from app.robots.description.description import Robot
 from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
 from nep.errors import NepError
+from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
@@ -274,7 +275,7 @@ class Network:
 
     def stop_words(self, name: str) -> str:
         """What is wrong with the stop of a robot: its own words when it refused, without a full stop."""
-        return self._refused.get(name) or f"{name} did not answer"
+        return self._refused.get(name) or _("{robot} did not answer").format(robot=name)
 
     def _serving(self, robot: Robot) -> set[str]:
         """The nodes that must answer a stop: the robot's own, and others that answer its commands."""

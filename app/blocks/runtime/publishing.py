@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from app.blocks.runtime.errors import BehaviourError
 from app.robots import rize
 from app.robots.description.description import Robot
-from nep.i18n import listed
+from nep.i18n import _, listed
 
 
 def moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:
@@ -48,6 +48,8 @@ class PublishGuard:
         if names:
             who = listed(names)
             raise BehaviourError(
-                f"Publishing on {topic} would move {who}, and nobody was asked whether it may. "
-                "Stop the behaviour and run it again."
+                _(
+                    "Publishing on {topic} would move {who}, and nobody was asked whether it may. Stop "
+                    "the behaviour and run it again."
+                ).format(topic=topic, who=who)
             )

@@ -18,7 +18,7 @@ from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.status_text import StatusText
 from app.robots.description.description import Action, Parameter, Robot
 from app.robots.description.inputs import from_words
-from nep.i18n import listed
+from nep.i18n import _, listed
 
 FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0
@@ -88,7 +88,7 @@ class RobotHandle:
         robot = self._runtime.described(self._name)
         link, scheduler = self._runtime.linked(), self._runtime.scheduler
         if robot.sensor(sensor) is None:
-            raise BehaviourError(f"{self._name} has no sensor “{sensor}”.")
+            raise BehaviourError(_("{name} has no sensor “{sensor}”.").format(name=self._name, sensor=sensor))
         if link.sensor(self._name, sensor) is None:
             # Sensors tell their value several times a second: the first one may still be under way.
             scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_S)
@@ -111,11 +111,11 @@ class RobotHandle:
         robot = self._runtime.described(self._name)
         action = robot.action(name)
         if action is None:
-            raise BehaviourError(f"{self._name} can't “{name}”.")
+            raise BehaviourError(_("{name} can't “{name_2}”.").format(name=self._name, name_2=name))
         input = {key: _fitting(action, key, value) for key, value in given.items()}
         wrong = action.check(action.complete(input))
         if wrong:
-            raise BehaviourError(f"{self._name} can't do this: {wrong[0]}.")
+            raise BehaviourError(_("{name} can't do this: {wrong}.").format(name=self._name, wrong=wrong[0]))
         words = sentence(robot, action, input)
         self._runtime.saying.tell(words)
         try:
@@ -123,7 +123,10 @@ class RobotHandle:
         finally:
             self._runtime.saying.tell("")
         if call.state == "failed":
-            raise BehaviourError(_ended(f"{self._name}: {call.error or f'“{action.title}” failed'}"))
+            why = call.error or _("“{action}” failed").format(action=action.title)
+            raise BehaviourError(
+                _ended(_("{robot}: {what_it_said}").format(robot=self._name, what_it_said=why))
+            )
         return call
 
     def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> RobotCall:
@@ -141,18 +144,22 @@ class RobotHandle:
 
     def _stay(self, action: Action, unknown: bool) -> None:
         """Until the pause ends; a person reads that the rest of a move will be left out, and that it was."""
-        known = f"{self._name} does not tell how much of “{action.title}” is left"
+        names = {"robot": self._name, "action": action.title}
         saying = self._runtime.saying
-        saying.warn(f"{known}; Go on leaves it out" if unknown else "")
+        ahead = _("{robot} does not tell how much of “{action}” is left; Go on leaves it out")
+        saying.warn(ahead.format(**names) if unknown else "")
         self._runtime.scheduler.hold()
         saying.warn("")
         if unknown:
-            self._runtime.write(f"{known}, so it was left out")
+            done = _("{robot} does not tell how much of “{action}” is left, so it was left out")
+            self._runtime.write(done.format(**names))
 
     def _await(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
         scheduler = self._runtime.scheduler
         if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
-            raise BehaviourError(f"{self._name} does not answer. {_check(robot)}")
+            raise BehaviourError(
+                _("{name} does not answer. {check}").format(name=self._name, check=_check(robot))
+            )
         can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or LONGEST_S
         until = time.monotonic() + limit + MARGIN_S
@@ -170,7 +177,9 @@ class RobotHandle:
                 self._runtime.saying.tell(_waiting(robot, call) if waits else words)
             said = self._broken(robot, call)
             if said is None and time.monotonic() >= until:
-                said = f"{self._name} has not ended “{action.title}” within {limit:g} s."
+                said = _("{name} has not ended “{title}” within {limit:g} s.").format(
+                    name=self._name, title=action.title, limit=limit
+                )
             if said is not None:
                 self._runtime.linked().cancel(call)
                 raise BehaviourError(said)
@@ -184,21 +193,23 @@ class RobotHandle:
         silence = time.monotonic() - call.heard_s
         if silence <= max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s):
             return None
-        return f"{self._name} has stopped answering. {_check(robot)}"
+        return _("{name} has stopped answering. {check}").format(name=self._name, check=_check(robot))
 
     def _hold(self, call: RobotCall) -> None:
         """The pause takes the command back; a robot that does not end it is no longer under control."""
         call.held = True
         self._runtime.linked().cancel(call)
         if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
-            raise BehaviourError(f"{self._name} does not hold still, so the behaviour was stopped.")
+            raise BehaviourError(
+                _("{name} does not hold still, so the behaviour was stopped.").format(name=self._name)
+            )
 
 
 def _waiting(robot: Robot, call: RobotCall) -> str:
     """What the robot does first: "Pepper waits for “say”"."""
     found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
     titles = [f"“{action.title if action is not None else name}”" for action, name in found]
-    return f"{robot.name} waits for {listed(titles)}"
+    return _("{robot} waits for {actions}").format(robot=robot.name, actions=listed(titles))
 
 
 def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
@@ -223,7 +234,10 @@ def _fitting(action: Action, name: str, value: object) -> object:
         return value
     if value is None:
         raise BehaviourError(
-            f"“{action.title}” needs a value for “{parameter.title}” that is not known yet.", unknown=True
+            _("“{title}” needs a value for “{value}” that is not known yet.").format(
+                title=action.title, value=parameter.title
+            ),
+            unknown=True,
         )
     return _as_kind(parameter, value)
 
@@ -245,8 +259,8 @@ def _ended(words: str) -> str:
 def _check(robot: Robot) -> str:
     """What a person does about a robot that is silent."""
     if robot.virtual:
-        return "Start the virtual robot again."
-    return "Check that it is on and in the same Wi-Fi."
+        return _("Start the virtual robot again.")
+    return _("Check that it is on and in the same Wi-Fi.")
 
 
 def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:

@@ -20,6 +20,7 @@ from app.blocks.runtime.scheduler import Scheduler, Stopped
 from app.blocks.runtime.status_text import StatusText
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
 from app.robots.description.description import Robot
+from nep.i18n import _, lazy, translate
 
 _OWN = (
     "called", "fail", "newest", "number", "on_message", "on_start", "on_true", "publish", "robot", "step",
@@ -110,7 +111,11 @@ class Runtime:
                 script(*arguments)
             self.scheduler.rest()
             if hat.dropped:
-                self.write(f"“{hat.title}” was too slow: {hat.dropped} of its events were left out")
+                self.write(
+                    _("“{title}” was too slow: {dropped} of its events were left out").format(
+                        title=hat.title, dropped=hat.dropped
+                    )
+                )
                 hat.dropped = 0
 
     def _guarded(self, body: Callable[[], None]) -> Callable[[], None]:
@@ -136,7 +141,11 @@ class Runtime:
         self.finished.set()
 
     def _stopped_outside(self, robot: str) -> None:
-        self._fail(BehaviourError(f"{robot} was stopped by somebody else, so the behaviour ended."))
+        self._fail(
+            BehaviourError(
+                _("{robot} was stopped by somebody else, so the behaviour ended.").format(robot=robot)
+            )
+        )
 
     def stop_program(self) -> None:
         """End all scripts."""
@@ -164,8 +173,8 @@ class Runtime:
             return result
         name = f"“{self._labels.get(block, '')}”"
         if isinstance(result, complex):
-            raise BehaviourError(f"{name} has no result for these numbers.", block)
-        raise BehaviourError(f"{name} needs numbers, not a text.", block)
+            raise BehaviourError(_("{name} has no result for these numbers.").format(name=name), block)
+        raise BehaviourError(_("{name} needs numbers, not a text.").format(name=name), block)
 
     def called(self, block: str, call: Callable[[], object]) -> object:
         """What a function gives back; afterwards the script is where it was before."""
@@ -178,11 +187,11 @@ class Runtime:
 
     def wait(self, seconds: object) -> None:
         """Wait that many seconds."""
-        self.scheduler.wait(float(values.number(seconds, "“wait”")))
+        self.scheduler.wait(float(values.number(seconds, lazy("“wait”"))))
 
     def wait_until(self, condition: Callable[[], object], at_most_s: object = None) -> None:
         """Wait until the condition is so; what is not known yet is not so."""
-        limit = None if at_most_s is None else float(values.number(at_most_s, "“wait until”"))
+        limit = None if at_most_s is None else float(values.number(at_most_s, lazy("“wait until”")))
         self.scheduler.wait_until(lambda: _is_so(condition), limit)
 
     def write(self, value: object) -> None:
@@ -213,13 +222,15 @@ class Runtime:
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_message(topic, lambda payload: hat.happened((payload,)))
 
-        return self._hat(f"when a message arrives on {topic}", prepare, MESSAGES_WAITING)
+        return self._hat(
+            _("when a message arrives on {topic}").format(topic=topic), prepare, MESSAGES_WAITING
+        )
 
     def on_true(self, condition: Callable[[], object]) -> Decorator:
         """The script runs each time the condition becomes so."""
 
         def decorate(script: Script) -> Script:
-            self._hats.append((Hat("when … becomes true", condition=lambda: _is_so(condition)), script))
+            self._hats.append((Hat(_("when … becomes true"), condition=lambda: _is_so(condition)), script))
             return script
 
         return decorate
@@ -237,7 +248,7 @@ class Runtime:
 
             link.on_event(robot, event, told)
 
-        return self._hat(f"when {robot} {event}", prepare, EVENTS_WAITING)
+        return self._hat(_("when {robot} {event}").format(robot=robot, event=event), prepare, EVENTS_WAITING)
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
         """The script runs each time the sensor tells another value."""
@@ -245,7 +256,9 @@ class Runtime:
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, changes(lambda: hat.happened(())))
 
-        return self._hat(f"when {robot} {sensor} changes", prepare, EVENTS_WAITING)
+        return self._hat(
+            _("when {robot} {sensor} changes").format(robot=robot, sensor=sensor), prepare, EVENTS_WAITING
+        )
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
         """The script runs each time the sensor passes the limit to that side."""
@@ -253,7 +266,13 @@ class Runtime:
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, PassGate(side, limit, lambda: hat.happened(())))
 
-        return self._hat(f"when {robot} {sensor} goes {side} {limit:g}", prepare, EVENTS_WAITING)
+        return self._hat(
+            _("when {robot} {sensor} goes {side} {limit}").format(
+                robot=robot, sensor=sensor, side=translate("choice", side), limit=f"{limit:g}"
+            ),
+            prepare,
+            EVENTS_WAITING,
+        )
 
     def _hat(self, title: str, prepare: Callable[[Hat, ProgramLink], None], waiting: int) -> Decorator:
         def decorate(script: Script) -> Script:
@@ -273,7 +292,7 @@ class Runtime:
     def described(self, name: str) -> Robot:
         """The description of a robot; BehaviourError if it is not there."""
         if name not in self._robots:
-            raise BehaviourError(f"{name} is not connected.")
+            raise BehaviourError(_("{name} is not connected.").format(name=name))
         return self._robots[name]
 
     def linked(self) -> ProgramLink:
@@ -282,7 +301,7 @@ class Runtime:
 
     def _linked(self) -> ProgramLink:
         if self._link is None:
-            raise BehaviourError("the program has not begun yet.")
+            raise BehaviourError(_("the program has not begun yet."))
         return self._link
 
 

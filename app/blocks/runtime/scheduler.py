@@ -13,6 +13,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from nep.i18n import _
+
 POLL_S = 0.02
 
 
@@ -274,7 +276,7 @@ class Scheduler:
         script = getattr(self._mine, "script", None)
         if isinstance(script, Script):
             return script
-        raise RuntimeError("only a script can do this; put it below “when started”")
+        raise RuntimeError(_("only a script can do this; put it below “when started”"))
 
     def _leave(self, script: Script, *, then_park: bool = False) -> None:
         if self._owner is script:

@@ -8,6 +8,7 @@ import random
 from collections.abc import Mapping, Sequence
 
 from app.blocks.runtime.errors import BehaviourError, kind
+from nep.i18n import _, lazy
 
 LONGEST_TEXT = 1_000_000
 _MOST_ROUNDS = 10**9
@@ -35,7 +36,9 @@ def join(first: object, second: object) -> str:
     """Both as one text."""
     one, other = text(first), text(second)
     if len(one) + len(other) > LONGEST_TEXT:
-        raise BehaviourError(f"This text is too long: more than {LONGEST_TEXT} characters.")
+        raise BehaviourError(
+            _("This text is too long: more than {most} characters.").format(most=LONGEST_TEXT)
+        )
     return one + other
 
 
@@ -49,32 +52,34 @@ def length(value: object) -> int:
 def number(value: object, what: str) -> int | float:
     """The value, if it is a finite number; else BehaviourError, whose sentence begins with `what`."""
     if value is None:
-        raise BehaviourError(f"{what} needs a value that is not known yet.", unknown=True)
+        raise BehaviourError(
+            _("{what} needs a value that is not known yet.").format(what=_(what)), unknown=True
+        )
     if not isinstance(value, (int, float)):
-        raise BehaviourError(f"{what} needs a number, not {kind(value)}.")
+        raise BehaviourError(_("{what} needs a number, not {value}.").format(what=_(what), value=kind(value)))
     if not math.isfinite(value):
-        raise BehaviourError(f"{what} needs a number that is not endless.")
+        raise BehaviourError(_("{what} needs a number that is not endless.").format(what=_(what)))
     return value
 
 
 def rounded(value: object) -> int:
     """The nearest whole number; halves go up."""
-    return math.floor(number(value, "“round”") + 0.5)
+    return math.floor(number(value, lazy("“round”")) + 0.5)
 
 
 def rounded_up(value: object) -> int:
     """The next whole number above."""
-    return math.ceil(number(value, "“round up”"))
+    return math.ceil(number(value, lazy("“round up”")))
 
 
 def rounded_down(value: object) -> int:
     """The next whole number below."""
-    return math.floor(number(value, "“round down”"))
+    return math.floor(number(value, lazy("“round down”")))
 
 
 def random_number(low: object, high: object) -> int | float:
     """A number by chance between both; a whole one when both are whole."""
-    first, last = number(low, "“random number”"), number(high, "“random number”")
+    first, last = number(low, lazy("“random number”")), number(high, lazy("“random number”"))
     first, last = min(first, last), max(first, last)
     if float(first).is_integer() and float(last).is_integer():
         return random.randint(int(first), int(last))  # noqa: S311 (a game, no secret)
@@ -83,7 +88,7 @@ def random_number(low: object, high: object) -> int | float:
 
 def repeat(times: object) -> range:
     """So many rounds; a fraction is rounded, below 0 is none."""
-    return range(max(0, min(rounded(number(times, "“repeat”")), _MOST_ROUNDS)))
+    return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MOST_ROUNDS)))
 
 
 def part(message: object, path: str) -> object:

@@ -12,7 +12,7 @@ from app.robots.description.description import Robot
 from nep.i18n import ENGLISH, language, translate
 from nep.system.plugins import discover
 
-_HOLE = re.compile(r"%[A-Z][A-Z0-9_]*")
+_HOLE = re.compile(r"%[A-Za-z_]\w*")
 
 
 class Catalogue:

@@ -12,8 +12,8 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from app.robots.description.json_access import as_part, names, number, number_of, part, text
-from nep.i18n import listed
+from app.robots.description.json_access import as_part, names, number, number_of, part, spoken, text
+from nep.i18n import listed, translate
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
@@ -86,7 +86,7 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
     places = held if isinstance(held, (list, tuple)) else ()
     return Parameter(
         name=name,
-        title=text(data.get("title")) or name.replace("_", " "),
+        title=spoken(data) or translate("robot", name.replace("_", " ")),
         kind=kind_of(data),
         minimum=number(data.get("minimum")),
         maximum=number(data.get("maximum")),
@@ -134,14 +134,14 @@ def kind_of(data: Mapping[str, object]) -> str:
 def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
     """The values that a data schema lists, with their words; empty when it lists none."""
     enum = data.get("enum")
-    pairs: list[tuple[object, object]] = []
+    pairs: list[tuple[object, str | None]] = []
     if isinstance(enum, (list, tuple)):
         pairs = [(value, None) for value in enum]
     named = data.get("oneOf")
     if isinstance(named, (list, tuple)):
-        pairs = [(as_part(item).get("const"), as_part(item).get("title")) for item in named]
+        pairs = [(as_part(item).get("const"), spoken(as_part(item))) for item in named]
     return tuple(
-        Choice(value, text(title) or str(value).replace("_", " "))
+        Choice(value, title or translate("robot", str(value).replace("_", " ")))
         for value, title in pairs
         if isinstance(value, (str, int, float))
     )

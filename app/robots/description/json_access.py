@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from nep.i18n import language, translate
+
 
 def part(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
     """The object of that name inside another; empty when it is missing or something else."""
@@ -23,6 +25,16 @@ def names(value: object) -> tuple[str, ...]:
 def text(value: object) -> str | None:
     """The text, or None when it is something else or empty."""
     return value if isinstance(value, str) and value else None
+
+
+def spoken(owner: Mapping[str, object], member: str = "title") -> str | None:
+    """A member for people in the language of now: `titles` and `descriptions` have it by language.
+
+    What a robot does not say in this language may be known to our own translators.
+    """
+    words = part(owner, f"{member}s")
+    own = text(owner.get(member))
+    return text(words.get(language())) or (own and translate("robot", own))
 
 
 def number(value: object) -> float | None:

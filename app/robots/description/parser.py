@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.robots.description.inputs import Parameter, choices_of, kind_of, parameter_of, pretty_unit
-from app.robots.description.json_access import as_part, names, number, part, text
+from app.robots.description.json_access import as_part, names, number, part, spoken, text
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
+from nep.i18n import ENGLISH, language, translate
 
 _SCHEME = "nep:"
-_LANGUAGE = "en"
 _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 
@@ -143,7 +143,7 @@ def _fields(owner: Mapping[str, object]) -> tuple[DataField, ...]:
 
 
 def _title(name: str, owner: Mapping[str, object]) -> str:
-    return text(owner.get("title")) or name.replace("_", " ")
+    return spoken(owner) or translate("robot", name.replace("_", " "))
 
 
 def _category(block: Mapping[str, object], otherwise: str) -> str:
@@ -154,7 +154,8 @@ def _category(block: Mapping[str, object], otherwise: str) -> str:
 
 def _words(block: Mapping[str, object], kind: str) -> str:
     words = part(block, kind)
-    return (text(words.get(_LANGUAGE)) or next((str(word) for word in words.values()), "")).strip()
+    english = text(words.get(ENGLISH)) or next((str(word) for word in words.values()), "")
+    return (text(words.get(language())) or translate("robot", english.strip())).strip()
 
 
 def _spelled(title: str, parameters: tuple[Parameter, ...]) -> str:
