@@ -10,8 +10,8 @@ from app.blocks.categories.robot import GROUPS
 from app.blocks.toolbox.catalogue import english_categories, has_words
 from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap
 
-MARKUP = re.compile(r"\[/?[a-z][a-z ]*\]|</?[a-z]+>|`[^`]*`")
-_KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Z][A-Z0-9_]*|%(?:(?:\(\w+\))?[sdr]|\d)|{MARKUP.pattern}")
+MARKUP = re.compile(r"\[(?:bold|dim|blue|red|green|yellow|cyan)[a-z ]*\]|\[/\]|</?[a-z]+>|`[^`]*`")
+_KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Za-z_]\w*|%(?:\(\w+\)[sdr]|\d)|{MARKUP.pattern}")
 _ACCENTS = str.maketrans(
     "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
     "áƀçđéƒğĥíĵķłḿñóþǫřšťúṽŵẋýžÁƁÇĐÉƑĞĤÍĴĶŁḾÑÓÞǪŘŠŤÚṼŴẊÝŽ",

@@ -31,7 +31,10 @@ from babel.messages.pofile import read_po, write_po
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402 - this file is started by its path
+from app.blocks.toolbox.catalogue import has_words  # noqa: E402 - this file is started by its path
+from nep.cli.app import app as nep_command  # noqa: E402
+from nep.cli.app import docstrings  # noqa: E402
+from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402
 from tools.pseudo import MARKUP, pseudo, sentences_of_blocks  # noqa: E402
 
 KEYWORDS = {
@@ -86,9 +89,43 @@ def template(root: Path = ROOT) -> Catalog:
                 made.add(_id(ids), locations=[(place, 0)], auto_comments=comments, context=context)
     for english in FOREIGN:
         made.add(english, locations=[("typer", 0)])
+    for _command, english in docstrings(nep_command):
+        made.add(english, locations=[("nep/cli", 0)])
+    for english, place in sentences_of_robots(root):
+        made.add(english, locations=[(place, 0)], context="robot")
     for context, english, place in sentences_of_blocks():
         made.add(english, locations=[(place, 0)], context=context)
     return made
+
+
+def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
+    """(English, its file) of what the descriptions that we ship say to people."""
+    for path in sorted((root / "resources" / "robots").glob("*.tm.jsonld")):
+        place = path.relative_to(root).as_posix()
+        for english in _of_description(json.loads(path.read_text(encoding="utf-8")), is_inside=False):
+            if has_words(english):
+                yield english, place
+
+
+def _of_description(value: object, *, is_inside: bool) -> Iterator[str]:
+    """Titles, descriptions and texts of blocks; names and choices that have none of their own."""
+    if isinstance(value, list):
+        for each in value:
+            yield from _of_description(each, is_inside=is_inside)
+    if not isinstance(value, dict):
+        return
+    for key, each in value.items():
+        if isinstance(each, str) and is_inside and key in {"title", "description"}:
+            yield each
+        elif key == "enum":
+            yield from (str(choice).replace("_", " ") for choice in each)
+        elif key == "rb:block":
+            yield from (each[kind]["en"] for kind in ("text", "says") if "en" in each.get(kind, {}))
+        elif key in {"actions", "properties", "events"}:
+            yield from (name.replace("_", " ") for name, held in each.items() if "title" not in held)
+            yield from _of_description(list(each.values()), is_inside=True)
+        elif not key.startswith("rb:") or key == "rb:feedback":
+            yield from _of_description(each, is_inside=is_inside)
 
 
 def keys(catalog: Catalog) -> set[Key]:
@@ -185,6 +222,9 @@ def compile_pseudo(folder: Path = LOCALE) -> None:
 
 def _write_mo(catalog: Catalog, path: Path) -> None:
     catalog.creation_date = _MADE
+    for entry in catalog:
+        if not is_done(entry.string):
+            entry.string = ""  # Babel would write English for plurals that nobody has translated
     held = io.BytesIO()
     write_mo(held, catalog)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -305,10 +345,15 @@ def _wrong_entries(catalog: Catalog) -> Iterator[str]:
 
 def _told(catalog: Catalog) -> dict[Key, tuple[str, ...]]:
     return {
-        Key(each.context or None, _ids(each.id)): _ids(each.string)
+        Key(_context(each.context), _ids(each.id)): _ids(each.string)
         for each in catalog
         if each.id and is_done(each.string)
     }
+
+
+def _context(told: str | bytes | None) -> str | None:
+    """Babel reads the contexts of a .mo as bytes."""
+    return (told.decode() if isinstance(told, bytes) else told) or None
 
 
 def _compiled(po: Path) -> dict[Key, tuple[str, ...]]:
