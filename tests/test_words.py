@@ -8,12 +8,15 @@ import sys
 from collections.abc import Iterator
 from types import ModuleType
 
+import click
 import pytest
+import typer
 
 from app.blocks.toolbox.catalogue import Catalogue, categories, has_words
 from app.blocks.toolbox.definitions import editor_definitions
 from app.blocks.toolbox.help import help_of
 from nep import i18n
+from nep.cli.app import app as nep_command
 from nep.i18n import _, install, lazy, listed, ngettext, number, pgettext
 from tests.blocks.samples import robot
 
@@ -248,6 +251,24 @@ def test_types_and_python_stay(pseudo) -> None:
     assert translated == {
         described.type: described.python for each in categories() for described in each.blocks
     }
+
+
+def test_every_help_page_of_the_command_line_is_translated(pseudo) -> None:
+    def pages(command: click.Command) -> Iterator[click.Command]:
+        yield command
+        for inner in getattr(command, "commands", {}).values():
+            yield from pages(inner)
+
+    found = list(pages(typer.main.get_command(nep_command)))
+    assert len(found) > 8
+    for page in found:
+        assert is_pseudo(_(page.help or "")), page.name
+        for parameter in page.params:
+            words = getattr(parameter, "help", None) or ""
+            ours = "completion" not in words and not words.startswith(
+                ("Show this message", "Where the master is;")
+            )
+            assert not ours or is_pseudo(_(words)), (page.name, words)
 
 
 def test_the_library_does_not_ask_for_words_it_does_not_need() -> None:
