@@ -17,6 +17,7 @@ from app.ui.text.sensor_values import ReadingWords, reading_of
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState, paint
+from app.ui.widgets.indicators import BAR_HEIGHT, paint_bar
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 
 if TYPE_CHECKING:
@@ -74,17 +75,11 @@ class SensorRow(QWidget):
         paint.words(painter, value, self.reading.value, bold, theme.colour("text"), paint.RIGHT)
         between = QRectF(title.right(), rect.top(), value.left() - title.right() - 10, rect.height())
         if self.reading.share is not None and between.width() > 30:
-            self._paint_bar(painter, between, self.reading.share)
+            track = QRectF(between.left(), between.center().y() - 3, between.width(), BAR_HEIGHT)
+            paint_bar(painter, theme, track, self.reading.share)
         elif self.reading.beside and between.width() > 20:
             paint.words(painter, between, self.reading.beside, font, theme.colour("textSecondary"))
         painter.end()
-
-    def _paint_bar(self, painter: QPainter, between: QRectF, share: float) -> None:
-        track = QRectF(between.left(), between.center().y() - 3, between.width(), 6)
-        paint.box(painter, track, 3, self._theme.colour("sunken"))
-        if share > 0:
-            track.setWidth(max(6.0, track.width() * share))
-            paint.box(painter, track, 3, self._theme.colour("accent"))
 
 
 class SensorsPanel(OneRobotPanel):

@@ -281,9 +281,14 @@ class ValueBar(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        rect = QRectF(self.rect())
-        paint.box(painter, rect, rect.height() / 2, self._theme.colour("sunken"))
-        if self._fraction:
-            rect.setWidth(max(rect.height(), rect.width() * self._fraction))
-            paint.box(painter, rect, rect.height() / 2, self._theme.colour("accent"))
+        paint_bar(painter, self._theme, QRectF(self.rect()), self._fraction)
         painter.end()
+
+
+def paint_bar(painter: QPainter, theme: Theme, rect: QRectF, fraction: float | None) -> None:
+    """A track with a share of it filled, from 0 to 1; None or 0 show only the track."""
+    round_end = rect.height() / 2
+    paint.box(painter, rect, round_end, theme.colour("sunken"))
+    if fraction:
+        filled = QRectF(rect.left(), rect.top(), max(rect.height(), rect.width() * fraction), rect.height())
+        paint.box(painter, filled, round_end, theme.colour("accent"))
