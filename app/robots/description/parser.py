@@ -155,7 +155,9 @@ def _category(block: Mapping[str, object], otherwise: str) -> str:
 def _words(block: Mapping[str, object], kind: str) -> str:
     words = part(block, kind)
     english = text(words.get(ENGLISH)) or next((str(word) for word in words.values()), "")
-    return (text(words.get(language())) or translate("robot", english.strip())).strip()
+    return (
+        text(words.get(language())) or translate("robot", english.strip().removeprefix("%robot "))
+    ).strip()
 
 
 def _spelled(title: str, parameters: tuple[Parameter, ...]) -> str:
