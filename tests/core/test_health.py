@@ -13,9 +13,9 @@ from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, CURE_S, Health
-from nep.masters import graph
 from nep.messages.message import Message
-from nep.protocol.graph_view import PublisherInfo, SubscriberInfo, TopicInfo
+from nep.protocol.graph_view import Alert as MasterAlert
+from nep.protocol.graph_view import GraphView, PublisherInfo, SubscriberInfo, TopicInfo
 
 
 class Case:
@@ -101,11 +101,11 @@ def test_good_messages_are_nothing_to_tell(case: Case) -> None:
 
 
 def test_a_taken_port_leads_to_the_doctor_and_other_notes_of_the_master_do_not(case: Case) -> None:
-    noticed = (graph.Alert("port:7000", "Port 7000 is taken", "Close it."), graph.Alert("name:x", "2 x", ""))
-    case.health.graph_alerts(graph.GraphView(1, 1, alerts=noticed))
+    noticed = (MasterAlert("port:7000", "Port 7000 is taken", "Close it."), MasterAlert("name:x", "2 x", ""))
+    case.health.graph_alerts(GraphView(1, 1, alerts=noticed))
     steps = {alert.id: (alert.button, alert.action) for alert in case.alerts.active}
     assert steps == {"port:7000": ("Open the connection doctor", "help.doctor"), "name:x": (None, None)}
-    case.health.graph_alerts(graph.GraphView(1, 2))
+    case.health.graph_alerts(GraphView(1, 2))
     assert not case.alerts.active
 
 
@@ -166,7 +166,7 @@ def test_of_two_robots_the_one_that_is_not_shown_is_not_silent(case: Case) -> No
     """A virtual robot sends its pictures only while somebody looks."""
     case.links += [seeing("Pepper"), seeing("Turtle")]
     both = {f"/{name}/camera": camera(name, name == "Pepper") for name in ("Pepper", "Turtle")}
-    case.topics.update(graph.GraphView(1, 1, {}, both), 0)
+    case.topics.update(GraphView(1, 1, {}, both), 0)
     case.topics["/Pepper/camera"].watched = True
     case.topics.add("/Pepper/camera", Batch([Message("/Pepper/camera", b"", "image", "image")]), 49)
     case.topics.age(50, 60 * 10**9)
