@@ -10,19 +10,27 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 
-from app.blocks import Problem, editor_definitions
+from app.blocks import Problem, Program, compile_behaviour, editor_definitions
+from app.blocks.runtime.heartbeat import Heartbeat
 from app.core.alerts import Alerts
 from app.core.console import Console
+from app.core.documents import document as document_module
 from app.core.documents.workspace_json import WorkspaceJson
 from app.core.messages.picture import Picture
+from app.core.network import doctor as doctor_module
+from app.core.network import topics as topics_module
+from app.core.network.mailbox import Batch
+from app.core.network.master import MasterState
 from app.core.network.nodes import Nodes
-from app.core.robots.known import KnownRobots
-from app.core.robots.motion_permission import Moving
+from app.core.network.traffic import Traffic
+from app.core.network.watches import Watch, Watches
+from app.core.robots import fleet as fleet_module
+from app.core.robots import robot_link as link_module
 from app.robots.description.inputs import Choice, Parameter
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from nep.doctor import Finding
@@ -30,56 +38,24 @@ from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 
-@dataclass(eq=False)
-class Topic:
-    name: str
-    msg_type: str = "json"
-    codec: str = "json"
-    publishers: int = 1
-    publisher_nodes: tuple[str, ...] = ("pepper_driver",)
-    subscribers: int = 0
-    rate_hz: float | None = None
-    bandwidth_Bps: float | None = None  # noqa: N815
-    age_s: float | None = None
-    lost: int | None = 0
-    loss_ratio: float | None = 0.0
-    new: bool = False
-    gone_s: float | None = None
-    rates: list[float] = field(default_factory=list)
-    newest: Message | None = None
-    previous: Message | None = None
-    received: int = 0
-    dropped: int = 0
-    missed: int = 0
-    watched: bool = False
-
-    @property
-    def shown_of(self) -> tuple[int, int]:
-        return self.received - self.dropped, self.received + self.missed
+def Topic(name: str, msg_type: str = "json", codec: str = "json", **more: object) -> topics_module.Topic:
+    """A topic of the real kind as most tests want it: one node publishes it, and nothing is lost."""
+    given: dict[str, object] = {
+        "publishers": 1,
+        "publisher_nodes": ("pepper_driver",),
+        "lost": 0,
+        "loss_ratio": 0.0,
+    }
+    made = topics_module.Topic(name, msg_type, codec, **(given | more))  # type: ignore[arg-type]
+    if made.gone_s is not None:
+        made.gone_since = -made.gone_s
+    return made
 
 
-class Topics:
-    def __init__(self) -> None:
-        self._topics: dict[str, Topic] = {}
-        self.revision = 0
-        self.values_revision = 0
+class Topics(topics_module.Topics):
+    """The real topics; tests put some there and take them away."""
 
-    def __iter__(self) -> Iterator[Topic]:
-        return iter(self._topics.values())
-
-    def __len__(self) -> int:
-        return len(self._topics)
-
-    def __getitem__(self, name: str) -> Topic:
-        return self._topics[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._topics
-
-    def get(self, name: str) -> Topic | None:
-        return self._topics.get(name)
-
-    def put(self, topic: Topic) -> Topic:
+    def put(self, topic: topics_module.Topic) -> topics_module.Topic:
         self._topics[topic.name] = topic
         self.revision += 1
         self.values_revision += 1
@@ -88,35 +64,6 @@ class Topics:
     def remove(self, name: str) -> None:
         del self._topics[name]
         self.revision += 1
-
-    def live(self) -> list[Topic]:
-        return [topic for topic in self if topic.gone_s is None]
-
-    def of_type(self, *msg_types: str) -> list[Topic]:
-        return [topic for topic in self.live() if topic.msg_type in msg_types]
-
-    def mark_seen(self, name: str) -> None:
-        if name in self and self[name].new:
-            self[name].new = False
-            self.revision += 1
-
-
-class Watch:
-    def __init__(self, close: Callable[[], None]) -> None:
-        self._close: Callable[[], None] | None = close
-        self.open = True
-        self.resting = False
-
-    def rest(self) -> None:
-        self.resting = True
-
-    def wake(self) -> None:
-        self.resting = False
-
-    def close(self) -> None:
-        if self._close is not None:
-            self._close()
-        self._close, self.open = None, False
 
 
 class ImageStream:
@@ -129,7 +76,8 @@ class ImageStream:
         self.error: str | None = None
         self.painted: list[Picture] = []
         self.closed = False
-        self.held = self.awaits_picture = self.resting = False
+        self.held = self.resting = False
+        self.awaits_picture = True
         self.wishes: list[tuple[int, int] | None] = []
 
     @property
@@ -137,10 +85,12 @@ class ImageStream:
         return self.silent_s
 
     def rest(self) -> None:
-        self.resting = True
+        if not self.resting:
+            self.resting = self.awaits_picture = True
 
     def wake(self) -> None:
-        self.resting = False
+        if not self.closed:
+            self.resting = False
 
     def want(self, size: tuple[int, int] | None) -> None:
         if not self.wishes or self.wishes[-1] != size:
@@ -150,11 +100,11 @@ class ImageStream:
         self.held = held
 
     def shown(self) -> None:
-        assert self.picture is not None
-        self.painted.append(self.picture)
+        if self.picture is not None:
+            self.painted.append(self.picture)
 
     def close(self) -> None:
-        self.closed = True
+        self.resting = self.closed = True
 
 
 class Images:
@@ -167,55 +117,44 @@ class Images:
         stream.picture = self.source(topic)
         if stream.picture is not None:
             stream.arriving_hz, stream.shown_hz, stream.silent_s = 15.0, 15.0, 0.02
+            stream.awaits_picture = False
         self.streams.append(stream)
         return stream
 
 
-@dataclass(eq=False)
-class Invocation:
-    id: str
-    action: str
-    state: str = "running"
-    feedback: Mapping[str, object] = field(default_factory=dict)
-    output: Mapping[str, object] = field(default_factory=dict)
-    error: str | None = None
-    elapsed_s: float = 0.0
-    given: Mapping[str, object] = field(default_factory=dict)
-    left_s: float | None = None
-    waits_for: tuple[str, ...] = ()
-    replaces: tuple[str, ...] = ()
-    at_s: float = 0.0
-
-    @property
-    def running(self) -> bool:
-        return self.state not in {"succeeded", "failed", "canceled"}
+def Invocation(
+    id: str, action: str, state: str = "running", feedback: Mapping[str, object] | None = None, *,
+    elapsed_s: float = 0.0, left_s: float | None = None, **more: object,
+) -> link_module.Invocation:  # fmt: skip
+    """A try of the real kind, at whose clock so much time has passed."""
+    made = link_module.Invocation(id, action, state, feedback or {}, clock=lambda: elapsed_s, **more)  # type: ignore[arg-type]
+    if left_s is not None:
+        made.begun_s, made.timeout_s = 0.0, elapsed_s + left_s
+    return made
 
 
-@dataclass(eq=False)
-class RobotLink:
-    name: str
-    robot: Robot
-    virtual: bool = True
-    state: str = "ready"
-    state_words: str = "ready"
-    can_confirm_stop: bool = True
-    connected: bool = True
-    values: dict[str, object] = field(default_factory=dict)
-    drawing: Mapping[str, object] | None = None
-    invocations: dict[str, Invocation] = field(default_factory=dict)
-    tried: list[Invocation] = field(default_factory=list)
-    last_stop: str | None = "answered in 41 ms, at 8:40"
-    silent: str | None = None
-    mute: bool = False
-    answered_s: float | None = None
-    gone_s: float | None = None
-    not_stopped: str = ""
-    goes_on: str = ""
-    stopping: bool = False
+class Line:
+    """Stands for a publisher to a robot that hears everything."""
 
-    @property
-    def chip(self) -> str:
-        return f"virtual, {self.state_words}" if self.virtual else self.state_words
+    def __init__(self) -> None:
+        self.published: list[object] = []
+
+    def publish(self, payload: object) -> None:
+        self.published.append(payload)
+
+    def close(self) -> None:
+        """Nothing is to be closed."""
+
+
+def RobotLink(name: str, robot: Robot, *, virtual: bool = True, **more: object) -> link_module.RobotLink:
+    """A robot of the real kind that is reached, and has answered a stop."""
+    described = robot if robot.virtual == virtual else replace(robot, virtual=virtual)
+    given: dict[str, object] = {
+        "last_stop": "answered in 41 ms, at 8:40",
+        "publisher": Line(),
+        "world": Line(),
+    }
+    return link_module.RobotLink(name, described, **(given | more))  # type: ignore[arg-type]
 
 
 class Kept(dict[str, object]):
@@ -225,66 +164,54 @@ class Kept(dict[str, object]):
         self[key] = value
 
 
-class Fleet:
-    def __init__(self, calls: list[tuple[object, ...]]) -> None:
+class NoHeartbeat(Heartbeat):
+    """Nothing has to be kept going: no thread."""
+
+    def beat(self, name: str, publisher: object) -> None:
+        """It goes on by itself."""
+
+
+class Fleet(fleet_module.Fleet):
+    """The real fleet; tests let robots join and leave, and read in ``calls`` what panels asked of it."""
+
+    def __init__(self, calls: list[tuple[object, ...]], watches: Watches) -> None:
+        super().__init__(watches, lambda _what, _job: None, settings=Kept())  # type: ignore[arg-type]
+        self._alive = NoHeartbeat(link_module.SENDER, "none")
         self.calls = calls
-        self.revision = 0
-        self.links: list[RobotLink] = []
-        self.looked_at: list[str] = []
-        self.refuse: tuple[str, ...] = ()
-        self.moving, self.known = Moving(), KnownRobots(Kept())
-        self.chosen = ""
+        self._looked_at: list[tuple[str, Watch]] = []
 
     @property
-    def connected(self) -> list[RobotLink]:
-        return [link for link in self.links if link.connected]
+    def looked_at(self) -> list[str]:
+        """The robots whose sensors somebody sees."""
+        return [name for name, watch in self._looked_at if not watch.resting]
 
-    def join(self, link: RobotLink) -> RobotLink:
-        self.links.append(link)
+    def join(self, link: link_module.RobotLink) -> link_module.RobotLink:  # type: ignore[override]
+        """One comes, with everything that it is."""
+        self._links[link.name] = link
         self.revision += 1
         return link
 
-    def link(self, name: str) -> RobotLink | None:
-        return next((link for link in self.links if link.name == name), None)
-
-    @property
-    def shown(self) -> RobotLink | None:
-        chosen = next((link for link in self.connected if link.name == self.chosen), None)
-        virtual = next((link for link in self.connected if link.virtual), None)
-        return chosen or virtual or next(iter(self.connected), None)
-
-    def choose(self, name: str) -> None:
-        if name != self.chosen:
-            self.chosen = name
-            self.revision += 1
+    def leave(self, name: str) -> link_module.RobotLink:
+        """As if it had never been there."""
+        self.revision += 1
+        return self._links.pop(name)
 
     def look_at(self, name: str) -> Watch:
-        self.looked_at.append(name)
-        return Watch(lambda: self.looked_at.remove(name))
+        watch = super().look_at(name)
+        self._looked_at.append((name, watch))
+        return watch
 
-    def invoke(self, name: str, action: str, input: Mapping[str, object]) -> Invocation:
-        from app.errors import RobotInputError
-
+    def invoke(self, name: str, action: str, input: Mapping[str, object]) -> link_module.Invocation:
         self.calls.append(("invoke", name, action, dict(input)))
-        link = self.link(name)
-        assert link is not None
-        described = link.robot.action(action)
-        assert described is not None
-        wrong = described.check(input)
-        if wrong:
-            raise RobotInputError(wrong)
-        made = link.invocations[action] = Invocation(f"{len(self.calls)}", action, given=dict(input))
-        link.tried.append(made)
-        return made
+        return super().invoke(name, action, input)
 
     def cancel(self, name: str, action: str) -> None:
         self.calls.append(("cancel", name, action))
+        super().cancel(name, action)
 
     def world(self, name: str, change: Mapping[str, object]) -> None:
         self.calls.append(("world", name, dict(change)))
-
-    def stop(self, name: str | None = None) -> None:
-        self.calls.append(("stop", name))
+        super().world(name, change)
 
 
 PROGRAM = """import studio
@@ -318,58 +245,55 @@ WORKSPACE = {
 }  # fmt: skip
 
 
-class Document:
+class NoJournal:
+    """Keeps nothing."""
+
+    name = "unkept"
+
+    def write(self, *_what: object) -> None:
+        """Nothing is written."""
+
+    def discard(self) -> None:
+        """Nothing was written."""
+
+
+EMPTY = compile_behaviour({}, [])
+
+
+class Document(document_module.Document):
+    """The real document without a journal; its program is what a test tells."""
+
     def __init__(self, calls: list[tuple[object, ...]]) -> None:
+        super().__init__(NoJournal)  # type: ignore[arg-type]
         self.calls = calls
         self.key = "behaviour-1"
-        self.path = None
-        self.name = "New behaviour"
-        self.workspace: Mapping[str, object] = {}
-        self.robots: dict[str, Mapping[str, object]] = {}
-        self.dirty = False
-        self.saved_at: float | None = None
-        self.revision = 0
-        self.mends = 0
-        self.edits = 0
-        self.definitions_revision = 0
         self.found: tuple[Problem, ...] = ()
-        self.absent: tuple[Robot, ...] = ()
         self.sensors: tuple[tuple[str, str], ...] = ()
         self.known: Callable[[], list[Robot]] = list
         self.source = ""
         self.compiled = 0
-        self._newest: tuple[object, SimpleNamespace] | None = None
+        self.told: tuple[object, Program] | None = None
         self.absent_blocks: tuple[str, ...] = ("b8", "b9")
-
-    @property
-    def has_blocks(self) -> bool:
-        return WorkspaceJson.of(self.workspace).has_blocks
 
     def edited(self, workspace: Mapping[str, object] | WorkspaceJson) -> None:
         workspace = workspace.blocks if isinstance(workspace, WorkspaceJson) else workspace
         self.calls.append(("edited", workspace))
-        self.workspace, self.edits, self.dirty = workspace, self.edits + 1, True
+        super().edited(workspace)
 
-    def program(self) -> SimpleNamespace:
+    def program(self) -> Program:
         self.compiled += 1
-        return SimpleNamespace(
-            source=self.source, problems=self.found, sensors=self.sensors, absent=self.absent_blocks
+        return replace(
+            EMPTY, source=self.source, problems=self.found, sensors=self.sensors, absent=self.absent_blocks
         )
 
-    def newest(self) -> SimpleNamespace:
-        key = (self.revision, self.edits, self.definitions_revision)
-        if self._newest is None or self._newest[0] != key:
-            self._newest = (key, self.program())
-        return self._newest[1]
-
-    def problems(self) -> tuple[Problem, ...]:
-        return self.found
+    def newest(self) -> Program:
+        key = self._key()
+        if self.told is None or self.told[0] != key:
+            self.told = (key, self.program())
+        return self.told[1]
 
     def definitions(self) -> Mapping[str, object]:
         return editor_definitions(self.known())
-
-    def mend(self, action: str, block_id: str | None) -> None:
-        self.calls.append(("mend", action, block_id))
 
 
 class Documents:
@@ -393,23 +317,19 @@ class Documents:
         return self.current.definitions()
 
 
-class Doctor:
-    """Finds what the test says, at once."""
+class Doctor(doctor_module.Doctor):
+    """The real one; finds what the test says, at once and in the thread that asks."""
+
+    looking = False  # type: ignore[assignment]  # what a test says instead of a thread
 
     def __init__(self, calls: list[tuple[object, ...]]) -> None:
+        super().__init__(lambda: self.found, lambda: 1_795_164_093.0)
         self.calls = calls
         self.found: tuple[Finding, ...] = ()
-        self.findings: tuple[Finding, ...] = ()
-        self.looking = False
-        self.looked_s: float | None = None
-        self.revision = 0
 
     def look(self) -> None:
         self.calls.append(("look",))
-        self.findings, self.looked_s, self.revision = self.found, 1_795_164_093.0, self.revision + 1
-
-    def close(self) -> None:
-        """Nothing goes on."""
+        self._run()
 
 
 class Session:
@@ -423,7 +343,9 @@ class Session:
         self.alerts = Alerts()
         self.doctor = Doctor(self.calls)
         self.console = Console()
-        self.fleet = Fleet(self.calls)
+        self.watches = Watches(self._begin_watch, self._end_watch)
+        self._looks: list[Watch] = []
+        self.fleet = Fleet(self.calls, self.watches)
         self.images = Images()
         self.documents = Documents(Document(self.calls))
         self.document.known = lambda: [link.robot for link in self.fleet.connected]
@@ -440,30 +362,31 @@ class Session:
             virtual_robots=(),
         )
         self.graph: SimpleNamespace | None = None
-        self.master = SimpleNamespace(kind="none", address="127.0.0.1:7780", sentence="")
-        self.traffic = SimpleNamespace(messages_per_s=None, lost_30s=0, shown_30s=0, sent_30s=0)
+        self.master = MasterState("none", "127.0.0.1:7780")
+        self.traffic = Traffic(self.topics)
         self.tick_ms = 0.0
-        self.watched: list[str] = []
         self.ticks = 0
 
     @property
     def document(self) -> Document:
         return self.documents.current
 
+    @property
+    def watched(self) -> list[str]:
+        """The topics that panels look at, in the order in which they began."""
+        return [each.topics[0] for each in self._looks if not each.resting]
+
     def watch(self, topic: str) -> Watch:
-        self.watched.append(topic)
+        self._looks.append(self.watches.open([topic]))
+        return self._looks[-1]
+
+    def _begin_watch(self, topic: str) -> None:
         if topic in self.topics:
             self.topics[topic].watched = True
-        return Watch(lambda: self._unwatch(topic))
 
-    def _unwatch(self, topic: str) -> None:
-        self.watched.remove(topic)
-        if topic in self.topics and topic not in self.watched:
-            self.topics[topic].watched = False
-            self.topics[topic].newest = None
-
-    def frozen(self) -> bool:
-        return False
+    def _end_watch(self, topic: str) -> None:
+        self.topics.unwatch(topic)
+        self.fleet.unwatched(topic)
 
     def send(self, topic: str, payload: object) -> Message:
         """A message arrives on a topic, as it would for a watched one."""
@@ -473,16 +396,14 @@ class Session:
         message = Message(
             topic, data, known.codec, known.msg_type, stamp_ns=time.time_ns() - 600_000, seq=seq, publisher=1
         )
-        known.previous, known.newest = known.newest, message
-        known.received += 1
-        self.topics.values_revision += 1
+        self.topics.add(topic, Batch([message]), 0.0)
         return message
 
     @classmethod
     def full(cls) -> Session:
         """A session as in the design's pictures."""
         session = cls()
-        session.master = SimpleNamespace(kind="connected", address="127.0.0.1:7780", sentence="")
+        session.master = MasterState("connected", "127.0.0.1:7780")
         nodes = {str(number): None for number in range(7)}
         session.graph = SimpleNamespace(nodes=nodes, topics={})
         for topic in topics():
@@ -558,7 +479,7 @@ FOUND = (
 )  # fmt: skip
 
 
-def topics() -> list[Topic]:
+def topics() -> list[topics_module.Topic]:
     """The thirteen of picture 04."""
     image, string, raw = ("image", "image"), ("string", "string"), ("bytes", "bytes")
     rows: list[tuple[str, tuple[str, str], int, float, float, float]] = [
@@ -577,7 +498,7 @@ def topics() -> list[Topic]:
         ("/lidar/scan", raw, 0, 0.0, 0.0, 0.0),
     ]
     made = [
-        Topic(name, kind[0], kind[1], publishers, rate_hz=rate, bandwidth_Bps=bandwidth, age_s=age)
+        Topic(name, kind[0], kind[1], publishers=publishers, rate_hz=rate, bandwidth_Bps=bandwidth, age_s=age)
         for name, kind, publishers, rate, bandwidth, age in rows
     ]
     made[1].lost, made[1].loss_ratio = 7, 0.004

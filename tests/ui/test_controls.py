@@ -254,6 +254,7 @@ class Cameras:
     def __init__(self) -> None:
         self.images = fakes.Images()
         self.made = fakes.ImageStream("/Pepper/camera")
+        self.made.awaits_picture = False  # what comes is there at once
 
     def topics(self) -> Sequence[str]:
         return ["/Pepper/camera"]

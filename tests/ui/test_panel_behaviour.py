@@ -11,7 +11,7 @@ from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme
-from tests.ui.fakes import PROGRAM, RobotLink, Session, pepper
+from tests.ui.fakes import PROGRAM, Invocation, RobotLink, Session, pepper
 from tests.ui.panel_case import Window, button, press, ticks
 
 
@@ -111,18 +111,27 @@ def test_blocks_of_absent_robots_are_grey(panel, window) -> None:
     assert editor(panel).last("set_absent") == ()
 
 
-def test_the_toolbox_says_which_robots_may_move_or_do_not_answer(panel, window) -> None:
+def test_the_toolbox_says_which_robots_may_move_or_do_not_answer(panel, window, monkeypatch) -> None:
     link = window.session.fleet.links[0]
     assert editor(panel).last("set_alarms") == {}
-    for state, words, status in (
-        ("stopping", "stopping", "running"),
-        ("not stopped", "may still move", "error"),
-        ("silent", "does not answer", "warn"),
+    for fact, state, words, status in (
+        ({"stopping": True}, "stopping", "stopping", "running"),
+        (
+            {"not_stopped": "Pepper may still move: a joint stuck"},
+            "not stopped",
+            "may still move",
+            "error",
+        ),
+        ({"mute": True}, "silent", "does not answer", "warn"),
     ):
-        link.state, link.state_words = state, words
+        for name, value in fact.items():
+            monkeypatch.setattr(link, name, value)
+        assert link.state == state
         panel.refresh()
         assert editor(panel).last("set_alarms") == {link.name: (status, words)}
-    link.state, link.state_words = "busy", "busy"
+        monkeypatch.undo()
+    link.invocations["walk"] = Invocation("1", "walk")
+    assert link.state == "busy"
     panel.refresh()
     assert editor(panel).last("set_alarms") == {}
 
@@ -153,11 +162,10 @@ def test_sensors_in_the_open_toolbox_are_watched_until_it_closes(panel, window) 
 def test_a_robot_that_comes_while_its_sensors_are_shown_is_watched(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
-    links = window.session.fleet.links
-    window.session.fleet.links = []
+    link = window.session.fleet.leave("Pepper")
     editor(panel).sensors_offered.emit((("Pepper", "battery"),))
     assert window.session.fleet.looked_at == []
-    window.session.fleet.links = links
+    window.session.fleet.join(link)
     ticks(window, panel, 6)
     assert window.session.fleet.looked_at == ["Pepper"]
 

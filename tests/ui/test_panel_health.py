@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -58,7 +59,7 @@ def test_what_is_to_be_looked_at_is_counted_and_first(panel, asked) -> None:
 @pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])
 def test_one_that_does_not_answer_has_a_next_step(panel, asked, virtual: bool, does: str) -> None:
     link = asked.session.fleet.links[0]
-    link.virtual, link.mute = virtual, True
+    link.robot, link.mute = replace(link.robot, virtual=virtual), True
     panel.refresh()
     assert panel.step.isVisible()
     assert panel.rows[0].y() < panel.step.parentWidget().y() < panel.rows[1].y()

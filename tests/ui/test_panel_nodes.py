@@ -6,6 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from app.core.network.master import MasterState
 from app.core.network.nodes import NodeEntry, Nodes
 from app.ui.panels.nodes.panel import PANEL, NodesPanel
 from app.ui.panels.nodes.rows import NodeRow, cpu_words, facts_of, generation_cell, limits_of, name_cell
@@ -202,7 +203,7 @@ def test_the_load_is_renewed_when_it_was_told_and_sorted_once_a_second(panel, wi
 )
 def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed) -> None:
     window = Window(Session())
-    window.session.master.kind = kind
+    window.session.master = MasterState(kind, window.session.master.address)
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, NodesPanel)

@@ -72,7 +72,7 @@ def test_with_nothing_to_mend_it_says_so(qtbot, qapp) -> None:
     assert (panel.chip.text, panel.chip.status) == ("none", "ok")
 
 
-def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, window) -> None:
+def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, window, monkeypatch) -> None:
     document = window.session.document
     absent = [
         Problem("warning", f"b{n}", "robot", "say", "Pepper 2 is not connected, so say will be skipped.",
@@ -80,7 +80,7 @@ def test_a_missing_robot_is_one_line_with_the_robots_that_can_do_it(panel, windo
         for n in range(3)
     ]  # fmt: skip
     document.found, document.edits = tuple(absent), 7
-    document.absent = (pepper("Pepper 2"),)
+    monkeypatch.setattr(type(document), "absent", (pepper("Pepper 2"),))
     say = {"type": "robot_virtual_pepper_do_say", "fields": {"ROBOT": "Pepper 2"}}
     document.workspace = {"blocks": {"blocks": [say]}}
     panel.refresh()

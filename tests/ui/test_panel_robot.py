@@ -39,7 +39,7 @@ def test_it_is_drawn_from_its_state_with_its_name_and_its_chip(panel, window) ->
     before = panel.view.grab().toImage()
     link = window.session.fleet.links[0]
     link.drawing = drawing(theta_deg=90.0)
-    link.state, link.state_words = "silent", "silent for 4 s"
+    link.silent = "silent for 4 s"
     panel.refresh()
     assert panel.view.grab().toImage() != before
     assert panel.chip.status == "warn"

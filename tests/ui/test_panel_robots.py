@@ -141,7 +141,8 @@ def test_stop_stops_the_chosen_robot(panel, window) -> None:
 
 
 def test_another_robot_can_be_chosen_and_only_it_is_looked_at(panel, window) -> None:
-    window.session.fleet.join(RobotLink("Turtle", pepper("Turtle"), virtual=False, state="busy"))
+    link = window.session.fleet.join(RobotLink("Turtle", pepper("Turtle"), virtual=False))
+    link.invocations["walk"] = Invocation("1", "walk")
     panel.refresh()
     press(panel.items["Turtle"])
     assert panel.name.text() == "Turtle"
@@ -200,7 +201,7 @@ def test_a_robot_that_goes_says_when_it_was_seen_and_goes_from_the_list_when_for
     fleet = window.session.fleet
     link = fleet.join(RobotLink("Rover", replace(pepper(), name="Rover", virtual=False), virtual=False))
     fleet.known.saw([link.robot])
-    link.connected, link.state = False, "away"
+    link.connected = False
     fleet.revision += 1
     panel.refresh()
     assert panel.items["Rover"].where.startswith("seen today")

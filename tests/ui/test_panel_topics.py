@@ -4,6 +4,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QSignalSpy, QTest
 
+from app.core.network.master import MasterState
 from app.ui.panels.topics.columns import age_cell, curve_cell, loss_cell, name_cell, nodes_cell, type_cell
 from app.ui.panels.topics.panel import PANEL, TopicsPanel
 from app.ui.widgets.table.model import CELL_ROLE
@@ -164,7 +165,7 @@ def test_enter_opens_and_the_arrows_move(panel, window) -> None:
 )
 def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed, call) -> None:
     window = Window(Session())
-    window.session.master.kind = kind
+    window.session.master = MasterState(kind, window.session.master.address)
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, TopicsPanel)
@@ -188,7 +189,8 @@ def test_the_order_comes_back_with_the_layout(qtbot, panel, window) -> None:
 
 def test_the_curve_of_the_last_rates_stands_before_the_rate(panel, window) -> None:
     topic = window.session.topics["/odom"]
-    topic.rates[:] = [49.0, 50.0, 51.0]
+    topic.rates.clear()
+    topic.rates.extend([49.0, 50.0, 51.0])
     cell = panel.model.data(
         panel.model.index(panel.model.index_of("/odom").row(), place_of(panel, "curve")), CELL_ROLE
     )

@@ -68,7 +68,7 @@ def test_each_panel_lives_through_everything(qtbot, qapp, name, session) -> None
         ticks(window, panel, 2)
         window.session.topics.remove(topic.name)
     for link in window.session.fleet.links:
-        link.connected, link.state = False, "away"
+        link.connected = False
     window.session.fleet.revision += 1
     ticks(window, panel, 3)
     panel.restore_state(panel.save_state())

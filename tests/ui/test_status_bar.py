@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from app.core.network.master import MasterState
 from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import Facts, StatusBar
 from app.ui.theme.theme import Theme
@@ -63,7 +64,7 @@ def test_a_robot_that_has_told_nothing_is_connected_and_not_well(session: fakes.
 def test_a_robot_that_has_gone_is_to_be_looked_at(session: fakes.Session) -> None:
     session.alerts.cure("message:/faces")
     link = session.fleet.links[0]
-    link.connected, link.state = False, "away"
+    link.connected = False
     assert facts(session).health() == ("triangle-alert", "Pepper: 1 to look at", "warn")
 
 
@@ -110,7 +111,7 @@ def test_what_came_faster_than_the_window_shows_is_told(session: fakes.Session) 
     ],
 )
 def test_the_master(session: fakes.Session, kind: str, words: str) -> None:
-    session.master.kind = kind
+    session.master = MasterState(kind, session.master.address)
     assert facts(session).master()[1] == words
 
 
