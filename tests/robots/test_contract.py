@@ -148,15 +148,22 @@ def good_for(parameter: Parameter) -> object:
 
 
 def takes_time(bench: Bench, action: Action) -> bool:
-    """Whether an action, begun in the world as it is now, goes on until it is ended."""
-    known = bench.times.get(action.name)
-    if known is None:
-        wanted = bench.invoke(action)
-        bench.running(wanted)
-        bench.ears.command(id=wanted, op="cancel")
-        known = bench.times[action.name] = bench.ears.final(wanted)["state"] == "canceled"
-        bench.stop()
-    return known
+    """Whether an action, begun in the world as it is now, goes on until it is ended.
+
+    Three times, as on a busy computer a cancel may overtake an action that ends at once.
+    """
+    if action.name not in bench.times:
+        bench.times[action.name] = all(_goes_on(bench, action) for _ in range(3))
+    return bench.times[action.name]
+
+
+def _goes_on(bench: Bench, action: Action) -> bool:
+    wanted = bench.invoke(action)
+    bench.running(wanted)
+    bench.ears.command(id=wanted, op="cancel")
+    ended = bench.ears.final(wanted)["state"]
+    bench.stop()
+    return ended == "canceled"
 
 
 def wrong_for(kind: str) -> object:
