@@ -21,7 +21,7 @@ from app.robots.description.model import Action
 from app.ui.panels.robots.controls.angle import AngleDial
 from app.ui.panels.robots.controls.colour import ColourChoice, HueStrip
 from app.ui.panels.robots.controls.picture import PictureChoice
-from app.ui.panels.robots.controls.picture_file import FILES, MOST_FILE_BYTES, encoded, read_picture
+from app.ui.panels.robots.controls.picture_file import MOST_FILE_BYTES, encoded, file_filter, read_picture
 from app.ui.panels.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
@@ -319,7 +319,7 @@ def test_a_bomb_is_refused_with_a_sentence_as_a_file_and_as_an_address(qtbot, th
 
 
 def test_only_what_is_read_is_offered_and_a_pipe_is_not_opened(tmp_path) -> None:
-    assert FILES == "Pictures (*.png *.jpg *.jpeg)"
+    assert file_filter() == "Pictures (*.png *.jpg *.jpeg)"
     assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is no file."
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.png")

@@ -10,6 +10,7 @@ from app.ui.text.numbers import grouped
 from app.ui.widgets import Chip, EmptyState
 from app.ui.widgets.alert_box import AlertRow
 from app.ui.widgets.lists.scroll_areas import PanelRows
+from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.alerts import Alert
@@ -19,16 +20,19 @@ class AlertsPanel(PanelWidget):
     """Everything that is wrong now, the worst first."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Alerts")
+        super().__init__(context, _("Alerts"))
         self._seen = -1
         self.rows: list[AlertRow] = []
         self.shown: list[Alert] = []  # each in the row of its place
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.empty = EmptyState(
-            self.theme, "circle-check", "All is well", "What goes wrong appears here, with its next step."
+            self.theme,
+            "circle-check",
+            _("All is well"),
+            _("What goes wrong appears here, with its next step."),
         )
-        self.pages = PanelRows(self.empty, "Alerts")
+        self.pages = PanelRows(self.empty, _("Alerts"))
         self.pages.fill(self)
 
     def refresh(self) -> None:
@@ -67,8 +71,11 @@ class AlertsPanel(PanelWidget):
 def _since(alert: Alert) -> str:
     """Since when it is so, and how often it was."""
     clock = time.localtime(alert.since_s)
-    times = f", {grouped(alert.count)} times" if alert.count > 1 else ""
-    return f"since {clock.tm_hour}:{clock.tm_min:02d}{times}"
+    since = f"{clock.tm_hour}:{clock.tm_min:02d}"
+    if alert.count < 2:
+        return _("since {clock}").format(clock=since)
+    said = ngettext("since {clock}, {count} time", "since {clock}, {count} times", alert.count)
+    return said.format(clock=since, count=grouped(alert.count))
 
 
-PANEL = Panel("alerts", "Alerts", "bell", (), AlertsPanel)
+PANEL = Panel("alerts", lazy("Alerts"), "bell", (), AlertsPanel)

@@ -13,6 +13,7 @@ from app.ui.pictures.boxes import boxes_on, camera_of
 from app.ui.pictures.view import SILENT_AFTER_S, PictureView, rate_sentence
 from app.ui.text.numbers import age_words
 from app.ui.widgets import Chip, Elided, EmptyAction, EmptyState
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
@@ -26,7 +27,7 @@ class CameraPanel(OneRobotPanel):
     shows_pictures = True
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Camera")
+        super().__init__(context, _("Camera"))
         self._topic = ""
         self._stream: ImageStream | None = None
         self.rate = Elided("body", "textSecondary", least=60)
@@ -34,15 +35,15 @@ class CameraPanel(OneRobotPanel):
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.view = PictureView(self.theme, fill=True, labelled=False)
-        self.view.setAccessibleName("What the robot sees")
+        self.view.setAccessibleName(_("What the robot sees"))
         self.empty = EmptyState(
             self.theme,
             "camera",
-            "No pictures yet",
-            "Pictures appear here as soon as a robot with a camera is there.",
+            _("No pictures yet"),
+            _("Pictures appear here as soon as a robot with a camera is there."),
         )
         self.empty.set_actions(
-            [EmptyAction("Use the virtual robot", lambda: context.run("robots.virtual"), "bot")]
+            [EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")]
         )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
@@ -59,7 +60,7 @@ class CameraPanel(OneRobotPanel):
         silent = silent_s is not None and silent_s > SILENT_AFTER_S
         sentence = rate_sentence(self._stream.shown_hz, self._stream.arriving_hz)
         self.rate.setText("" if silent else sentence)
-        self.chip.set(f"silent for {age_words(silent_s)}" if silent else "", "error")
+        self.chip.set(_("silent for {age}").format(age=age_words(silent_s)) if silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
 
@@ -77,8 +78,9 @@ class CameraPanel(OneRobotPanel):
         self._topic = _topic_of(link)
         self._stream = self.session.images.stream(self._topic)
         self.view.clear()
-        self.set_title("Camera", self._topic)
-        self.empty.say("No pictures yet", f"The next picture of {link.name} appears here.")
+        self.set_title(_("Camera"), self._topic)
+        said = _("The next picture of {robot} appears here.").format(robot=link.name)
+        self.empty.say(_("No pictures yet"), said)
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
 
@@ -98,4 +100,4 @@ def _topic_of(link: RobotLink) -> str:
     return camera.topic if camera is not None else ""
 
 
-PANEL = Panel("camera", "Camera", "camera", (), CameraPanel)
+PANEL = Panel("camera", lazy("Camera"), "camera", (), CameraPanel)

@@ -13,6 +13,7 @@ from app.ui.widgets import Chip, EmptyState, IconButton
 from app.ui.widgets.alert_box import AlertRow
 from app.ui.widgets.lists.scroll_areas import PanelRows
 from nep.doctor import report
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from nep.doctor import Finding
@@ -26,22 +27,22 @@ class DoctorPanel(PanelWidget):
     """Everything that was looked at, the worst first."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Connection doctor")
+        super().__init__(context, _("Connection doctor"))
         self._seen: tuple[object, ...] = ()
         self._master = ""
         self.rows: list[AlertRow] = []
         self.shown: list[Finding] = []  # each in the row of its place
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.again = IconButton(self.theme, "refresh-cw", "Look again", size=26)
+        self.again = IconButton(self.theme, "refresh-cw", _("Look again"), size=26)
         self.again.clicked.connect(self.session.doctor.look)
         self.header = [self.again]
-        self._copy = QAction("Copy the report", self)
+        self._copy = QAction(_("Copy the report"), self)
         self._copy.triggered.connect(self.copy_report)
         self.empty = EmptyState(
-            self.theme, "stethoscope", "Looking at the connections", "This takes a second or two."
+            self.theme, "stethoscope", _("Looking at the connections"), _("This takes a second or two.")
         )
-        self.pages = PanelRows(self.empty, "Connection doctor")
+        self.pages = PanelRows(self.empty, _("Connection doctor"))
         self.pages.fill(self)
 
     def refresh(self) -> None:
@@ -73,17 +74,17 @@ class DoctorPanel(PanelWidget):
         if bad:
             self.chip.set(str(len(bad)), STATUS[bad[0]])
         else:
-            self.chip.set("all is well", "ok")
+            self.chip.set(_("all is well"), "ok")
 
     def _row(self, finding: Finding) -> AlertRow:
         row = AlertRow(self.theme, framed=finding.severity in BAD)
-        does = "Copy the command" if finding.command else ""
+        does = _("Copy the command") if finding.command else ""
         row.say(
             STATUS[finding.severity],
             finding.sentence,
             finding.mend,
             command=finding.command,
-            button="Start the master" if finding.id in STARTABLE else does,
+            button=_("Start the master") if finding.id in STARTABLE else does,
         )
         row.button.clicked.connect(lambda: self._mend(finding))
         return row
@@ -91,18 +92,18 @@ class DoctorPanel(PanelWidget):
     def _mend(self, finding: Finding) -> None:
         if finding.id in STARTABLE:
             self.session.companions.ensure_master()
-            self.context.toast("Starting the master")
+            self.context.toast(_("Starting the master"))
             return
         QGuiApplication.clipboard().setText(finding.command)
-        self.context.toast(f"Copied “{finding.command}”")
+        self.context.toast(_("Copied “{command}”").format(command=finding.command))
 
     def copy_report(self) -> None:
         """Put everything that was found on the clipboard, to be sent to somebody."""
         QGuiApplication.clipboard().setText(report(self.session.doctor.findings))
-        self.context.toast("Copied the report")
+        self.context.toast(_("Copied the report"))
 
     def more_actions(self) -> Sequence[QAction]:
         return (self._copy,)
 
 
-PANEL = Panel("doctor", "Connection doctor", "stethoscope", (), DoctorPanel)
+PANEL = Panel("doctor", lazy("Connection doctor"), "stethoscope", (), DoctorPanel)

@@ -16,6 +16,7 @@ from app.ui.text.numbers import age_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Scrolled, label, paint
 from app.ui.widgets.indicators import StatusIcon
+from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
@@ -76,7 +77,7 @@ class HealthPanel(OneRobotPanel):
     """The health of the robot that is shown."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Health")
+        super().__init__(context, _("Health"))
         self._facts: tuple[HealthFact, ...] = ()
         self.rows: list[HealthRow] = []
         self.chip = Chip(self.theme)
@@ -84,14 +85,14 @@ class HealthPanel(OneRobotPanel):
         self.empty = EmptyState(
             self.theme,
             "bot",
-            "No robot is connected",
-            "How it is stands here as soon as it is there.",
+            _("No robot is connected"),
+            _("How it is stands here as soon as it is there."),
             [
-                EmptyAction("Use the virtual robot", lambda: context.run("robots.virtual"), "bot"),
-                EmptyAction("Find out why", lambda: context.run("help.doctor"), "stethoscope"),
+                EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot"),
+                EmptyAction(_("Find out why"), lambda: context.run("help.doctor"), "stethoscope"),
             ],
         )
-        self.step = Button(self.theme, "Start it again", "rotate-ccw", size="small")
+        self.step = Button(self.theme, _("Start it again"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
         inside = QWidget()
         self._column = QVBoxLayout(inside)
@@ -105,7 +106,7 @@ class HealthPanel(OneRobotPanel):
         self._column.addWidget(self._below)
         self._column.addStretch(1)
         self._scroll = Scrolled(inside)
-        self._scroll.setAccessibleName("How the robot is")
+        self._scroll.setAccessibleName(_("How the robot is"))
         self._scroll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.pages = QStackedWidget()
@@ -122,7 +123,7 @@ class HealthPanel(OneRobotPanel):
         link = self.wanted_robot()
         self.pages.setCurrentIndex(0 if link is None else 1)
         if link is not None:
-            self.set_title("Health", link.name if len(self.session.fleet.links) > 1 else "")
+            self.set_title(_("Health"), link.name if len(self.session.fleet.links) > 1 else "")
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
@@ -139,8 +140,9 @@ class HealthPanel(OneRobotPanel):
             row.show_fact(fact)
         wrong = [fact for fact in facts if fact.to_look_at]
         worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
-        self.chip.set(f"{len(wrong)} to look at" if wrong else "", worst)
-        self.step.setText("Start it again" if link.virtual else "Find out why")
+        said = ngettext("{count} to look at", "{count} to look at", len(wrong)).format(count=len(wrong))
+        self.chip.set(said if wrong else "", worst)
+        self.step.setText(_("Start it again") if link.virtual else _("Find out why"))
         self._below.setVisible(not link.connected or link.mute)
 
     def _make_rows(self, count: int) -> None:
@@ -175,5 +177,5 @@ def _whole_age(age_s: float) -> str:
     return f"{max(1, int(age_s))} s" if age_s < 60 else age_words(age_s)
 
 
-PANEL = Panel("health", "Health", "heart", (), HealthPanel)
+PANEL = Panel("health", lazy("Health"), "heart", (), HealthPanel)
 """How the robot is: what answers, what it tells of itself, how it stops."""

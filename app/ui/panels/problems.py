@@ -25,14 +25,15 @@ from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.keyboard import is_pressed_key
 from app.ui.widgets.labels import BoldInLine
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from nep.i18n import _, lazy, ngettext, pgettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
 
 STATUS = {"error": "error", "warning": "warn", "info": "info"}
-PLURAL = {"error": ("error", "errors"), "warning": ("warning", "warnings"), "info": ("hint", "hints")}
+SEVERITIES = {"error": lazy("error"), "warning": lazy("warning"), "info": lazy("info")}
 MOST_ROWS = 60
-NOTHING = "Nothing to mend.\nProblems appear here while you build."
+NOTHING = lazy("Nothing to mend.\nProblems appear here while you build.")
 
 
 class ProblemRow(QWidget):
@@ -47,7 +48,9 @@ class ProblemRow(QWidget):
         problem = line.problem
         self._theme, self.line, self.problem, self._large = theme, line, problem, large
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(f"{problem.severity}: {problem.sentence}")
+        severity = _(SEVERITIES[problem.severity])
+        said = _("{severity}: {sentence}").format(severity=severity, sentence=problem.sentence)
+        self.setAccessibleName(said)
         self.setProperty("focusRadius", theme.radius("small"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         if problem.block_id:
@@ -110,22 +113,22 @@ class ProblemsPanel(PanelWidget):
     """The problems of the behaviour that is open, and how many they are."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Problems")
+        super().__init__(context, _("Problems"))
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._program: Program | None = None
         self._found: tuple[Listed, ...] | None = None
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.checked = label("Checked while you build", "body", role="textSecondary")
+        self.checked = label(_("Checked while you build"), "body", role="textSecondary")
         self.header = [self.checked]
-        self._scroll = ScrollColumn("Problems", margins=(0, 4, 0, 4))
+        self._scroll = ScrollColumn(_("Problems"), margins=(0, 4, 0, 4))
         self._column = self._scroll.column
         self.others = label("", "body", role="textSecondary")
         self.others.setContentsMargins(14, 6, 8, 6)
         self.others.hide()
         self._column.insertWidget(0, self.others)
-        self.nothing = label(NOTHING, "bodyLarge", role="textSecondary", wrap=True)
+        self.nothing = label(_(NOTHING), "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.pages = QStackedWidget()
         self.pages.addWidget(Scrolled(self.nothing))
@@ -138,12 +141,12 @@ class ProblemsPanel(PanelWidget):
         document = self.session.document
         program = document.newest()
         if program is None:
-            self.checked.setText("Checking")
+            self.checked.setText(_("Checking"))
             return
         if program is self._program:
             return
         self._program = program
-        self.checked.setText("Checked while you build")
+        self.checked.setText(_("Checked while you build"))
         found = listed(
             program.problems,
             document.workspace if document.absent else {},  # parsed only when somebody is missing
@@ -168,8 +171,12 @@ class ProblemsPanel(PanelWidget):
         self.rows = [kept.get(line) or self._row(line) for line in list(dict.fromkeys(found))[:MOST_ROWS]]
         for place, row in enumerate(self.rows):
             self._column.insertWidget(place, row)
-        self.others.setText(f"and {len(found) - MOST_ROWS} more, when these are mended")
-        paint.show_when(self.others, len(found) > MOST_ROWS)
+        more = max(0, len(found) - MOST_ROWS)
+        said = ngettext(
+            "and {count} more, when these are mended", "and {count} more, when these are mended", more
+        )
+        self.others.setText(said.format(count=more))
+        paint.show_when(self.others, more > 0)
         self.pages.setCurrentIndex(1 if found else 0)
         if held:  # a cured problem does not throw the keyboard out of the panel
             (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
@@ -191,14 +198,12 @@ class ProblemsPanel(PanelWidget):
 
     def _count(self, found: tuple[Listed, ...]) -> None:
         if not found:
-            self.chip.set("none", "ok")
+            self.chip.set(pgettext("problems", "none"), "ok")
             return
         kinds = [each.severity for each in found]
         worst = next((kind for kind in ("error", "warning") if kind in kinds), "info")
         self.chip.set(str(len(found)), STATUS[worst])
-        words = [
-            f"{kinds.count(kind)} {PLURAL[kind][kinds.count(kind) > 1]}" for kind in PLURAL if kind in kinds
-        ]
+        words = [_count_words(kind, kinds.count(kind)) for kind in SEVERITIES if kind in kinds]
         self.chip.setAccessibleName(", ".join(words))
         self.chip.setToolTip(plain.tip(", ".join(words)))
 
@@ -212,4 +217,12 @@ class ProblemsPanel(PanelWidget):
             self._show(self._found)
 
 
-PANEL = Panel("problems", "Problems", "triangle-alert", (), ProblemsPanel)
+def _count_words(severity: str, count: int) -> str:
+    if severity == "error":
+        return ngettext("{count} error", "{count} errors", count).format(count=count)
+    if severity == "warning":
+        return ngettext("{count} warning", "{count} warnings", count).format(count=count)
+    return ngettext("{count} hint", "{count} hints", count).format(count=count)
+
+
+PANEL = Panel("problems", lazy("Problems"), "triangle-alert", (), ProblemsPanel)

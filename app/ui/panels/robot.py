@@ -21,6 +21,7 @@ from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.indicators import ROBOT_STATUS
 from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.menus import Menu, drop_below
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
@@ -51,7 +52,7 @@ class RoomView(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setToolTip("Press its head or a hand to touch it; drag the ball")
+        self.setToolTip(_("Press its head or a hand to touch it; drag the ball"))
         theme.changed.connect(self.update)
 
     def show_state(self, data: Mapping[str, object]) -> None:
@@ -133,21 +134,21 @@ class RobotPanel(OneRobotPanel):
     """The first virtual robot; its name is the title."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Robot")
+        super().__init__(context, _("Robot"))
         self._told: Mapping[str, object] | None = None
         self._told_s = 0.0
         self.chip = Chip(self.theme)
-        self.reset = IconButton(self.theme, "rotate-cw", "Put the robot and its room back", size=30)
+        self.reset = IconButton(self.theme, "rotate-cw", _("Put the robot and its room back"), size=30)
         self.reset.clicked.connect(lambda: self._change({"reset": True}))
         self.reset.setVisible(False)
-        self.choose = IconButton(self.theme, "chevron-down", "Choose a robot", size=26)
+        self.choose = IconButton(self.theme, "chevron-down", _("Choose a robot"), size=26)
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
         self.choose.setVisible(False)
         self.chips = [self.choose, self.chip]
         self.header = [self.reset]
         self.view = RoomView(self.theme)
-        self.view.setAccessibleName("The robot in its room")
+        self.view.setAccessibleName(_("The robot in its room"))
         self.view.touched.connect(lambda part, down: self._change({"touch": part, "down": down}))
         self.view.moved.connect(
             lambda what, x, y: self._change({"move": what, "x": round(x, 3), "y": round(y, 3)})
@@ -195,16 +196,17 @@ class RobotPanel(OneRobotPanel):
         self.pages.setCurrentWidget(self.empty)
         if link is None:
             self.empty.say(
-                "No robot is connected", "With the virtual robot you can try everything at once.", "bot"
+                _("No robot is connected"), _("With the virtual robot you can try everything at once."), "bot"
             )
-            start = EmptyAction("Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot")
+            start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
             self.empty.set_actions([start])
         elif link.virtual:
-            self.empty.say(f"{link.name} is coming", "It is drawn as soon as it tells where it is.")
+            title = _("{robot} is coming").format(robot=link.name)
+            self.empty.say(title, _("It is drawn as soon as it tells where it is."))
             self.empty.set_actions([])
         else:
             self.empty.say(link.name, _where_to_look(link))
-            show = EmptyAction("Show its actions", lambda: self.context.run("panel:robots"), "bot")
+            show = EmptyAction(_("Show its actions"), lambda: self.context.run("panel:robots"), "bot")
             self.empty.set_actions([show])
 
     def _change(self, change: Mapping[str, object]) -> None:
@@ -221,10 +223,12 @@ def _where_to_look(link: RobotLink) -> str:
     """What shows how a robot is that is not drawn; only what it has is named."""
     images = [sensor.is_image for sensor in link.robot.sensors]
     if True in images and False in images:
-        return "Its camera and its sensors show how it is."
+        return _("Its camera and its sensors show how it is.")
+    if True in images:
+        return _("Its camera shows how it is.")
     if images:
-        return f"Its {'camera shows' if True in images else 'sensors show'} how it is."
-    return "It tells nothing of itself, but you can try what it can do."
+        return _("Its sensors show how it is.")
+    return _("It tells nothing of itself, but you can try what it can do.")
 
 
-PANEL = Panel("robot", "Robot", "bot", (), RobotPanel)
+PANEL = Panel("robot", lazy("Robot"), "bot", (), RobotPanel)

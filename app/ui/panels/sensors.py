@@ -19,6 +19,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState, paint
 from app.ui.widgets.indicators import BAR_HEIGHT, paint_bar
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
@@ -48,7 +49,9 @@ class SensorRow(QWidget):
         if value is True:
             self._yes_s = now
         elif value is False and self._yes_s is not None:
-            reading = ReadingWords(reading.value, f"{age_words(max(1.0, float(int(now - self._yes_s))))} ago")
+            reading = ReadingWords(
+                reading.value, _("{age} ago").format(age=age_words(max(1.0, float(int(now - self._yes_s)))))
+            )
         if reading != self.reading:
             self.reading = reading
             self.setAccessibleDescription(" ".join(part for part in (reading.value, reading.beside) if part))
@@ -86,12 +89,12 @@ class SensorsPanel(OneRobotPanel):
     """The sensors of the robot that is shown."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Sensors now")
+        super().__init__(context, _("Sensors now"))
         self.rows: list[SensorRow] = []
-        self._scroll = ScrollColumn("Sensors", margins=(0, 6, 0, 6))
+        self._scroll = ScrollColumn(_("Sensors"), margins=(0, 6, 0, 6))
         self._column = self._scroll.column
         self.empty = EmptyState(
-            self.theme, "eye", "No robot, no sensors", "Connect a robot to see what it feels and sees."
+            self.theme, "eye", _("No robot, no sensors"), _("Connect a robot to see what it feels and sees.")
         )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
@@ -122,7 +125,8 @@ class SensorsPanel(OneRobotPanel):
         self._fit_rows()
         self.pages.setCurrentIndex(1 if self.rows else 0)
         if not self.rows:
-            self.empty.say(f"{link.name} has no sensors", "Its description names none.")
+            title = _("{robot} has no sensors").format(robot=link.name)
+            self.empty.say(title, _("Its description names none."))
 
     def _fit_rows(self) -> None:
         """Leave the rest below the last whole row empty; the others are scrolled to, row by row."""
@@ -161,4 +165,4 @@ def _shown(link: RobotLink) -> list[Sensor]:
     return sorted((sensor for sensor in link.robot.sensors if not sensor.is_image), key=rank)
 
 
-PANEL = Panel("sensors", "Sensors now", "eye", (), SensorsPanel)
+PANEL = Panel("sensors", lazy("Sensors now"), "eye", (), SensorsPanel)

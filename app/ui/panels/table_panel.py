@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from PySide6.QtCore import Qt
@@ -17,8 +18,19 @@ from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
+from nep.i18n import _
 
 Row = TypeVar("Row")
+
+
+@dataclass(frozen=True)
+class TableWords:
+    """What a table says of its rows, each marked with `lazy`: "Topics", "Filter topics"."""
+
+    title: str
+    filter: str
+    nothing_fits: str
+    clear_the_filter: str
 
 
 class TablePanel(PanelWidget, Generic[Row]):
@@ -28,14 +40,14 @@ class TablePanel(PanelWidget, Generic[Row]):
     below.
     """
 
-    def __init__(self, context: PanelContext, row: str, icon: str) -> None:
-        """A table whose rows are each a ``row`` ("topic"); ``icon`` is that of the empty state."""
-        self._row, self._rows = row, f"{row}s"
-        super().__init__(context, self._rows.capitalize())
+    def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
+        """``icon`` is that of the empty state."""
+        self._words = words
+        super().__init__(context, _(words.title))
         theme = self.theme
         self.model = self.make_model()
         self.table = self.make_table(self.model)
-        self.filter = FilterField(theme, f"Filter {self._rows}")
+        self.filter = FilterField(theme, _(words.filter))
         self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.filter.textChanged.connect(self.rebuild)
         self.header: list[QWidget] = [self.filter]
@@ -53,7 +65,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         self.pages.addWidget(self.table)
         self.pages.addWidget(self.empty)
         self.setFocusProxy(self.table)
-        self._columns = Menu(theme, self, "Columns")  # filled anew when "more" opens
+        self._columns = Menu(theme, self, _("Columns"))  # filled anew when "more" opens
         self._columns.setIcon(theme.icon("columns-2"))
 
     def make_model(self) -> TableModel[Row]:
@@ -83,14 +95,14 @@ class TablePanel(PanelWidget, Generic[Row]):
         if any_rows:
             return
         if filtered:
-            self.empty.say(
-                f"No {self._row} has these words", f"Clear the filter to see all {self._rows}.", "search"
-            )
-            self.empty.set_actions([EmptyAction("Clear the filter", self.filter.clear, "x")])
+            words = self._words
+            self.empty.say(_(words.nothing_fits), _(words.clear_the_filter), "search")
+            self.empty.set_actions([EmptyAction(_("Clear the filter"), self.filter.clear, "x")])
         elif self.session.master.kind == "none":
-            self.empty.say("No master is running", "A master lets programs find each other.", "radio-tower")
+            said = _("A master lets programs find each other.")
+            self.empty.say(_("No master is running"), said, "radio-tower")
             start = self.session.companions.ensure_master
-            self.empty.set_actions([EmptyAction("Start a master here", start, "play", primary=True)])
+            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
         else:
             self.say_empty()
 
@@ -131,8 +143,8 @@ class DoctorLine(QWidget):
         """``run`` does a command of the window by its name."""
         super().__init__()
         words = Elided("small", "textSecondary")
-        words.setText("Expected to see something?")
-        self.button = LinkButton(theme, "Open the connection doctor")
+        words.setText(_("Expected to see something?"))
+        self.button = LinkButton(theme, _("Open the connection doctor"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.button.clicked.connect(lambda: run(COMMAND))
         row = QHBoxLayout()

@@ -11,6 +11,7 @@ from PySide6.QtGui import QColor, QPainter, QPen
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from nep.i18n import number
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
@@ -81,7 +82,7 @@ def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox)
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(colour, 2.5))
     painter.drawRoundedRect(place, 2, 2)
-    words = box.words if box.confidence is None else f"{box.words} {box.confidence:.2f}"
+    words = box.words if box.confidence is None else f"{box.words} {number(box.confidence, '.2f')}"
     font = theme.font("caption")
     font.setWeight(font.Weight.DemiBold)
     width = paint.width_of(font, words) + 12

@@ -15,6 +15,7 @@ from app.ui.text.numbers import age_words
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
@@ -35,7 +36,7 @@ def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
     if arriving_hz is None:
         return ""
     shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
-    return f"shown {round(shown)} of {round(arriving_hz)}/s"
+    return _("shown {shown} of {arriving}/s").format(shown=round(shown), arriving=round(arriving_hz))
 
 
 def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
@@ -65,6 +66,7 @@ class PictureView(QWidget):
         self._grey: QImage | None = None  # of the last picture, when no new one comes
         self._boxes: tuple[DetectionBox, ...] = ()
         self._rate = self._state = self._age = ""
+        self._silent = False  # the last picture is shown, and no new one comes
         self.mouse: QPointF | None = None  # where a person points, when it matters
         self._takes = 0
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
@@ -100,6 +102,7 @@ class PictureView(QWidget):
         self._picture = self._image = self._grey = None
         self._boxes = ()
         self._rate = self._state = self._age = ""
+        self._silent = False
         self.update()
 
     def take(self, stream: ImageStream, boxes: tuple[DetectionBox, ...] = ()) -> None:
@@ -110,11 +113,13 @@ class PictureView(QWidget):
         self._rate = rate_sentence(stream.shown_hz, stream.arriving_hz)
         if picture is not None and (self._takes % AGE_EVERY == 1 or not self._age):
             self._age = _age_of(picture)
+        self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S
         if stream.held:
-            self._state = f"Frozen, {age_words(stream.age_s)} old"
+            self._state = _("Frozen, {age} old").format(age=age_words(stream.age_s))
+        elif self._silent:
+            self._state = _("Last picture, {age} old").format(age=age_words(stream.age_s))
         else:
-            silent = silent_s is not None and silent_s > SILENT_AFTER_S
-            self._state = f"Last picture, {age_words(stream.age_s)} old" if silent else ""
+            self._state = ""
         if picture is not self._picture and picture is not None:
             self._picture = picture
             rows, columns = picture.bgra.shape[:2]
@@ -176,8 +181,7 @@ class PictureView(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         area, view = self.area(), QRectF(self.rect())
-        silent = self._state.startswith("Last")
-        image = self._grey_image() if silent and not self._labelled else self._image
+        image = self._grey_image() if self._silent and not self._labelled else self._image
         if image is None or not area.contains(view):
             if image is None or not self._fill:
                 painter.fillRect(self.rect(), QColor("black"))
@@ -185,9 +189,9 @@ class PictureView(QWidget):
                 paint_around(painter, view, image)
         if image is not None:
             self._paint_image(painter, area, image)
-        if silent and not self._labelled:
+        if self._silent and not self._labelled:
             paint_silent(painter, self._theme, view, self._state)
-        elif silent:
+        elif self._silent:
             painter.fillRect(area, QColor(90, 90, 90, 150))
         else:
             shares = self.place.to_view(area)

@@ -4,19 +4,38 @@ from __future__ import annotations
 
 import datetime as dt
 
+from nep.i18n import _, day_text
+
 
 def day_words(then: dt.datetime, now: dt.datetime) -> str:
     """Say "Today, 8:12", "Yesterday", "17 November", "17 November 2025"."""
     days = (now.date() - then.date()).days
     if days == 0:
-        return f"Today, {then.hour}:{then.minute:02d}"
+        return _("Today, {clock}").format(clock=clock_words(then))
     if days == 1:
-        return "Yesterday"
-    words = f"{then.day} {then:%B}"
-    return words if then.year == now.year else f"{words} {then.year}"
+        return _("Yesterday")
+    return day_text(then.day, then.month, then.year if then.year != now.year else None)
 
 
 def when_words(then: dt.datetime, now: dt.datetime) -> str:
     """Say "Today, 8:12", "Yesterday, 8:12", "17 November, 8:12"."""
     day = day_words(then, now)
-    return day if then.date() == now.date() else f"{day}, {then.hour}:{then.minute:02d}"
+    if then.date() == now.date():
+        return day
+    return _("{day}, {clock}").format(day=day, clock=clock_words(then))
+
+
+def seen_words(then: dt.datetime, now: dt.datetime) -> str:
+    """Say "seen today, 8:12", "seen yesterday, 16:20", "seen 17 November, 16:20"."""
+    clock = clock_words(then)
+    days = (now.date() - then.date()).days
+    if days == 0:
+        return _("seen today, {clock}").format(clock=clock)
+    if days == 1:
+        return _("seen yesterday, {clock}").format(clock=clock)
+    return _("seen {day}, {clock}").format(day=day_words(then, now), clock=clock)
+
+
+def clock_words(then: dt.datetime) -> str:
+    """Say "8:12"."""
+    return f"{then.hour}:{then.minute:02d}"

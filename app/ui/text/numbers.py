@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import sys
 
+from nep.i18n import number
+
 MAC_KEYS = {"Ctrl": "⌘", "Alt": "⌥", "Shift": "⇧", "Meta": "⌃"}
 THIN = "\u2009"  # a thin space between thousands
 
@@ -13,7 +15,7 @@ def rate_words(rate_hz: float | None) -> str:
     """Messages a second: 30.0, 0.4, 1 204; blank when not known."""
     if rate_hz is None:
         return ""
-    return f"{rate_hz:.1f}" if rate_hz < 1000 else grouped(round(rate_hz))
+    return number(rate_hz, ".1f") if rate_hz < 1000 else grouped(round(rate_hz))
 
 
 def bandwidth_words(bytes_per_s: float | None) -> str:
@@ -30,7 +32,7 @@ def size_words(size_bytes: float) -> str:
         if value < 999.5:
             break
         value, unit = value / 1000, larger
-    return f"{value:.1f} {unit}" if value < 9.95 else f"{round(value)} {unit}"
+    return f"{number(value, '.1f')} {unit}" if value < 9.95 else f"{round(value)} {unit}"
 
 
 def age_words(age_s: float | None) -> str:
@@ -40,7 +42,7 @@ def age_words(age_s: float | None) -> str:
     if age_s < 0.0995:
         return f"{round(age_s * 1000)} ms"
     if age_s < 2.95:
-        return f"{age_s:.1f} s"
+        return f"{number(age_s, '.1f')} s"
     if age_s < 60:
         return f"{round(age_s)} s"
     return f"{round(age_s / 60)} min" if age_s < 3600 else f"{round(age_s / 3600)} h"
@@ -49,13 +51,13 @@ def age_words(age_s: float | None) -> str:
 def latency_words(latency_s: float) -> str:
     """0.6 ms, 41 ms, 1.2 s."""
     if latency_s < 0.00995:
-        return f"{latency_s * 1000:.1f} ms"
-    return f"{round(latency_s * 1000)} ms" if latency_s < 0.9995 else f"{latency_s:.1f} s"
+        return f"{number(latency_s * 1000, '.1f')} ms"
+    return f"{round(latency_s * 1000)} ms" if latency_s < 0.9995 else f"{number(latency_s, '.1f')} s"
 
 
-def grouped(number: int) -> str:
+def grouped(count: int) -> str:
     """18 204: thousands apart."""
-    return f"{number:,}".replace(",", THIN)
+    return f"{count:,}".replace(",", THIN)
 
 
 def plural(count: int | None, word: str) -> str:
@@ -66,7 +68,7 @@ def plural(count: int | None, word: str) -> str:
 def seconds_words(value_s: float) -> str:
     """0.4 s, 14 s, 2 min: how long something took."""
     if value_s < 10:
-        return f"{value_s:.1f} s"
+        return f"{number(value_s, '.1f')} s"
     return f"{round(value_s)} s" if value_s < 120 else f"{round(value_s / 60)} min"
 
 

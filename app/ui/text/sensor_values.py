@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeGuard
 
 from app.robots.description.description import DataField, Sensor
+from nep.i18n import _, number
 
 MINUS = "\u2212"
 
@@ -24,7 +26,7 @@ def reading_of(sensor: Sensor, value: object) -> ReadingWords:
     if value is None:
         return ReadingWords()
     if sensor.kind == "boolean" or isinstance(value, bool):
-        return ReadingWords("yes" if value else "no")
+        return ReadingWords(yes_words(value))
     if sensor.kind == "detections" and isinstance(value, Mapping):
         return _detections(value)
     if isinstance(value, Mapping):
@@ -39,14 +41,19 @@ def reading_of(sensor: Sensor, value: object) -> ReadingWords:
     return ReadingWords(str(value))
 
 
+def yes_words(value: object) -> str:
+    """Say "yes" or "no"."""
+    return _("yes") if value else _("no")
+
+
 def number_words(value: float, unit: str | None) -> str:
     """0.82 m, 84 %, 31°: as many decimals as matter."""
     if isinstance(value, int) or float(value).is_integer():
         words = f"{value:.0f}"
     elif abs(value) < 10:
-        words = f"{value:.2f}"
+        words = number(value, ".2f")
     else:
-        words = f"{value:.1f}" if abs(value) < 100 else f"{value:.0f}"
+        words = number(value, ".1f" if abs(value) < 100 else ".0f")
     words = words.replace("-", MINUS)
     if not unit:
         return words
@@ -73,26 +80,20 @@ def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
     """Fields of one unit are said together ("1.3, 0.3 m"), the others beside ("facing 31°")."""
     fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
-    numbers = [(field, number) for field, number in known if _is_number(number)]
+    numbers = [(field, told) for field, told in known if _is_number(told)]
     if not numbers:
         return ReadingWords(
             "", ", ".join(f"{field.title} {words}" for field, words in known if words is not None)
         )
     unit = numbers[0][0].unit
-    together = [f"{number:.1f}".replace("-", MINUS) for field, number in numbers if field.unit == unit]
-    others = [(field, number) for field, number in numbers if field.unit != unit]
-    beside = ", ".join(
-        f"{field.title} {number_words(_round(number), field.unit)}" for field, number in others
-    )
+    together = [number(told, ".1f").replace("-", MINUS) for field, told in numbers if field.unit == unit]
+    others = [(field, told) for field, told in numbers if field.unit != unit]
+    beside = ", ".join(f"{field.title} {number_words(round(told), field.unit)}" for field, told in others)
     return ReadingWords(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _round(number: object) -> float:
-    return round(number) if isinstance(number, (int, float)) else 0.0
 
 
 def _name(item: object) -> str:

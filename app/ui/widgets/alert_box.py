@@ -10,8 +10,9 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
-from app.ui.widgets.indicators import SPOKEN
+from app.ui.widgets.indicators import spoken
 from app.ui.widgets.labels import label
+from nep.i18n import _
 
 BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 
@@ -104,7 +105,8 @@ class AlertRow(AlertBox):
             paint.show_when(line, bool(text))
         self.button.set_word(button)
         paint.show_when(self.button, bool(button))
-        self.setAccessibleName(f"{SPOKEN.get(status, status)}: {title} {detail}".strip())
+        said = _("{status}: {sentence}").format(status=spoken(status), sentence=f"{title} {detail}".strip())
+        self.setAccessibleName(said)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(160, super().minimumSizeHint().height())

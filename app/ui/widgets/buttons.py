@@ -17,6 +17,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.keyboard import is_plain
+from nep.i18n import _
 
 Kind = Literal["plain", "primary", "ghost", "run", "stop"]
 Size = Literal["small", "normal", "form", "large"]
@@ -370,7 +371,7 @@ class StopButton(PaintedButton):
 
     def __init__(self, theme: Theme, place: Place = "runBar", parent: QWidget | None = None) -> None:
         self._corners = "large" if place == "runBar" else "control"
-        super().__init__(theme, "Stop", radius=self._corners, parent=parent)
+        super().__init__(theme, _("Stop"), radius=self._corners, parent=parent)
         self._place: Place = place
         self._ring = False
         self.filled = True
@@ -389,7 +390,8 @@ class StopButton(PaintedButton):
     def sizeHint(self) -> QSize:
         wanted = self._theme.pair("stop", self._place)
         word, key = self._fonts()
-        least = self._side() + 26 + paint.width_of(word, "Stop again")  # one place and size in every state
+        said = (_("Stop"), _("Stopping"), _("Stop again"))  # one place and size in every state
+        least = self._side() + 26 + max(paint.width_of(word, each) for each in said)
         if self._place != "runBar":
             least += paint.width_of(key, "F12") + 8
         height = max(wanted.height(), round(paint.height_of(word)) + 10)
@@ -425,7 +427,7 @@ class StopButton(PaintedButton):
 
     def _paint_words(self, painter: QPainter, frame: QRectF, ink: QColor) -> None:
         font, key_font = self._fonts()
-        key = "F12" if self.text() == "Stop" or self._place != "runBar" else ""
+        key = "F12" if self.text() == _("Stop") or self._place != "runBar" else ""
         side = self._side()
         gap = 10 if self._place == "runBar" else 8
         key_gap = gap + 3 if self._place == "runBar" else gap - 1

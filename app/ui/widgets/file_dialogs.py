@@ -10,8 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.core.documents.file_format import SUFFIX
-
-FILTER = f"Behaviours (*{SUFFIX})"
+from nep.i18n import _
 
 
 class Asks(Protocol):
@@ -43,18 +42,18 @@ class SystemDialogs:
         self._window = window
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog("Open a behaviour", folder, take)
+        dialog = self._dialog(_("Open a behaviour"), folder, take)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         show_free(dialog)
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog("Save the behaviour", str(Path(suggestion).parent), take)
+        dialog = self._dialog(_("Save the behaviour"), str(Path(suggestion).parent), take)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
         show_free(dialog)
 
     def _dialog(self, title: str, folder: str, take: Callable[[Path], None]) -> QFileDialog:
-        dialog = QFileDialog(self._window, title, folder, FILTER)
+        dialog = QFileDialog(self._window, title, folder, f"{_('Behaviours')} (*{SUFFIX})")
         dialog.fileSelected.connect(lambda chosen: take(Path(chosen)))
         return dialog

@@ -109,7 +109,7 @@ class Flow(QLayout):
             rows = self._rows(shown, room.width())
         top = room.top()
         for row in rows:
-            high = max(_height(item, wide) for item, _, wide in row)
+            high = max(_height(item, wide) for item, _rect, wide in row)
             for item, left, wide in row:
                 if move:
                     height = min(high, _height(item, wide))

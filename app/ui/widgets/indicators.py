@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from nep.i18n import _, lazy
 
 CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
 ICON = 18
@@ -20,12 +21,24 @@ LEAST_ITEM = 64
 SPARK = QSize(56, 16)
 SPARK_STROKE = 1.25
 BAR_HEIGHT = 6
-SPOKEN = {"warn": "warning"}  # what a screen reader says for the word of a status
+SPOKEN = {
+    "ok": lazy("ok"),
+    "info": lazy("info"),
+    "warn": lazy("warning"),
+    "error": lazy("error"),
+    "running": lazy("running"),
+    "off": lazy("off"),
+}
 # the status that a chip gives what `RobotLink.state` says
 ROBOT_STATUS = {
     "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
     "away": "off",
 }  # fmt: skip
+
+
+def spoken(status: str) -> str:
+    """What a screen reader says for a status."""
+    return _(SPOKEN.get(status, status))
 
 
 class Chip(QWidget):
@@ -133,7 +146,7 @@ class StatusIcon(QWidget):
         """Show another status."""
         if status != self._status:
             self._status = status
-            self.setAccessibleName(SPOKEN.get(status, status))
+            self.setAccessibleName(spoken(status))
             self.update()
 
     def sizeHint(self) -> QSize:

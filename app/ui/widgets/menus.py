@@ -92,7 +92,7 @@ class Menu(QMenu):
         elif not action.icon().isNull():
             mode = QIcon.Mode.Normal if action.isEnabled() else QIcon.Mode.Disabled
             action.icon().paint(painter, mark.toRect(), Qt.AlignmentFlag.AlignCenter, mode)
-        said, _, key = action.text().partition("\t")
+        said, _tab, key = action.text().partition("\t")
         key = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText) or key
         ink = theme.colour("text" if action.isEnabled() else "textDisabled")
         inside = place.adjusted(TEXT_LEFT, 0, -12, 0)

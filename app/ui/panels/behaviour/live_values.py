@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 from app.robots.description.description import DataField, Robot, Sensor
-from app.ui.text.sensor_values import number_words, reading_of
+from app.ui.text.sensor_values import number_words, reading_of, yes_words
 
 SILENT = "silent"
 
@@ -63,5 +63,5 @@ def _words(key: str, sensor: Sensor, value: object) -> dict[str, str]:
 
 def _part(field: DataField, value: object) -> str:
     if isinstance(value, bool):
-        return "yes" if value else "no"
+        return yes_words(value)
     return number_words(value, field.unit) if isinstance(value, (int, float)) else str(value)

@@ -19,6 +19,7 @@ from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.tabs import BehaviourTitle
 from app.ui.widgets import EmptyAction, EmptyState, label
 from app.ui.widgets.indicators import ROBOT_STATUS
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.blocks import Program
@@ -32,7 +33,7 @@ LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed f
 TOOLBOX_WIDTH = 196
 EMPTY_SIZE = (460, 250)
 ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
-WAIT_WORDS = "Getting the blocks ready."
+WAIT_WORDS = lazy("Getting the blocks ready.")
 WAIT_UNTIL_S = 0.5
 
 
@@ -40,7 +41,7 @@ class BehaviourPanel(PanelWidget):
     """The behaviour that is open: Blocks to build with, Python to read."""
 
     def __init__(self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = blockly) -> None:
-        super().__init__(context, "Behaviour")
+        super().__init__(context, _("Behaviour"))
         self._bar = BehaviourTitle(self.theme)
         self._bar.mode.changed.connect(self.set_mode)
         self._bar.copy.clicked.connect(self.copy_program)
@@ -68,11 +69,11 @@ class BehaviourPanel(PanelWidget):
         self.empty = EmptyState(
             self.theme,
             "bot",
-            "No robot is connected",
-            "You can build now and run later. With the virtual robot you can try it at once.",
+            _("No robot is connected"),
+            _("You can build now and run later. With the virtual robot you can try it at once."),
             [
                 EmptyAction(
-                    "Use the virtual robot", lambda: context.run("robots.virtual"), "bot", primary=True
+                    _("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot", primary=True
                 )
             ],
         )
@@ -147,7 +148,7 @@ class BehaviourPanel(PanelWidget):
         editor = self._make_editor(self._place)
         editor.changed.connect(self._edited)
         editor.recovered.connect(
-            lambda: self.context.toast("The block editor was started again. Undo begins anew.")
+            lambda: self.context.toast(_("The block editor was started again. Undo begins anew."))
         )
         editor.history_changed.connect(self._history)
         editor.key_pressed.connect(self._key)
@@ -184,7 +185,7 @@ class BehaviourPanel(PanelWidget):
     def _show_live(self) -> None:
         """What sensor blocks say now: "84 %" on the battery, in the behaviour and in the open toolbox."""
         sensors = dict.fromkeys((*self._sensors, *self._offered))
-        self._look_at({robot for robot, _ in sensors})
+        self._look_at({robot for robot, _name in sensors})
         if self.editor is not None:
             words, old = live_words(self.session.fleet, sensors)
             self.editor.set_live_values(words, old)
@@ -230,7 +231,7 @@ class BehaviourPanel(PanelWidget):
     def copy_program(self) -> None:
         """Put the Python text on the clipboard."""
         QGuiApplication.clipboard().setText(self.program.toPlainText())
-        self.context.toast("Copied the program")
+        self.context.toast(_("Copied the program"))
 
     def flush(self, done: Callable[[], None]) -> None:
         """Take over the newest edits (the editor tells them 150 ms late), then call ``done``."""
@@ -301,7 +302,7 @@ class BlocksWait:
         """``clock`` gives seconds."""
         self._place, self._clock = place, clock
         self._since: float | None = None
-        self.words = label(WAIT_WORDS, "bodyLarge", role="textSecondary", wrap=True)
+        self.words = label(_(WAIT_WORDS), "bodyLarge", role="textSecondary", wrap=True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.words.setParent(place)
@@ -330,8 +331,8 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
 def tab_facts(document: Document, runs: Runs) -> TabFacts:
     """What the tab of a behaviour shows."""
     running = runs.active and runs.document is document
-    where = str(document.path) if document.path is not None else "Not saved in a file yet"
+    where = str(document.path) if document.path is not None else _("Not saved in a file yet")
     return TabFacts(document.key, document.name, document.dirty, running, f"{document.name}\n{where}")
 
 
-PANEL = Panel("behaviour", "Behaviour", "blocks", (), BehaviourPanel)
+PANEL = Panel("behaviour", lazy("Behaviour"), "blocks", (), BehaviourPanel)

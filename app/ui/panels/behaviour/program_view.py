@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import EditMenu
+from nep.i18n import _
 
 # The first rule that fits a place colours it: text and comments before the words inside them.
 _RULES: tuple[tuple[str, str], ...] = (
@@ -27,7 +28,7 @@ class _Colours(QSyntaxHighlighter):
     def __init__(self, document: QTextDocument, theme: Theme) -> None:
         super().__init__(document)
         self._theme = theme
-        together = "|".join(f"(?P<r{place}>{rule})" for place, (_, rule) in enumerate(_RULES))
+        together = "|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_RULES))
         self._rules = re.compile(together)
 
     def highlightBlock(self, text: str) -> None:
@@ -48,7 +49,7 @@ class ProgramView(QPlainTextEdit):
         self.setProperty("bare", "true")
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
-        self.setAccessibleName("The program in Python")
+        self.setAccessibleName(_("The program in Python"))
         self.document().setDocumentMargin(16)
         self._colours = _Colours(self.document(), theme)
         EditMenu(theme, self)

@@ -19,6 +19,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
+from nep.i18n import _
 
 LONGEST_NAME = 220
 PADDING = 12
@@ -60,9 +61,10 @@ class BehaviourTab(PaintedButton):
         self.facts = facts
         self.setChecked(current)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
-        states = [word for word, so in (("not saved", facts.dirty), ("runs", facts.runs)) if so]
+        states = [word for word, so in ((_("not saved"), facts.dirty), (_("runs"), facts.runs)) if so]
         self.say(facts.name, ", ".join([facts.name, *states]))
-        self.setAccessibleDescription("The behaviour that shows" if current else "Another open behaviour")
+        said = _("The behaviour that shows") if current else _("Another open behaviour")
+        self.setAccessibleDescription(said)
         self.setToolTip(plain.tip(facts.tip or self.accessibleName()))
         self.update()
         return wider

@@ -12,6 +12,7 @@ from app.ui.panels.behaviour.tab import BehaviourTab, TabFacts
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Segments
 from app.ui.widgets.menus import Menu
+from nep.i18n import _
 
 SHORTEST = 76
 GAP = 4
@@ -33,9 +34,9 @@ class BehaviourTabs(QWidget):
         self._left = 0.0
         self.tabs: dict[str, BehaviourTab] = {}
         self._room = QWidget(self)  # cuts off what the wheel has moved out of sight
-        self.add = IconButton(theme, "plus", "New behaviour", "Ctrl+N", parent=self)
+        self.add = IconButton(theme, "plus", _("New behaviour"), "Ctrl+N", parent=self)
         self.add.setProperty("command", "file.new")
-        self.setAccessibleName("Open behaviours")
+        self.setAccessibleName(_("Open behaviours"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self._restyle)
 
@@ -159,9 +160,9 @@ class BehaviourTabs(QWidget):
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for words, command in (
-            ("Save as", "tab.save_as"),
-            ("Close", "tab.close"),
-            ("Close the others", "tab.close_others"),
+            (_("Save as"), "tab.save_as"),
+            (_("Close"), "tab.close"),
+            (_("Close the others"), "tab.close_others"),
         ):
             menu.addAction(words).triggered.connect(
                 lambda _on=False, command=command: self.asked.emit(command, found)
@@ -176,14 +177,15 @@ class BehaviourTitle(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.tabs = BehaviourTabs(theme)
-        self.undo = IconButton(theme, "rotate-ccw", "Undo", "Ctrl+Z", size=32)
-        self.redo = IconButton(theme, "rotate-cw", "Redo", "Ctrl+Shift+Z", size=32)
+        self.undo = IconButton(theme, "rotate-ccw", _("Undo"), "Ctrl+Z", size=32)
+        self.redo = IconButton(theme, "rotate-cw", _("Redo"), "Ctrl+Shift+Z", size=32)
         self.undo.setProperty("command", "edit.undo")
         self.redo.setProperty("command", "edit.redo")
-        self.copy = Button(theme, "Copy", "copy", size="small")
-        self.copy.setAccessibleName("Copy the program")
+        self.copy = Button(theme, _("Copy"), "copy", size="small")
+        self.copy.setAccessibleName(_("Copy the program"))
         self.copy.hide()
-        self.mode = Segments(theme, [("blocks", "Blocks", None), ("python", "Python", None)], name="Show as")
+        modes = [("blocks", _("Blocks"), None), ("python", _("Python"), None)]
+        self.mode = Segments(theme, modes, name=_("Show as"))
         for button in (self.undo, self.redo):
             button.setEnabled(False)
         row = QHBoxLayout(self)

@@ -25,6 +25,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SearchField, paint
 from app.ui.widgets.keyboard import is_plain
+from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.console import LogRecord
@@ -38,7 +39,13 @@ LEVELS = {
     "error": ("circle-x", "error"),
     "critical": ("octagon-x", "error"),
 }
-WORDS = {"critical": "fatal"}
+WORDS = {
+    "debug": lazy("debug"),
+    "info": lazy("info"),
+    "warn": lazy("warn"),
+    "error": lazy("error"),
+    "critical": lazy("fatal"),
+}
 """Words that fit into the column of levels."""
 ROW = {"compact": 22, "comfortable": 30}
 ICON = 14
@@ -47,7 +54,7 @@ _ROOT = QModelIndex()
 
 
 def line_of(record: LogRecord) -> str:
-    """A record as text, for the clipboard."""
+    """A record as text, for the clipboard: a line of a log, in no language."""
     moment = time.localtime(record.stamp_s)
     clock = f"{time.strftime('%H:%M:%S', moment)}.{int(record.stamp_s % 1 * 1000):03d}"
     logger = f" [{record.logger}]" if record.logger else ""
@@ -57,17 +64,23 @@ def line_of(record: LogRecord) -> str:
 def tip_of(record: LogRecord) -> str:
     """What is known of a record beside its text: where in the program it was logged."""
     where = "  ".join(part for part in (record.logger, record.place) if part)
-    said = f"{record.text}\n{time.strftime('%H:%M:%S', time.localtime(record.stamp_s))} {record.level}"
+    clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
+    said = f"{record.text}\n{clock} {_level_words(record)}"
     return f"{said}  {record.origin}\n{where}" if where else f"{said}  {record.origin}"
 
 
 def first_line(text: str) -> str:
     """A text in one row; how many lines follow is said."""
-    first, _, rest = text.partition("\n")
+    first, _end, rest = text.partition("\n")
     if not rest:
         return first
     more = rest.count("\n") + 1
-    return f"{first} (and {more} more line{'' if more == 1 else 's'})"
+    said = ngettext("{text} (and {count} more line)", "{text} (and {count} more lines)", more)
+    return said.format(text=first, count=more)
+
+
+def _level_words(record: LogRecord) -> str:
+    return _("critical") if record.level == "critical" else _(WORDS.get(record.level, record.level))
 
 
 class Wanted:
@@ -142,7 +155,7 @@ class ConsoleModel(QAbstractListModel):
         if gone:
             rows = len(self._records)
             self.beginRemoveRows(_ROOT, rows - gone, rows - 1)
-            for _ in range(gone):
+            for _each in range(gone):
                 self._records.popleft()
             self.endRemoveRows()
 
@@ -184,7 +197,7 @@ class LineDelegate(QStyledItemDelegate):
         paint_icon(painter, square, icon, theme.colour(role))
         rect.setLeft(rect.left() + shown["icon"])
         if "level" in shown:
-            level = WORDS.get(record.level, record.level)
+            level = _(WORDS.get(record.level, record.level))
             paint.words(painter, rect, level, font, theme.colour(role))
             rect.setLeft(rect.left() + shown["level"])
         for words, colour, most in self._parts(record, logger="logger" in shown):
@@ -204,7 +217,7 @@ class LineDelegate(QStyledItemDelegate):
         shown = {
             "time": paint.width_of(self._theme.font("code"), "00:00:00") + 14,
             "icon": float(ICON + 4),
-            "level": max(paint.width_of(font, word) for word in ("debug", "error")) + 10,
+            "level": max(paint.width_of(font, _(word)) for word in WORDS.values()) + 10,
             "origin": min(paint.width_of(font, record.origin), 0.3 * width) + 7,
             "logger": paint.width_of(font, record.logger.rpartition(".")[2]),
         }
@@ -232,7 +245,7 @@ class LineList(QListView):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setAccessibleName("What happened, newest first")
+        self.setAccessibleName(_("What happened, newest first"))
         self.setUniformItemSizes(True)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -257,8 +270,8 @@ class FindWords(SearchField):
     left = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, "Find words")
-        self.setAccessibleName("Find words in the lines")
+        super().__init__(theme, _("Find words"))
+        self.setAccessibleName(_("Find words in the lines"))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:

@@ -25,15 +25,16 @@ from app.ui.text import plain
 from app.ui.text.numbers import grouped
 from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
+from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.console import LogRecord
 
 FROM = {
-    "debug": "Everything, also details",
-    "all": "Everything",
-    "warn": "Warnings and errors",
-    "error": "Errors only",
+    "debug": lazy("Everything, also details"),
+    "all": lazy("Everything"),
+    "warn": lazy("Warnings and errors"),
+    "error": lazy("Errors only"),
 }
 SHOWN = {
     "debug": frozenset(LEVELS),
@@ -48,13 +49,13 @@ class ConsolePanel(PanelWidget):
     """The lines, and which of them are shown: by level, by node, by words."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Console")
+        super().__init__(context, _("Console"))
         self._seen = -1
         self._choice: tuple[object, ...] = ()
         self._unseen = 0
         self.level = "all"
         self.node = ""
-        self.filter = IconButton(self.theme, "filter", "Choose what is shown", size=26)
+        self.filter = IconButton(self.theme, "filter", _("Choose what is shown"), size=26)
         self.filter.clicked.connect(self._show_menu)
         self.header = [self.filter]
         self.words = FindWords(self.theme)
@@ -63,7 +64,7 @@ class ConsolePanel(PanelWidget):
         self.words.hide()
         self.model = ConsoleModel()
         self.list = self._make_list()
-        self.empty = EmptyState(self.theme, "terminal", "Nothing happened yet", "")
+        self.empty = EmptyState(self.theme, "terminal", _("Nothing happened yet"), "")
         self.newer = Button(self.theme, "", "arrow-up", size="small")
         self.newer.setParent(self.list)
         self.newer.hide()
@@ -88,17 +89,17 @@ class ConsolePanel(PanelWidget):
         made.setItemDelegate(self._delegate)
         made.find_wanted.connect(self.focus_filter)
         made.resized.connect(self._place_newer)
-        self._copy = QAction("Copy", made)
+        self._copy = QAction(_("Copy"), made)
         self._copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
         self._copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
         self._copy.triggered.connect(self.copy)
         made.addAction(self._copy)
         made.customContextMenuRequested.connect(self._show_actions)
-        self._copy_all = QAction("Copy all lines", self)
+        self._copy_all = QAction(_("Copy all lines"), self)
         self._copy_all.triggered.connect(self._copy_everything)
-        self._clear = QAction("Clear", self)
+        self._clear = QAction(_("Clear"), self)
         self._clear.triggered.connect(self.clear)
-        self._find = QAction("Find words", self)
+        self._find = QAction(_("Find words"), self)
         self._find.triggered.connect(self.focus_filter)
         return made
 
@@ -144,9 +145,10 @@ class ConsolePanel(PanelWidget):
         """The way back to the newest line, with how many came meanwhile."""
         away = self.list.verticalScrollBar().value() > 0
         if self._unseen:
-            self.newer.set_word(f"{grouped(self._unseen)} new", "arrow-up")
+            said = ngettext("{count} new", "{count} new", self._unseen)
+            self.newer.set_word(said.format(count=grouped(self._unseen)), "arrow-up")
         else:
-            self.newer.set_word("To the newest", "arrow-up")
+            self.newer.set_word(_("To the newest"), "arrow-up")
         self.newer.setVisible(away)
         self.newer.adjustSize()
         self._place_newer()
@@ -159,13 +161,14 @@ class ConsolePanel(PanelWidget):
     def _say_nothing(self) -> None:
         chosen = self.level in {"warn", "error"} or self.node or self.words.text()
         if not chosen:
-            self.empty.say("Nothing happened yet", "What programs and robots say appears here.")
+            self.empty.say(_("Nothing happened yet"), _("What programs and robots say appears here."))
             self.empty.set_actions([])
         elif self.node or self.words.text():
-            self.empty.say("No line fits", "Show all lines again, or wait for one that fits.")
-            self.empty.set_actions([EmptyAction("Show all lines", self.show_all, "x")])
+            self.empty.say(_("No line fits"), _("Show all lines again, or wait for one that fits."))
+            self.empty.set_actions([EmptyAction(_("Show all lines"), self.show_all, "x")])
         else:
-            self.empty.say("No problem was told", "Choose “Everything” to see all lines.")
+            said = _("Choose “{everything}” to see all lines.").format(everything=_(FROM["all"]))
+            self.empty.say(_("No problem was told"), said)
             self.empty.set_actions([])
 
     # ---- what a person chooses
@@ -194,19 +197,19 @@ class ConsolePanel(PanelWidget):
         self.refresh()
 
     def _name_filter(self) -> None:
-        whose = f" of {self.node}" if self.node else ""
-        self.filter.set_name(f"Shown: {FROM[self.level]}{whose}")
+        said = _("Shown: {level} of {node}") if self.node else _("Shown: {level}")
+        self.filter.set_name(said.format(level=_(FROM[self.level]), node=self.node))
         self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
         self.refresh()
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
         for level, words in FROM.items():
-            self._offer(menu, words, level == self.level, partial(self.set_level, level))
+            self._offer(menu, _(words), level == self.level, partial(self.set_level, level))
         nodes = sorted({record.origin for record in self.session.console.records} | {self.node} - {""})
         if nodes:
             menu.addSeparator()
-            self._offer(menu, "Of everybody", not self.node, partial(self.set_node, ""))
+            self._offer(menu, _("Of everybody"), not self.node, partial(self.set_node, ""))
         for node in nodes[:MOST_NODES]:
             if node:
                 self._offer(menu, node, node == self.node, partial(self.set_node, node))
@@ -253,7 +256,8 @@ class ConsolePanel(PanelWidget):
         if rows:
             records = [self.model.index(row, 0).data(RECORD_ROLE) for row in rows]
             QGuiApplication.clipboard().setText("\n".join(line_of(record) for record in records))
-            self.context.toast(f"Copied {grouped(len(rows))} line{'' if len(rows) == 1 else 's'}")
+            said = ngettext("Copied {count} line", "Copied {count} lines", len(rows))
+            self.context.toast(said.format(count=grouped(len(rows))))
 
     # ---- how it looks, and what is kept
 
@@ -269,4 +273,4 @@ class ConsolePanel(PanelWidget):
         self.set_level(str(state.get("level", "all")))
 
 
-PANEL = Panel("console", "Console", "terminal", (), ConsolePanel)
+PANEL = Panel("console", lazy("Console"), "terminal", (), ConsolePanel)

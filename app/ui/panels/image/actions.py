@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction
 
 from app.ui.pictures.zoom import STEP, ZoomablePicture
 from app.ui.theme.theme import Theme
+from nep.i18n import _, lazy
 
 
 @dataclass(frozen=True)
@@ -25,17 +26,17 @@ class PictureRow:
 
 
 ROWS: tuple[PictureRow, ...] = (
-    PictureRow("larger", "Zoom in", ("+", "Ctrl++"), "zoom-in"),
-    PictureRow("smaller", "Zoom out", ("-", "Ctrl+-"), "zoom-out"),
-    PictureRow("fit", "Whole picture", ("0", "Ctrl+0"), "maximize"),
-    PictureRow("exact", "One pixel for one", ("1",)),
-    PictureRow("right", "Turn right", ("R",), "rotate-cw", above=True),
-    PictureRow("left", "Turn left", ("Shift+R",), "rotate-ccw"),
-    PictureRow("across", "Flip left and right", ("H",), "move-horizontal", check=True),
-    PictureRow("down", "Flip top and bottom", ("V",), "arrow-up-down", check=True),
-    PictureRow("freeze", "Freeze this picture", ("Space",), "snowflake", above=True, check=True),
-    PictureRow("save", "Save as PNG", ("S",), "download"),
-    PictureRow("copy", "Copy the picture", ("Ctrl+C",), "copy"),
+    PictureRow("larger", lazy("Zoom in"), ("+", "Ctrl++"), "zoom-in"),
+    PictureRow("smaller", lazy("Zoom out"), ("-", "Ctrl+-"), "zoom-out"),
+    PictureRow("fit", lazy("Whole picture"), ("0", "Ctrl+0"), "maximize"),
+    PictureRow("exact", lazy("One pixel for one"), ("1",)),
+    PictureRow("right", lazy("Turn right"), ("R",), "rotate-cw", above=True),
+    PictureRow("left", lazy("Turn left"), ("Shift+R",), "rotate-ccw"),
+    PictureRow("across", lazy("Flip left and right"), ("H",), "move-horizontal", check=True),
+    PictureRow("down", lazy("Flip top and bottom"), ("V",), "arrow-up-down", check=True),
+    PictureRow("freeze", lazy("Freeze this picture"), ("Space",), "snowflake", above=True, check=True),
+    PictureRow("save", lazy("Save as PNG"), ("S",), "download"),
+    PictureRow("copy", lazy("Copy the picture"), ("Ctrl+C",), "copy"),
 )
 
 
@@ -60,7 +61,7 @@ class PictureActions(QObject):
         self._by_key: dict[str, QAction] = {}
         self._listed: list[QAction] = []  # with their lines
         for row in ROWS:
-            action = QAction(f"{row.words}\t{row.keys[0]}", view)
+            action = QAction(f"{_(row.words)}\t{row.keys[0]}", view)
             if row.icon is not None:
                 action.setIcon(theme.icon(row.icon))
             action.setCheckable(row.check)

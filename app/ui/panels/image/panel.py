@@ -20,6 +20,7 @@ from app.ui.pictures.zoom import ZoomablePicture
 from app.ui.text import plain
 from app.ui.widgets import EmptyAction, EmptyState, IconButton
 from app.ui.widgets.menus import Menu, drop_below
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
@@ -37,7 +38,7 @@ class ImagePanel(PanelWidget):
     shows_pictures = True
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Image")
+        super().__init__(context, _("Image"))
         self._topic = ""
         self._stream: ImageStream | None = None
         self._watch: Watch | None = None
@@ -45,12 +46,12 @@ class ImagePanel(PanelWidget):
         self._places: dict[str, PicturePlace] = {}
         self._revision = -1
         self._there: bool | None = None
-        self.choose = IconButton(self.theme, "chevron-down", "Choose a picture topic", size=26)
+        self.choose = IconButton(self.theme, "chevron-down", _("Choose a picture topic"), size=26)
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
         self.chips = [self.choose]
         self.view = ZoomablePicture(self.theme)
-        self.view.setAccessibleName("Picture")
+        self.view.setAccessibleName(_("Picture"))
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.view.customContextMenuRequested.connect(self._show_actions)
         self._make_actions()
@@ -67,7 +68,7 @@ class ImagePanel(PanelWidget):
     def _make_actions(self) -> None:
         own = {"freeze": self._freeze_or_not, "save": self.save_picture, "copy": self.copy_picture}
         self.actions_of = PictureActions(self.theme, self.view, own)
-        self._look_inside = QAction(self.theme.icon("list-tree"), "Show in the inspector", self)
+        self._look_inside = QAction(self.theme.icon("list-tree"), _("Show in the inspector"), self)
         self._look_inside.triggered.connect(self._inspect)
         self._line = QAction(self)
         self._line.setSeparator(True)
@@ -75,11 +76,11 @@ class ImagePanel(PanelWidget):
         self.job.saved.connect(self._saved)
         self.job.copied.connect(self._copied)
         self.job.failed.connect(self._failed)
-        self.fit = IconButton(self.theme, "maximize", "Whole picture", "0", size=26)
+        self.fit = IconButton(self.theme, "maximize", _("Whole picture"), "0", size=26)
         self.freeze = IconButton(
-            self.theme, "snowflake", "Freeze this picture", "Space", checkable=True, size=26
+            self.theme, "snowflake", _("Freeze this picture"), "Space", checkable=True, size=26
         )
-        self.keep = IconButton(self.theme, "download", "Save as PNG", "S", size=26)
+        self.keep = IconButton(self.theme, "download", _("Save as PNG"), "S", size=26)
         self.fit.clicked.connect(self.view.show_whole)
         self.freeze.toggled.connect(self._hold)
         self.keep.clicked.connect(self.save_picture)
@@ -99,7 +100,7 @@ class ImagePanel(PanelWidget):
         self._topic = name
         self.view.clear()
         self.freeze.setChecked(False)
-        self.set_title("Image", name)
+        self.set_title(_("Image"), name)
         if name:
             self._stream = self.session.images.stream(name)
             self.session.topics.mark_seen(name)
@@ -127,8 +128,8 @@ class ImagePanel(PanelWidget):
         if self._stream.picture is not None:
             self._page(there=True)
         elif self._stream.error:
-            self.empty.say("This can't be shown as a picture", f"{self._stream.error}.", "circle-x")
-            look = EmptyAction("Look at the message", self._inspect, "list-tree")
+            self.empty.say(_("This can't be shown as a picture"), f"{self._stream.error}.", "circle-x")
+            look = EmptyAction(_("Look at the message"), self._inspect, "list-tree")
             self.empty.set_actions([look])
 
     def _look_at_robot(self) -> None:
@@ -142,12 +143,13 @@ class ImagePanel(PanelWidget):
 
     def _say_nothing(self) -> None:
         if self._topic:
-            self.empty.say("No pictures yet", f"The next picture on {self._topic} appears here.", "image")
+            words = _("The next picture on {topic} appears here.").format(topic=self._topic)
+            self.empty.say(_("No pictures yet"), words, "image")
             self.empty.set_actions([])
         else:
-            words = "Pictures appear here as soon as a camera publishes them."
-            self.empty.say("No pictures yet", words, "image")
-            robot = EmptyAction("Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot")
+            words = _("Pictures appear here as soon as a camera publishes them.")
+            self.empty.say(_("No pictures yet"), words, "image")
+            robot = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
             self.empty.set_actions([robot])
         self._page(there=False)
 
@@ -196,18 +198,19 @@ class ImagePanel(PanelWidget):
 
     def _saved(self, path: str) -> None:
         folder = QUrl.fromLocalFile(str(Path(path).parent))
-        self.context.toast(
-            f"Saved {Path(path).name}", "Open folder", lambda: QDesktopServices.openUrl(folder)
-        )
+        said = _("Saved {file}").format(file=Path(path).name)
+        self.context.toast(said, _("Open folder"), lambda: QDesktopServices.openUrl(folder))
 
     def _copied(self, image: QImage) -> None:
         QGuiApplication.clipboard().setImage(image)
-        self.context.toast(f"Copied the picture, {image.width()}\u00d7{image.height()}")
+        size = f"{image.width()}\u00d7{image.height()}"
+        self.context.toast(_("Copied the picture, {size}").format(size=size))
 
     def _failed(self, sentence: str) -> None:
-        self.session.console.add("error", "image", f"the picture can't be kept: {sentence}")
+        said = _("the picture can't be kept: {reason}").format(reason=sentence)
+        self.session.console.add("error", "image", said)
         self.session.alerts.put(
-            "snapshot", "error", "The picture can't be kept.", sentence, button="Look at the console",
+            "snapshot", "error", _("The picture can't be kept."), sentence, button=_("Look at the console"),
             action="panel:console",
         )  # fmt: skip
 
@@ -228,7 +231,7 @@ class ImagePanel(PanelWidget):
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))
         if menu.isEmpty():  # Qt shows no empty menu, and would keep it
-            menu.addAction("No camera sends pictures now").setEnabled(False)
+            menu.addAction(_("No camera sends pictures now")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.choose)
 
@@ -262,4 +265,4 @@ class ImagePanel(PanelWidget):
             self._stream = None
 
 
-PANEL = Panel("image", "Image", "image", (CODEC,), ImagePanel)
+PANEL = Panel("image", lazy("Image"), "image", (CODEC,), ImagePanel)

@@ -14,6 +14,7 @@ from PySide6.QtGui import QImage
 from app.core.messages import snapshots
 from app.core.messages.picture import png_of
 from nep.errors import NepError
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from nep.messages.message import Message
@@ -75,7 +76,8 @@ class SnapshotJob(QObject):
         except NepError as error:
             made = str(error)
         except OSError as error:
-            made = f"{error.filename or 'the picture'}: {(error.strerror or str(error)).lower()}"
+            what = error.filename or _("the picture")
+            made = f"{what}: {(error.strerror or str(error)).lower()}"
         except Exception as error:  # noqa: BLE001  a job that ends without a word would be busy for ever
             made = f"{type(error).__name__}: {error}"
         self._made.put(made)

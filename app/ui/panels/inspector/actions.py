@@ -8,6 +8,7 @@ from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 
 from app.ui.panels.inspector.values import plain_words
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,12 +41,12 @@ class InspectorActions(QObject):
         super().__init__(panel)
         self._body, self._shown, self._toast = body, shown, toast
         rows: tuple[tuple[str, str, str, Callable[[], object]], ...] = (
-            ("Copy value", "Ctrl+C", "copy", self.copy_value),
-            ("Copy path", "Ctrl+Shift+C", "link", self.copy_path),
-            ("Copy the message as JSON", "Ctrl+Shift+J", "braces", self.copy_message),
-            ("Find a key or value", "Ctrl+F", "search", find),
-            ("Next one", "F3", "", lambda: body.finder.step(1)),
-            ("Previous one", "Shift+F3", "", lambda: body.finder.step(-1)),
+            (_("Copy value"), "Ctrl+C", "copy", self.copy_value),
+            (_("Copy path"), "Ctrl+Shift+C", "link", self.copy_path),
+            (_("Copy the message as JSON"), "Ctrl+Shift+J", "braces", self.copy_message),
+            (_("Find a key or value"), "Ctrl+F", "search", find),
+            (_("Next one"), "F3", "", lambda: body.finder.step(1)),
+            (_("Previous one"), "Shift+F3", "", lambda: body.finder.step(-1)),
         )
         self._find = find
         panel.installEventFilter(self)
@@ -84,13 +85,13 @@ class InspectorActions(QObject):
         """Put the chosen value on the clipboard."""
         node = self._chosen()
         if node is not None:
-            self._copied(plain_words(node.value), node.path)
+            self._copied(plain_words(node.value), _("Copied {path}").format(path=node.path))
 
     def copy_path(self) -> None:
         """Put the chosen value's path on the clipboard."""
         node = self._chosen()
         if node is not None:
-            self._copied(node.path, f"the path {node.path}")
+            self._copied(node.path, _("Copied the path {path}").format(path=node.path))
 
     def copy_message(self) -> None:
         """Put the whole message on the clipboard: JSON as it was sent, anything else as JSON."""
@@ -101,13 +102,13 @@ class InspectorActions(QObject):
             text = str(message.data, "utf-8", "replace")
         else:
             text = plain_words(self._body.model.value())
-        self._copied(text, f"the message of {message.topic}")
+        self._copied(text, _("Copied the message of {topic}").format(topic=message.topic))
 
     def _chosen(self) -> TreeNode | None:
         """The value that is chosen in the tree."""
         index = self._body.tree.currentIndex()
         return self._body.model.node(index) if index.isValid() else None
 
-    def _copied(self, text: str, what: str) -> None:
+    def _copied(self, text: str, said: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self._toast(f"Copied {what}")
+        self._toast(said)

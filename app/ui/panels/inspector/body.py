@@ -17,6 +17,7 @@ from app.ui.panels.inspector.tree_view import TreeView
 from app.ui.text.numbers import size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Elided, EmptyAction, EmptyState, IconButton, Line, Segments, label
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
@@ -33,7 +34,7 @@ class CompareStrip(QWidget):
         super().__init__()
         self._with = ""
         self.words = Elided("small", "textSecondary")
-        self.only = IconButton(theme, "filter", "Show changes only", checkable=True, size=24)
+        self.only = IconButton(theme, "filter", _("Show changes only"), checkable=True, size=24)
         self.only.toggled.connect(self.only_changed)
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 3, 8, 3)
@@ -44,7 +45,8 @@ class CompareStrip(QWidget):
 
     def say(self, compared_with: str, counts: Counts, whole: bool) -> None:
         """``Message before: 3 changed, 1 added``."""
-        self.words.setText(f"{compared_with}: {changes_words(counts, whole)}")
+        said = _("{compared_with}: {changes}")
+        self.words.setText(said.format(compared_with=compared_with, changes=changes_words(counts, whole)))
         self.setAccessibleDescription(self.words.text())
 
 
@@ -57,15 +59,16 @@ class InspectorBody(QWidget):
         self._waiting = ""
         self.model = TreeModel()
         self.tree = TreeView(theme, self.model)
-        self.tree.setAccessibleName("Newest message")
+        self.tree.setAccessibleName(_("Newest message"))
         self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.finder = FindBar(theme, looked_through)
         self.finder.found.connect(self._reveal)
         self.finder.field.leave.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.mode = Segments(
-            theme, [("tree", "Tree", None), ("raw", "Raw", None)], size="small", name="Show as"
+            theme, [("tree", _("Tree"), None), ("raw", _("Raw"), None)], size="small", name=_("Show as")
         )
-        self.compare = IconButton(theme, "equal", "Compare with the message before", checkable=True, size=26)
+        compare = _("Compare with the message before")
+        self.compare = IconButton(theme, "equal", compare, checkable=True, size=26)
         self.strip = CompareStrip(theme)
         self.sentence = label("", "small", role="warn", wrap=True)
         self.sentence.setContentsMargins(12, 6, 12, 6)
@@ -116,11 +119,14 @@ class InspectorBody(QWidget):
 
     def say_waiting(self, topic: str, published: bool) -> None:
         """There is no message of this topic yet, and perhaps nobody publishes it."""
-        words = f"The next message on {topic} appears here."
-        words = words if published else f"Nobody publishes it now. {words}"
+        if published:
+            words = _("The next message on {topic} appears here.")
+        else:
+            words = _("Nobody publishes it now. The next message on {topic} appears here.")
+        words = words.format(topic=topic)
         if words != self._waiting:
             self._waiting = words
-            self.empty.say("No message yet", words)
+            self.empty.say(_("No message yet"), words)
             self.empty.set_actions([])
 
     def say_nothing(self, topic: str, choose: Callable[[], object]) -> None:
@@ -129,16 +135,17 @@ class InspectorBody(QWidget):
         if topic:
             self.say_waiting(topic, published=True)
         else:
-            self.empty.say("Nothing chosen", "Click a topic to see its newest message.")
-            self.empty.set_actions([EmptyAction("Choose a topic", choose, "list")])
+            self.empty.say(_("Nothing chosen"), _("Click a topic to see its newest message."))
+            self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
     def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
         """There is a large message; ``read`` reads it when a person asks for it."""
-        self.large.say(f"A message of {size_words(size_bytes)}", words)
+        self.large.say(_("A message of {size}").format(size=size_words(size_bytes)), words)
         if read is None:
             self.large.set_actions([])
         elif self.page != LARGE:
-            self.large.set_actions([EmptyAction("Read the newest one", read, "list-tree", primary=True)])
+            action = EmptyAction(_("Read the newest one"), read, "list-tree", primary=True)
+            self.large.set_actions([action])
 
     def _reveal(self, path: object) -> None:
         index = self.model.reveal(path)  # type: ignore[arg-type]

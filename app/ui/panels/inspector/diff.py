@@ -10,6 +10,7 @@ import orjson
 
 from app.core.messages.lazy_json import LazyList, LazyObject
 from app.ui.panels.inspector.values import is_container, keys_of, size_of, values_of
+from nep.i18n import _, lazy, ngettext
 
 Mark = Literal["", "changed", "added", "removed"]
 Key = str | int
@@ -17,6 +18,11 @@ MOST_CHILDREN = 5000  # of one value that are looked through for changes
 MOST_VALUES = 20_000  # of a message that are counted
 Part = tuple[Key, object, object, Mark]
 Counts = dict[Mark, int]
+MARK_WORDS: Mapping[Mark, str] = {
+    "changed": lazy("changed"),
+    "added": lazy("added"),
+    "removed": lazy("removed"),
+}
 
 
 class _Nothing:
@@ -100,10 +106,18 @@ def count_changes(value: object, base: object, most: int = MOST_VALUES) -> tuple
 
 def changes_words(counts: Counts, whole: bool = True) -> str:
     """``3 changed, 1 added``; ``no difference``; ``at least`` in front when not all was looked through."""
-    said = ", ".join(f"{count} {mark}" for mark, count in counts.items() if count)
+    said = ", ".join(_count_words(mark, count) for mark, count in counts.items() if count)
     if not said:
-        return "no difference" if whole else "no difference at the start of long lists"
-    return said if whole else f"at least {said}"
+        return _("no difference") if whole else _("no difference at the start of long lists")
+    return said if whole else _("at least {changes}").format(changes=said)
+
+
+def _count_words(mark: Mark, count: int) -> str:
+    if mark == "added":
+        return ngettext("{count} added", "{count} added", count).format(count=count)
+    if mark == "removed":
+        return ngettext("{count} removed", "{count} removed", count).format(count=count)
+    return ngettext("{count} changed", "{count} changed", count).format(count=count)
 
 
 def _compared(value: object, base: object) -> Iterator[Part]:

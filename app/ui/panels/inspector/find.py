@@ -14,6 +14,7 @@ from app.ui.panels.inspector.values import search
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, SearchField, paint
 from app.ui.widgets.keyboard import is_plain
+from nep.i18n import _, pgettext
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
@@ -40,7 +41,7 @@ class FindField(SearchField):
     leave = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, "Find a key or value")
+        super().__init__(theme, _("Find a key or value"))
         self._count = ""
 
     @property
@@ -98,8 +99,8 @@ class FindBar(QWidget):
         self.field = FindField(theme)
         self.field.textChanged.connect(self.look)
         self.field.step_wanted.connect(self.step)
-        self.before = IconButton(theme, "chevron-up", "Previous one", "Shift+Return", size=22)
-        self.after = IconButton(theme, "chevron-down", "Next one", "Return", size=22)
+        self.before = IconButton(theme, "chevron-up", _("Previous one"), "Shift+Return", size=22)
+        self.after = IconButton(theme, "chevron-down", _("Next one"), "Return", size=22)
         self.before.clicked.connect(lambda: self.step(-1))
         self.after.clicked.connect(lambda: self.step(1))
         row = QHBoxLayout(self)
@@ -161,7 +162,8 @@ class FindBar(QWidget):
 
     def _say(self, *, wrong: bool) -> None:
         total = f"{len(self.matches)}{'+' if self._more else ''}"
-        words = f"{self._place + 1} of {total}" if self.matches else "none"
+        words = _("{place} of {total}") if self.matches else pgettext("found", "none")
+        words = words.format(place=self._place + 1, total=total)
         self.field.show_count(words if self.field.text() else "")
         self.field.setProperty("wrong", "true" if wrong else "false")
         self.field.style().unpolish(self.field)

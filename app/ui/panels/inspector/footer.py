@@ -13,6 +13,7 @@ from app.ui.text import plain
 from app.ui.text.numbers import age_words, grouped, latency_words, size_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Changing, IconButton, Line, label, paint
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from nep.messages.message import Message
@@ -28,37 +29,38 @@ def message_facts(message: Message, since_ns: int = 0) -> str:
     """
     facts = [size_words(message.size_bytes)]
     if message.seq is not None:
-        facts.insert(0, f"seq {grouped(message.seq)}")
+        facts.insert(0, _("seq {number}").format(number=grouped(message.seq)))
     if message.stamp_ns is not None:
         latency = (time.time_ns() - message.stamp_ns) / 1e9
         if message.is_latched and message.stamp_ns < since_ns:
-            facts.append(f"latched, sent {age_words(latency)} ago")
+            facts.append(_("latched, sent {age} ago").format(age=age_words(latency)))
         elif 0 <= latency < 3600:
-            facts.append(f"latency {latency_words(latency)}")
+            facts.append(_("latency {latency}").format(latency=latency_words(latency)))
     return "   ".join(facts)
 
 
 class Legend(QWidget):
     """Says what the bar at a row's left means."""
 
-    WORDS = "changed"
+    WORDS = lazy("changed")
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
+        self._words = _(self.WORDS)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("A bar at the left marks changed values")
+        self.setAccessibleName(_("A bar at the left marks changed values"))
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        return QSize(round(paint.width_of(font, self.WORDS)) + 10, max(18, round(paint.height_of(font)) + 2))
+        return QSize(round(paint.width_of(font, self._words)) + 10, max(18, round(paint.height_of(font)) + 2))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         colour = self._theme.colour("changed")
         painter.fillRect(QRectF(0, self.height() / 2 - 7, 3, 14), colour)
         words = QRectF(self.rect()).adjusted(7, 0, 3, 0)
-        paint.words(painter, words, self.WORDS, self._theme.font("small"), colour)
+        paint.words(painter, words, self._words, self._theme.font("small"), colour)
         painter.end()
 
 
@@ -70,8 +72,8 @@ class Foot(QWidget):
         self.path = label("", "code", role="textSecondary")
         self.path.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.path.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.copy_value = IconButton(theme, "copy", "Copy value", "Ctrl+C", size=26)
-        self.copy_path = IconButton(theme, "link", "Copy path", "Ctrl+Shift+C", size=26)
+        self.copy_value = IconButton(theme, "copy", _("Copy value"), "Ctrl+C", size=26)
+        self.copy_path = IconButton(theme, "link", _("Copy path"), "Ctrl+Shift+C", size=26)
         self.facts = Changing("small", "textTertiary")
         self._facts_next, self._facts_due = "", -FACTS_S
         self.legend = Legend(theme)

@@ -7,6 +7,7 @@ from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractScrollArea
 
 from app.ui.theme.theme import Theme
+from nep.i18n import _
 
 WIDE, NARROW = 16, 8
 EDGE = 12
@@ -26,7 +27,7 @@ class HexView(QAbstractScrollArea):
         super().__init__()
         self._theme = theme
         self._data = memoryview(b"")
-        self.setAccessibleName("Raw bytes")
+        self.setAccessibleName(_("Raw bytes"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setFrameShape(QAbstractScrollArea.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

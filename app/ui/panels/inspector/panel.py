@@ -19,6 +19,7 @@ from app.ui.panels.inspector.footer import message_facts
 from app.ui.panels.inspector.values import payload_or, read_at_once
 from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.menus import Menu
+from nep.i18n import _, lazy, pgettext
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
@@ -27,14 +28,14 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 FIRST_ROWS = 24
-BEFORE, PINNED = "Message before", "Pinned message"
+BEFORE, PINNED = lazy("Message before"), lazy("Pinned message")
 
 
 class InspectorPanel(PanelWidget):
     """Shows one topic: Tree or Raw, what changed, the path of the chosen value, and the message's facts."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Inspector")
+        super().__init__(context, _("Inspector"))
         self.clock = time.monotonic
         self._topic = ""
         self._watch: Watch | None = None
@@ -58,8 +59,9 @@ class InspectorPanel(PanelWidget):
     def _make_header(self) -> None:
         theme = self.theme
         self.live = Chip(theme, "", "info", "")
-        self.freeze = IconButton(theme, "snowflake", "Freeze this panel", checkable=True, size=26)
-        self.pin = IconButton(theme, "pin", "Pin this message and compare with it", checkable=True, size=26)
+        self.freeze = IconButton(theme, "snowflake", _("Freeze this panel"), checkable=True, size=26)
+        pin = _("Pin this message and compare with it")
+        self.pin = IconButton(theme, "pin", pin, checkable=True, size=26)
         self.freeze.toggled.connect(lambda _on: self.refresh())
         self.pin.toggled.connect(self._pin)
         self.header = [self.live, self.freeze, self.pin]
@@ -98,7 +100,7 @@ class InspectorPanel(PanelWidget):
         self.foot.clear()
         for button in (self.freeze, self.pin):
             button.setChecked(False)
-        self.set_title("Inspector", name)
+        self.set_title(_("Inspector"), name)
         if name:
             self._since_ns = time.time_ns()
             self._watch = self.session.watch(name)
@@ -138,7 +140,7 @@ class InspectorPanel(PanelWidget):
         if not self.reader.ask_at_leisure(message, self.clock()):
             return
         if self._shown is None or self.body.page == LARGE:
-            self.body.say_large(message.size_bytes, "It is being read.")
+            self.body.say_large(message.size_bytes, _("It is being read."))
             self._page(LARGE)
 
     def _show_read(self, done: Reading) -> None:
@@ -174,7 +176,8 @@ class InspectorPanel(PanelWidget):
         base: object = OFF
         if self.comparing:
             base = self._pinned if self.pin.isChecked() else self._before
-            self.strip.say(PINNED if self.pin.isChecked() else BEFORE, *count_changes(self._value, base))
+            compared_with = PINNED if self.pin.isChecked() else BEFORE
+            self.strip.say(_(compared_with), *count_changes(self._value, base))
         self.strip.setVisible(self.comparing and self.body.page == TREE)
         only = self.comparing and base is not OFF and self.strip.only.isChecked()
         self.model.set_value(self._value, self.clock(), base, changes_only=only)
@@ -185,12 +188,15 @@ class InspectorPanel(PanelWidget):
         self._shown = message
         self.foot.show_facts(self._facts(message), self.clock())
         self.bytes.show_bytes(message.data)
-        self.body.sentence.setText(f"This can't be read as {message.codec}: {sentence}." if sentence else "")
+        said = _("This can't be read as {codec}: {reason}.").format(codec=message.codec, reason=sentence)
+        self.body.sentence.setText(said if sentence else "")
         self._page(RAW)
 
     def _offer_large(self, message: Message) -> None:
         self._shown = message
-        words = f"Messages of {message.codec} above 1 MB are read only when you ask for it."
+        words = _("Messages of {codec} above 1 MB are read only when you ask for it.").format(
+            codec=message.codec
+        )
         self.body.say_large(message.size_bytes, words, self._read_large)
         self._page(LARGE)
 
@@ -200,7 +206,7 @@ class InspectorPanel(PanelWidget):
             self._allowed = self._shown
             self.freeze.setChecked(True)
             self.reader.ask(self._shown)
-            self.body.say_large(self._shown.size_bytes, "It is being read.")
+            self.body.say_large(self._shown.size_bytes, _("It is being read."))
 
     def _page(self, page: int) -> None:
         self.body.show_page(page, comparing=self.comparing)
@@ -301,12 +307,12 @@ class InspectorPanel(PanelWidget):
 def chip_words(topic: Topic | None, frozen: bool) -> tuple[str, str, str]:
     """The words, status and icon of the chip that says whether what is shown is still coming."""
     if frozen:
-        return "frozen", "off", "snowflake"
+        return pgettext("message", "frozen"), "off", "snowflake"
     if topic is None:
-        return "gone", "off", ""
+        return pgettext("topic", "gone"), "off", ""
     if topic.gone_s is not None:
-        return f"gone {int(topic.gone_s)} s", "off", ""
-    return "live", "info", ""
+        return _("gone {seconds} s").format(seconds=int(topic.gone_s)), "off", ""
+    return pgettext("message", "live"), "info", ""
 
 
-PANEL = Panel("inspector", "Inspector", "list-tree", (ANY_TYPE,), InspectorPanel)
+PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel)

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
 
-from app.ui.panels.inspector.diff import MISSING, OFF, Mark, Part, differs, parts_of
+from app.ui.panels.inspector.diff import MARK_WORDS, MISSING, OFF, Mark, Part, differs, parts_of
 from app.ui.panels.inspector.values import is_container, keys_of, size_of, values_of, words_of
 from app.ui.text import plain
+from nep.i18n import _
 
 Index = QModelIndex | QPersistentModelIndex
 PAGE = 500
@@ -114,7 +115,8 @@ class TreeModel(QAbstractItemModel):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(node.path)
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            return ", ".join(part for part in (str(node.key), words_of(node.value), node.mark) if part)
+            said = (str(node.key), words_of(node.value), _(MARK_WORDS.get(node.mark, "")))
+            return ", ".join(part for part in said if part)
         return None
 
     # -- what the inspector asks and says ---------------------------------------------------------------

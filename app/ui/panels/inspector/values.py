@@ -11,6 +11,7 @@ from app.core.messages.lazy_json import LazyList, LazyObject
 from app.core.messages.reader import LARGE_BYTES, Reading, read
 from app.ui.text.numbers import size_words
 from nep.errors import NepError
+from nep.i18n import ngettext
 
 if TYPE_CHECKING:
     from nep.messages.message import Message
@@ -57,7 +58,8 @@ def words_of(value: object) -> str:
         return f"{{{len(value)}}}" if value else "{}"
     if isinstance(value, (bytes, bytearray, memoryview)):
         start = bytes(value[:16]).hex(" ")
-        return f"{start}{' …' if len(value) > 16 else ''}  ({len(value)} bytes)"
+        size = ngettext("({count} byte)", "({count} bytes)", len(value)).format(count=len(value))
+        return f"{start}{' …' if len(value) > 16 else ''}  {size}"
     if isinstance(value, str):
         text = value if len(value) <= TEXT_LIMIT else f"{value[:TEXT_LIMIT]}…"
         return '"' + text.replace("\n", "⏎").replace("\r", "").replace("\t", "⇥") + '"'
@@ -70,7 +72,7 @@ def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tup
     """Where a key or a value has these words (any case), in the tree's order, among ``limit`` values."""
     wanted = words.casefold()
     waiting: list[tuple[tuple[str | int, ...], object]] = [((), value)]
-    for _ in range(limit):
+    for _each in range(limit):
         if not waiting:
             return
         path, here = waiting.pop()

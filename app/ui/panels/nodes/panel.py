@@ -11,15 +11,22 @@ from PySide6.QtWidgets import QVBoxLayout
 from app.core.network.source import NODE_NAME
 from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, limits_of, rows_of
-from app.ui.panels.table_panel import TablePanel
+from app.ui.panels.table_panel import TablePanel, TableWords
 from app.ui.text.numbers import rate_words
 from app.ui.widgets import Scrolled
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.network.nodes import NodeEntry
 
+WORDS = TableWords(
+    title=lazy("Nodes"),
+    filter=lazy("Filter nodes"),
+    nothing_fits=lazy("No node has these words"),
+    clear_the_filter=lazy("Clear the filter to see all nodes."),
+)
 SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
 LIVELY = frozenset({"cpu"})
 
@@ -28,7 +35,7 @@ class NodesPanel(TablePanel[NodeRow]):
     """The table of nodes, a filter in the title, what is known of the chosen one below."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "node", "network")
+        super().__init__(context, WORDS, "network")
         self.table.selectionModel().currentChanged.connect(self._chosen)
         self._about = Scrolled(self.foot)
         column = QVBoxLayout(self)
@@ -82,7 +89,8 @@ class NodesPanel(TablePanel[NodeRow]):
         return rate_words(topic.rate_hz) if topic is not None else ""
 
     def say_empty(self) -> None:
-        self.empty.say("No nodes yet", "Programs appear here as soon as they join the master.", "network")
+        said = _("Programs appear here as soon as they join the master.")
+        self.empty.say(_("No nodes yet"), said, "network")
         self.empty.set_actions([])
 
     def _chosen(self, _now: QModelIndex, _before: QModelIndex) -> None:
@@ -91,7 +99,7 @@ class NodesPanel(TablePanel[NodeRow]):
     def _say_chosen(self) -> None:
         row = self.model.row_at(self.table.currentIndex())
         shown = self.pages.currentIndex() == 0
-        words = "Open a node to see its topics" if row is None else facts_of(row.node)
+        words = _("Open a node to see its topics") if row is None else facts_of(row.node)
         limits = limits_of(row.node) if row is not None else ""
         self.foot.setText(f"{words}.\n{limits}" if limits else words)
         self._about.setVisible(shown)
@@ -136,4 +144,4 @@ def _haystack(node: NodeEntry) -> str:
     return f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {topics}".casefold()
 
 
-PANEL = Panel("nodes", "Nodes", "network", (), NodesPanel)
+PANEL = Panel("nodes", WORDS.title, "network", (), NodesPanel)

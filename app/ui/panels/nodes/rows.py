@@ -10,21 +10,23 @@ from dataclasses import dataclass, replace
 from app.core.network.nodes import NodeEntry
 from app.ui.text.numbers import age_words
 from app.ui.widgets.table.model import Cell, Column, Order
+from nep.i18n import _, lazy, number, pgettext
 
-PUBLISHES, SUBSCRIBES = "publishes", "subscribes"
+PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
 GENERATIONS = {
-    "native": "native",
-    "A": "NEP to 0.5.4.5",
+    "native": lazy("native"),
+    "A": lazy("NEP to 0.5.4.5"),
     "B": "NEP 0.5.4.8",
 }
 UNSERVED = frozenset({"0.5.4.6", "0.5.4.7"})
-NOT_SERVED = "NEP {version} is not served: nobody understands its messages. Install 0.5.4.8 or 0.5.4.5."
-LIMITS = (
-    "A program of the original NEP{version}: it sends no numbers and no times, so what was lost and how old "
-    "a message is can't be known."
+NOT_SERVED = lazy("NEP {version} is not served: nobody understands its messages. Install 0.5.4.8 or 0.5.4.5.")
+LIMITS = lazy(
+    "A program of {nep}: it sends no numbers and no times, so what was lost and how old a message is can't "
+    "be known."
 )
-VERSIONS = {"A": " up to 0.5.4.5", "B": " 0.5.4.8"}
+ORIGINAL = lazy("the original NEP")
+VERSIONS = {"A": lazy("the original NEP up to 0.5.4.5"), "B": lazy("the original NEP 0.5.4.8")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,27 +64,31 @@ def rows_of(
 
 def generation_words(node: NodeEntry) -> str:
     """Native, or which versions of the original NEP."""
-    return GENERATIONS.get(node.generation, f"NEP {node.generation}")
+    return _(GENERATIONS.get(node.generation, f"NEP {node.generation}"))
 
 
 def limits_of(node: NodeEntry) -> str:
     """What an original program can't do, in words; empty for a native one."""
     if node.generation in UNSERVED:
-        return NOT_SERVED.format(version=node.generation)
-    return LIMITS.format(version=VERSIONS.get(node.generation, "")) if node.is_original else ""
+        return _(NOT_SERVED).format(version=node.generation)
+    if not node.is_original:
+        return ""
+    return _(LIMITS).format(nep=_(VERSIONS.get(node.generation, ORIGINAL)))
 
 
 def facts_of(node: NodeEntry) -> str:
     """Where it runs and since when, in one line: what a narrow table has no column for."""
     parts = [node.name]
     if node.host:
-        parts.append("on this computer" if node.host == platform.node() else f"on {node.host}")
+        here = node.host == platform.node()
+        parts.append(_("on this computer") if here else _("on {host}").format(host=node.host))
     if node.pid is not None:
-        parts.append(f"pid {node.pid}")
+        parts.append(_("pid {number}").format(number=node.pid))
     if node.language:
         parts.append(node.language)
     if node.since_ns:
-        parts.append(f"here since {time.strftime('%H:%M:%S', time.localtime(node.since_ns / 1e9))}")
+        clock = time.strftime("%H:%M:%S", time.localtime(node.since_ns / 1e9))
+        parts.append(_("here since {clock}").format(clock=clock))
     return ", ".join(parts)
 
 
@@ -91,7 +97,7 @@ def cpu_words(ratio: float | None) -> str:
     if ratio is None:
         return ""
     percent = ratio * 100
-    return f"{percent:.1f} %" if percent < 9.95 else f"{round(percent)} %"
+    return f"{number(percent, '.1f')} %" if percent < 9.95 else f"{round(percent)} %"
 
 
 def _ink(row: NodeRow, role: str) -> str:
@@ -103,7 +109,7 @@ def name_cell(row: NodeRow) -> Cell:
     gone = row.node.gone_s is not None
     if row.topic:
         return Cell(row.topic, role=_ink(row, "text"), mono=True, struck=gone, indent=INDENT, middle=True)
-    chip = "new" if row.node.new and not gone else None
+    chip = pgettext("node", "new") if row.node.new and not gone else None
     icon = "chevron-down" if row.opened else "chevron-right"
     return Cell(row.node.name, icon, _ink(row, "text"), bold=bool(chip), struck=gone, chip=chip)
 
@@ -112,7 +118,8 @@ def generation_cell(row: NodeRow) -> Cell:
     """Native or original; of a topic what the node does with it, and how often."""
     if row.topic:
         rate = row.rate(row.topic) if row.rate is not None and row.way == PUBLISHES else ""
-        return Cell(f"{row.way} {rate}/s" if rate else row.way, role=_ink(row, "textTertiary"))
+        said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
+        return Cell(said, role=_ink(row, "textTertiary"))
     if row.node.generation in UNSERVED:
         return Cell(generation_words(row.node), "triangle-alert", _ink(row, "warn"))
     icon = "plug" if row.node.is_original else None
@@ -124,7 +131,11 @@ def _of_node(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable[[
 
 
 def _cpu(node: NodeEntry) -> str:
-    return cpu_words(node.cpu_ratio) if node.gone_s is None else f"gone {int(node.gone_s)} s"
+    return (
+        cpu_words(node.cpu_ratio)
+        if node.gone_s is None
+        else _("gone {seconds} s").format(seconds=int(node.gone_s))
+    )
 
 
 def _since(node: NodeEntry) -> str:
@@ -134,46 +145,57 @@ def _since(node: NodeEntry) -> str:
 
 
 def _name_tip(row: NodeRow) -> str:
-    return f"{row.node.name} {row.way} {row.topic}" if row.topic else facts_of(row.node)
+    if not row.topic:
+        return facts_of(row.node)
+    said = _("{node} publishes {topic}") if row.way == PUBLISHES else _("{node} subscribes {topic}")
+    return said.format(node=row.node.name, topic=row.topic)
 
 
 def _generation_tip(row: NodeRow) -> str:
     if row.topic:
         return _name_tip(row)
-    return (
-        limits_of(row.node) or "Made with nep: nothing is lost unseen, every message has its number and time"
-    )
+    said = _("Made with nep: nothing is lost unseen, every message has its number and time")
+    return limits_of(row.node) or said
 
 
 def _cpu_tip(_row: NodeRow) -> str:
-    return "The share of one processor core that its process used in the last second"
+    return _("The share of one processor core that its process used in the last second")
 
 
 COLUMNS: tuple[Column[NodeRow], ...] = (
-    Column("node", "Node", 108, name_cell, lambda r: r.node.name.casefold(), stretch=True, tip=_name_tip),
     Column(
-        "generation", "Generation", 116, generation_cell,
+        "node", lazy("Node"), 108, name_cell,
+        lambda r: r.node.name.casefold(), stretch=True, tip=_name_tip,
+    ),
+    Column(
+        "generation", lazy("Generation"), 116, generation_cell,
         lambda r: (r.node.is_original, r.node.generation), tip=_generation_tip,
     ),
     Column(
-        "language", "Language", 78, _of_node(lambda n: n.language, "textSecondary"),
+        "language", lazy("Language"), 78, _of_node(lambda n: n.language, "textSecondary"),
         lambda r: r.node.language, yields=4,
     ),
-    Column("host", "Host", 110, _of_node(lambda n: n.host, "textSecondary"), lambda r: r.node.host, yields=3),
     Column(
-        "pid", "PID", 66, _of_node(lambda n: str(n.pid) if n.pid is not None else ""),
+        "host", lazy("Host"), 110, _of_node(lambda n: n.host, "textSecondary"),
+        lambda r: r.node.host, yields=3,
+    ),
+    Column(
+        "pid", lazy("PID"), 66, _of_node(lambda n: str(n.pid) if n.pid is not None else ""),
         lambda r: r.node.pid, figures=True, yields=5,
     ),
-    Column("cpu", "CPU", 66, _of_node(_cpu), lambda r: r.node.cpu_ratio, figures=True, tip=_cpu_tip),
+    Column("cpu", lazy("CPU"), 66, _of_node(_cpu), lambda r: r.node.cpu_ratio, figures=True, tip=_cpu_tip),
     Column(
-        "publishes", "Publishes", 80, _of_node(lambda n: str(len(n.publishes))),
+        "publishes", lazy("Publishes"), 80, _of_node(lambda n: str(len(n.publishes))),
         lambda r: len(r.node.publishes), figures=True, yields=1,
     ),
     Column(
-        "subscribes", "Subscribes", 86, _of_node(lambda n: str(len(n.subscribes))),
+        "subscribes", lazy("Subscribes"), 86, _of_node(lambda n: str(len(n.subscribes))),
         lambda r: len(r.node.subscribes), figures=True, yields=2,
     ),
-    Column("since", "Here for", 62, _of_node(_since), lambda r: r.node.since_ns, figures=True, yields=6),
+    Column(
+        "since", lazy("Here for"), 62, _of_node(_since),
+        lambda r: r.node.since_ns, figures=True, yields=6,
+    ),
 )  # fmt: skip
 
 

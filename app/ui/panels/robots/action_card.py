@@ -17,11 +17,13 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, Chip, Elided, IconButton, ValueBar, label, set_role
 from app.ui.widgets.cards import Tile
 from app.ui.widgets.flow_layout import Flow
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation
 
-RISKS = {"moves": "moves the robot", "locomotes": "moves the robot"}
+MOVES = lazy("moves the robot")
+RISKS = {"moves": MOVES, "locomotes": MOVES}
 
 
 class ActionCard(Card):
@@ -51,18 +53,19 @@ class ActionCard(Card):
         self.form.changed.connect(self._say_summary)
         self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
         self.summary = Elided("bodyLarge", "textSecondary")
-        self.risk = Chip(theme, RISKS.get(action.risk or "", ""), "warn")
+        self.risk = Chip(theme, _(RISKS.get(action.risk or "", "")), "warn")
         self.words = Elided("body", "textSecondary", 60)
         self.left = label("", "body", role="textTertiary")
         self.result = Chip(theme)
-        self.try_button = Button(theme, "Try", "play")
-        self.try_button.setAccessibleName(f"Try {action.title}")
+        self.try_button = Button(theme, _("Try"), "play")
+        self.try_button.setAccessibleName(_("Try {action}").format(action=action.title))
         self.try_button.clicked.connect(self._press)
-        self.past = IconButton(theme, "history", f"Last tries of {action.title}", size=30)
+        tries = _("Last tries of {action}").format(action=action.title)
+        self.past = IconButton(theme, "history", tries, size=30)
         self.past.setCheckable(True)
         self.past.toggled.connect(self._show_past)
         self.past.hide()
-        self.fold = IconButton(theme, "chevron-down", "Show its values", size=30)
+        self.fold = IconButton(theme, "chevron-down", _("Show its values"), size=30)
         self.fold.clicked.connect(lambda: self.set_folded(not self._folded))
         self.fold.setVisible(folded and bool(action.parameters))
         self.error = label("", "small", role="error", wrap=True)
@@ -98,7 +101,7 @@ class ActionCard(Card):
         self._folded = folded
         self.form.setVisible(not folded and bool(self.action.parameters))
         self.fold.set_icon("chevron-down" if folded else "chevron-up")
-        self.fold.set_name("Show its values" if folded else "Hide its values")
+        self.fold.set_name(_("Show its values") if folded else _("Hide its values"))
         self._say_summary()
 
     def _say_summary(self) -> None:
@@ -154,8 +157,12 @@ class ActionCard(Card):
         can_cancel = self._running and (
             self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))
         )
-        self.try_button.set_word("Cancel" if can_cancel else "Try", "x" if can_cancel else "play")
-        self.try_button.setAccessibleName(f"{self.try_button.text()} {self.action.title}")
+        if can_cancel:
+            self.try_button.set_word(_("Cancel"), "x")
+        else:
+            self.try_button.set_word(_("Try"), "play")
+        said = _("Cancel {action}") if can_cancel else _("Try {action}")
+        self.try_button.setAccessibleName(said.format(action=self.action.title))
         self.try_button.setEnabled(can_cancel or not self._running)
         self.set_first(self.border == "accent")
         share, words, left = None, "", ""

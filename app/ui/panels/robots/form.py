@@ -17,6 +17,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Segments, label
 from app.ui.widgets.inputs.fields import LongText
+from nep.i18n import _
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
@@ -51,7 +52,7 @@ class ActionForm(QWidget):
         self._fit()
         theme.changed.connect(self._fit)
         self._grid.setColumnStretch(1, 1)
-        self.more = Button(theme, "More", "chevron-down", kind="ghost", size="small")
+        self.more = Button(theme, _("More"), "chevron-down", kind="ghost", size="small")
         self.more.setCheckable(True)
         self.more.toggled.connect(self._show_advanced)
         self.problem = label("", "small", role="error", wrap=True)
@@ -125,7 +126,7 @@ class ActionForm(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         """As wide as the widest control alone: names can stand above."""
-        least = max((cell.minimumSizeHint().width() for _, cell in self._rows.values()), default=0)
+        least = max((cell.minimumSizeHint().width() for _name, cell in self._rows.values()), default=0)
         return QSize(least, super().minimumSizeHint().height())
 
     def _told(self) -> None:
@@ -140,7 +141,10 @@ class ActionForm(QWidget):
         self._judge(parameter, said)
 
     def _show_advanced(self, on: bool) -> None:
-        self.more.set_word("Fewer" if on else "More", "chevron-up" if on else "chevron-down")
+        if on:
+            self.more.set_word(_("Fewer"), "chevron-up")
+        else:
+            self.more.set_word(_("More"), "chevron-down")
         for parameter in self.action.parameters:
             if parameter.advanced:
                 for widget in self._rows[parameter.name]:

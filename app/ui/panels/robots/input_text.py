@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from app.robots.description.description import Action, Parameter
 from app.robots.description.inputs import to_words
+from nep.i18n import _, number
 
 UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
 LONGEST_TEXT = 32
@@ -22,13 +23,15 @@ def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
     if title is not None:
         return title
     if parameter.kind in NUMBERS and isinstance(value, (int, float)):
-        name = "for" if UNITS.get(parameter.unit or "") == parameter.title else parameter.title
-        number = f"{value:g}" if isinstance(value, float) else str(value)
-        return f"{name} {number}{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}"
+        said = number(value) if isinstance(value, float) else str(value)
+        said += f"{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}"
+        if UNITS.get(parameter.unit or "") == parameter.title:
+            return _("for {duration}").format(duration=said)
+        return f"{parameter.title} {said}"
     if not texts:
         return ""
     if parameter.kind == "image" and value:
-        return "a picture"
+        return _("a picture")
     if parameter.kind == "text" and isinstance(value, str) and value:
         text = " ".join(value.split())
         return f"“{text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + '…'}”"

@@ -11,14 +11,15 @@ from PySide6.QtCore import QPoint, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QPainter
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.ui.text import plain
-from app.ui.text.dates import when_words
+from app.core.robots.robot_link import STATE_WORDS
+from app.ui.text import dates, plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, label, paint
 from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.indicators import ROBOT_STATUS, Chip
 from app.ui.widgets.menus import Menu
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from app.core.robots.fleet import Fleet
@@ -32,8 +33,7 @@ LIST_WIDTH = 300
 def seen_words(seen_s: float, now: dt.datetime | None = None) -> str:
     """Say "seen today, 8:12", "seen yesterday, 16:20", "seen 17 November, 16:20"."""
     now = now or dt.datetime.now().astimezone()
-    words = when_words(dt.datetime.fromtimestamp(seen_s, tz=now.tzinfo), now)
-    return f"seen {words[:1].lower()}{words[1:]}"
+    return dates.seen_words(dt.datetime.fromtimestamp(seen_s, tz=now.tzinfo), now)
 
 
 class RobotItem(PaintedButton):
@@ -56,7 +56,7 @@ class RobotItem(PaintedButton):
 
     def show_link(self, link: RobotLink, seen: str = "") -> None:
         """Its state now; ``seen`` says when it was last seen, for one that is away."""
-        where = "virtual, this computer" if link.virtual else link.robot.title
+        where = _("virtual, this computer") if link.virtual else link.robot.title
         away = not link.connected
         self._show(link.state, seen if away and seen else where, away=away)
         self.may_be_forgotten = self._away and not link.virtual
@@ -69,9 +69,10 @@ class RobotItem(PaintedButton):
         self.may_be_forgotten = True
 
     def _show(self, state: str, where: str, *, away: bool) -> None:
-        self.chip.set(state, ROBOT_STATUS.get(state, "ok"))
+        said = _(STATE_WORDS[state])
+        self.chip.set(said, ROBOT_STATUS.get(state, "ok"))
         self.where, self._away = where, away
-        self.setAccessibleName(f"{self.name}, {where}, {state}")
+        self.setAccessibleName(f"{self.name}, {where}, {said}")
         self.update()
 
     def sizeHint(self) -> QSize:
@@ -128,13 +129,13 @@ class RobotList(QWidget):
         column = QVBoxLayout(card)
         column.setContentsMargins(14, 12, 14, 12)
         column.setSpacing(6)
-        column.addWidget(label("Robot not in the list?", "label"))
-        said = "Check that it is on and that its driver runs."
+        column.addWidget(label(_("Robot not in the list?"), "label"))
+        said = _("Check that it is on and that its driver runs.")
         column.addWidget(label(said, "body", role="textSecondary", wrap=True))
-        self.why = Button(self._theme, "Find out why", "stethoscope", size="small")
+        self.why = Button(self._theme, _("Find out why"), "stethoscope", size="small")
         self.why.clicked.connect(lambda: run("help.doctor"))
-        self.turtle = Button(self._theme, "Use a virtual Turtle", "bot", kind="ghost", size="small")
-        self.turtle.setAccessibleName("Use the virtual Turtle")
+        self.turtle = Button(self._theme, _("Use a virtual Turtle"), "bot", kind="ghost", size="small")
+        self.turtle.setAccessibleName(_("Use the virtual Turtle"))
         self.turtle.clicked.connect(lambda: run("robots.turtle"))
         for button in (self.why, self.turtle):  # below each other: large text needs the width
             column.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
@@ -203,7 +204,7 @@ class RobotList(QWidget):
             return None
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.addAction("Find out why").triggered.connect(lambda: self._run("help.doctor"))
-        forget = menu.addAction(plain.entry(f"Forget {item.name}"))
+        menu.addAction(_("Find out why")).triggered.connect(lambda: self._run("help.doctor"))
+        forget = menu.addAction(plain.entry(_("Forget {robot}").format(robot=item.name)))
         forget.triggered.connect(lambda: self.forgotten.emit(item.name))
         return menu

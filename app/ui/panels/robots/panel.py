@@ -22,12 +22,13 @@ from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.list import LIST_WIDTH, RobotList
-from app.ui.text.numbers import plural
+from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, Elided, EmptyAction, EmptyState, Line, SearchField, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.indicators import ROBOT_STATUS
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
@@ -50,10 +51,10 @@ class RobotHead(QWidget):
         self.name = label("", "heading")
         self.chip = Chip(theme)
         self.about = Elided("body", "textSecondary")
-        self.finder = SearchField(theme, "Find an action")
+        self.finder = SearchField(theme, _("Find an action"))
         self.finder.setFixedWidth(FINDER_WIDTH)
         self.finder.setMinimumHeight(theme.size("control", "form"))
-        self.stop = Button(theme, "Stop", "square", kind="stop", size="large")
+        self.stop = Button(theme, _("Stop"), "square", kind="stop", size="large")
         self.stop.fill_icon = True
         row = Flow(self)
         row.setContentsMargins(16, 7, 16, 8)
@@ -93,7 +94,7 @@ class RobotsPanel(OneRobotPanel):
     """The list of robots, and the actions of the chosen one."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "Robots")
+        super().__init__(context, _("Robots"))
         self._names: list[str] = []  # of the robots in the list
         self.cards: dict[str, ActionCard] = {}
         self._cards_of = ""
@@ -112,11 +113,14 @@ class RobotsPanel(OneRobotPanel):
         self.empty = EmptyState(
             theme,
             "bot",
-            "No robot is connected",
-            "What a robot can do appears here as soon as it is there.",
+            _("No robot is connected"),
+            _("What a robot can do appears here as soon as it is there."),
             [
                 EmptyAction(
-                    "Use the virtual robot", lambda: self.context.run("robots.virtual"), "bot", primary=True
+                    _("Use the virtual robot"),
+                    lambda: self.context.run("robots.virtual"),
+                    "bot",
+                    primary=True,
                 )
             ],
         )
@@ -149,10 +153,10 @@ class RobotsPanel(OneRobotPanel):
         row.addWidget(self.pages, 1)
 
     def _make_cards(self) -> QWidget:
-        scroll = ScrollColumn("Actions", margins=(16, 14, 16, 14), gap=12)
+        scroll = ScrollColumn(_("Actions"), margins=(16, 14, 16, 14), gap=12)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self._card_column = scroll.column
-        self.none = label("No action has these words.", "bodyLarge", role="textSecondary")
+        self.none = label(_("No action has these words."), "bodyLarge", role="textSecondary")
         self.none.hide()
         self._card_column.insertWidget(0, self.none)
         return scroll
@@ -231,9 +235,13 @@ class RobotsPanel(OneRobotPanel):
         self._cards_of = link.name
         self._set_first(next(iter(self.cards.values()), None))
         self.name.setText(link.name)
-        self.stop.set_word(f"Stop {link.name}")
-        kind = "virtual, " if link.virtual else ""
-        self.about.setText(f"{kind}{plural(len(actions), 'action')}")
+        self.stop.set_word(_("Stop {robot}").format(robot=link.name))
+        count = len(actions)
+        if link.virtual:
+            about = ngettext("virtual, {count} action", "virtual, {count} actions", count)
+        else:
+            about = ngettext("{count} action", "{count} actions", count)
+        self.about.setText(about.format(count=grouped(count)))
         self._filter()
 
     def _made_for(self, link: RobotLink) -> bool:
@@ -341,4 +349,4 @@ class RobotsPanel(OneRobotPanel):
             card.form.shut()
 
 
-PANEL = Panel("robots", "Robots", "bot", (), RobotsPanel)
+PANEL = Panel("robots", lazy("Robots"), "bot", (), RobotsPanel)

@@ -14,12 +14,12 @@ from app.robots.description.description import Action, DataField
 from app.ui.panels.robots.input_text import input_words
 from app.ui.text import plain
 from app.ui.text.numbers import seconds_words
-from app.ui.text.sensor_values import number_words
+from app.ui.text.sensor_values import number_words, yes_words
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from nep.i18n import listed
+from nep.i18n import _, listed
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation
@@ -40,7 +40,7 @@ def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
         if value is None or field.name in SHARES:
             continue
         if isinstance(value, bool):
-            parts.append(f"{field.title} {'yes' if value else 'no'}")
+            parts.append(f"{field.title} {yes_words(value)}")
         elif isinstance(value, (int, float)):
             words = number_words(float(round(value, 2)), field.unit)
             if field.name == TO_GO:
@@ -93,12 +93,17 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
 def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
     """What a try that has not ended does now."""
     if made.state == "sent":
-        return "asked"
+        return _("asked")
     if made.state == "accepted":
         if made.waits_for:
-            return f"waits for {listed([title_of(name) for name in made.waits_for])}"
-        return f"replaces {listed([title_of(name) for name in made.replaces])}" if made.replaces else "asked"
-    return feedback_words(action, made.feedback) or f"for {seconds_words(made.elapsed_s)}"
+            return _("waits for {actions}").format(
+                actions=listed([title_of(name) for name in made.waits_for])
+            )
+        if made.replaces:
+            return _("replaces {actions}").format(actions=listed([title_of(name) for name in made.replaces]))
+        return _("asked")
+    took = _("for {duration}").format(duration=seconds_words(made.elapsed_s))
+    return feedback_words(action, made.feedback) or took
 
 
 def left_words(made: Invocation) -> str:
@@ -106,7 +111,7 @@ def left_words(made: Invocation) -> str:
     left_s = made.left_s
     if left_s is None or not made.running:
         return ""
-    return f"{max(0, int(left_s + 0.999))} s left"
+    return _("{seconds} s left").format(seconds=max(0, int(left_s + 0.999)))
 
 
 def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
@@ -116,11 +121,12 @@ def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, st
     """
     took = seconds_words(made.elapsed_s)
     if made.state == "succeeded":
-        return f"done in {took}", "ok", ""
+        return _("done in {duration}").format(duration=took), "ok", ""
     if made.state == "canceled":
         reason = made.error if made.error and made.error != "stopped" else ""
-        return f"{'ended' if may_move else 'stopped'} after {took}", "off", _sentence(reason)
-    return "not done", "error", _sentence(made.error or "The robot did not say why")
+        said = _("ended after {duration}") if may_move else _("stopped after {duration}")
+        return said.format(duration=took), "off", _sentence(reason)
+    return _("not done"), "error", _sentence(made.error or _("The robot did not say why"))
 
 
 def _sentence(words: str) -> str:
@@ -149,8 +155,9 @@ class TryRow(PaintedButton):
         self.result = f"{said}, {told}" if told else sentence.rstrip(".") or said
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(f"{self.when}, {self.given}, {self.result}; take these values")
-        self.setToolTip(plain.tip(f"{self.result}. Press to take these values"))
+        said = _("{when}, {values}, {result}; take these values")
+        self.setAccessibleName(said.format(when=self.when, values=self.given, result=self.result))
+        self.setToolTip(plain.tip(_("{result}. Press to take these values").format(result=self.result)))
 
     def sizeHint(self) -> QSize:
         return QSize(200, round(self._theme.scaled(ROW)))
@@ -191,7 +198,7 @@ class TryList(QWidget):
         self._theme, self._action = theme, action
         self._shown: tuple[str, ...] = ()
         self.rows: list[TryRow] = []
-        self.setAccessibleName(f"The last tries of {action.title}")
+        self.setAccessibleName(_("The last tries of {action}").format(action=action.title))
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 2, 0, 0)
         self._column.setSpacing(0)

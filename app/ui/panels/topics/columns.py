@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from app.ui.text.numbers import age_words, bandwidth_words, grouped, plural, rate_words
+from app.ui.text.numbers import age_words, bandwidth_words, grouped, rate_words
 from app.ui.widgets.table.model import Cell, Column
+from nep.i18n import _, lazy, ngettext, number, pgettext
 
 if TYPE_CHECKING:
     from app.core.network.topics import Topic
@@ -22,7 +23,7 @@ def _ink(topic: Topic, role: str) -> str:
 def name_cell(topic: Topic) -> Cell:
     """The name: bold with a chip while new, struck through when it has vanished."""
     gone = topic.gone_s is not None
-    chip = "new" if topic.new and not gone else None
+    chip = pgettext("topic", "new") if topic.new and not gone else None
     return Cell(topic.name, role=_ink(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip)
 
 
@@ -65,7 +66,7 @@ def bandwidth_cell(topic: Topic) -> Cell:
 def age_cell(topic: Topic) -> Cell:
     """How old the newest message is, or since when the topic is gone."""
     if topic.gone_s is not None:
-        return Cell(f"gone {int(topic.gone_s)} s", role="textDisabled")
+        return Cell(_("gone {seconds} s").format(seconds=int(topic.gone_s)), role="textDisabled")
     return Cell(age_words(topic.age_s))
 
 
@@ -77,20 +78,23 @@ def loss_cell(topic: Topic) -> Cell:
         return Cell("0")
     share = topic.loss_ratio
     return Cell(
-        f"{share:.1%}".replace("%", " %") if share is not None else str(topic.lost), "triangle-alert", "warn"
+        number(share, ".1%").replace("%", " %") if share is not None else str(topic.lost),
+        "triangle-alert",
+        "warn",
     )
 
 
 def _publishers_tip(topic: Topic) -> str:
-    return (
-        "Published by " + ", ".join(topic.publisher_nodes) if topic.publisher_nodes else "Nobody publishes it"
-    )
+    if not topic.publisher_nodes:
+        return _("Nobody publishes it")
+    return _("Published by {nodes}").format(nodes=", ".join(topic.publisher_nodes))
 
 
 def _curve_tip(topic: Topic) -> str:
     if len(topic.rates) < 2:
-        return "Nobody has told a rate yet"
-    return f"Rate lately: {rate_words(min(topic.rates))} to {rate_words(max(topic.rates))} /s"
+        return _("Nobody has told a rate yet")
+    said = _("Rate lately: {least} to {most} /s")
+    return said.format(least=rate_words(min(topic.rates)), most=rate_words(max(topic.rates)))
 
 
 def _shown_tip(topic: Topic) -> str:
@@ -98,29 +102,37 @@ def _shown_tip(topic: Topic) -> str:
     if not (topic.dropped or topic.missed):
         return ""
     shown, sent = topic.shown_of
-    return f"Shown {grouped(shown)} of {grouped(sent)} sent"
+    return _("Shown {shown} of {sent} sent").format(shown=grouped(shown), sent=grouped(sent))
 
 
 def _rate_tip(topic: Topic) -> str:
-    return _shown_tip(topic) or "Messages a second, as the publishers tell"
+    return _shown_tip(topic) or _("Messages a second, as the publishers tell")
 
 
 def _loss_tip(topic: Topic) -> str:
     shown = _shown_tip(topic)
-    lost = (
-        f"{plural(topic.lost, 'message')} lost"
-        if topic.lost is not None
-        else "No subscriber tells what is lost"
-    )
-    return f"{lost}. {shown}" if shown else lost
+    if topic.lost is None:
+        lost = _("No subscriber tells what is lost")
+    else:
+        lost = ngettext("{count} message lost", "{count} messages lost", topic.lost)
+        lost = lost.format(count=grouped(topic.lost))
+    return _("{lost}. {shown}").format(lost=lost, shown=shown) if shown else lost
 
 
 COLUMNS: tuple[Column[Topic], ...] = (
-    Column("topic", "Topic", 137, name_cell, lambda t: t.name.casefold(), stretch=True, tip=lambda t: t.name),
-    Column("type", "Type", 90, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
+    Column(
+        "topic",
+        lazy("Topic"),
+        137,
+        name_cell,
+        lambda t: t.name.casefold(),
+        stretch=True,
+        tip=lambda t: t.name,
+    ),
+    Column("type", lazy("Type"), 90, type_cell, lambda t: t.msg_type, tip=lambda t: t.msg_type),
     Column(
         "publishers",
-        "Publishers",
+        lazy("Publishers"),
         72,
         publishers_cell,
         lambda t: t.publishers,
@@ -129,14 +141,24 @@ COLUMNS: tuple[Column[Topic], ...] = (
         yields=4,
     ),
     Column(
-        "subscribers", "Subscribers", 80, subscribers_cell, lambda t: t.subscribers, figures=True, off=True
+        "subscribers",
+        lazy("Subscribers"),
+        80,
+        subscribers_cell,
+        lambda t: t.subscribers,
+        figures=True,
+        off=True,
     ),
-    Column("nodes", "Published by", 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
-    Column("curve", "", 50, curve_cell, yields=5, words="Rate over time", tip=_curve_tip),
-    Column("rate", "Rate /s", 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
-    Column("bandwidth", "Bandwidth", 75, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3),
-    Column("age", "Age", 58, age_cell, lambda t: t.age_s, figures=True, yields=2),
-    Column("loss", "Loss", 62, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1),
+    Column("nodes", lazy("Published by"), 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
+    Column("curve", "", 50, curve_cell, yields=5, words=lazy("Rate over time"), tip=_curve_tip),
+    Column("rate", lazy("Rate /s"), 53, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
+    Column(
+        "bandwidth", lazy("Bandwidth"), 75, bandwidth_cell, lambda t: t.bandwidth_Bps, figures=True, yields=3
+    ),
+    Column("age", lazy("Age"), 58, age_cell, lambda t: t.age_s, figures=True, yields=2),
+    Column(
+        "loss", lazy("Loss"), 62, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1
+    ),
 )
 
 

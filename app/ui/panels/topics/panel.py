@@ -8,17 +8,24 @@ from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.table_panel import TablePanel
+from app.ui.panels.table_panel import TablePanel, TableWords
 from app.ui.panels.topics.columns import columns
-from app.ui.text.numbers import plural
+from app.ui.text.numbers import grouped
 from app.ui.widgets import EmptyAction, label
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
+from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.network.topics import Topic
 
-FOOT = "Rates come from the publishers; nothing is subscribed but what you look at"
+FOOT = lazy("Rates come from the publishers; nothing is subscribed but what you look at")
+WORDS = TableWords(
+    title=lazy("Topics"),
+    filter=lazy("Filter topics"),
+    nothing_fits=lazy("No topic has these words"),
+    clear_the_filter=lazy("Clear the filter to see all topics."),
+)
 FIGURES_EVERY = 3  # refreshes of 30 a second: figures are renewed ten times a second
 SORT_EVERY = 30
 LIVELY = frozenset({"rate", "bandwidth", "age", "loss"})
@@ -28,10 +35,10 @@ class TopicsPanel(TablePanel["Topic"]):
     """The table of topics, a filter in the title, a line about the figures below."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, "topic", "radio-tower")
+        super().__init__(context, WORDS, "radio-tower")
         self.count = label("", "small", role="textSecondary")
         self.header.insert(0, self.count)
-        self.foot.setText(FOOT)
+        self.foot.setText(_(FOOT))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -81,20 +88,27 @@ class TopicsPanel(TablePanel["Topic"]):
 
     def _say_counts(self, known: int, found: int | None) -> None:
         graph = self.session.graph
-        words = plural(known, "topic") if found is None else f"{found} of {plural(known, 'topic')}"
+        if found is None:
+            words = ngettext("{count} topic", "{count} topics", known)
+        else:
+            words = ngettext("{found} of {count} topic", "{found} of {count} topics", known)
+        words = words.format(count=grouped(known), found=found)
         if graph is not None and graph.nodes:
-            words += f", {plural(len(graph.nodes), 'node')}"
+            count = len(graph.nodes)
+            nodes = ngettext("{count} node", "{count} nodes", count).format(count=grouped(count))
+            words = _("{topics}, {nodes}").format(topics=words, nodes=nodes)
         self.count.setText(words if known else "")
         self.filter.setVisible(known > 0)
 
     def say_empty(self) -> None:
         if self.session.master.kind == "searching":
-            self.empty.say("Looking for a master", f"At {self.session.master.address}.", "radio-tower")
+            said = _("At {address}.").format(address=self.session.master.address)
+            self.empty.say(_("Looking for a master"), said, "radio-tower")
             self.empty.set_actions([])
         else:
-            self.empty.say("No topics yet", "They appear as soon as a program publishes.", "list")
+            self.empty.say(_("No topics yet"), _("They appear as soon as a program publishes."), "list")
             self.empty.set_actions(
-                [EmptyAction("Use the virtual robot", self._use_virtual, "bot", primary=True)]
+                [EmptyAction(_("Use the virtual robot"), self._use_virtual, "bot", primary=True)]
             )
 
     def _use_virtual(self) -> None:
@@ -113,4 +127,4 @@ def _haystack(topic: Topic) -> str:
     return f"{topic.name} {topic.msg_type} {' '.join(topic.publisher_nodes)}".casefold()
 
 
-PANEL = Panel("topics", "Topics", "list", (), TopicsPanel)
+PANEL = Panel("topics", WORDS.title, "list", (), TopicsPanel)

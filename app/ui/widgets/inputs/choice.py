@@ -22,15 +22,16 @@ from app.ui.widgets.buttons import Button, PaintedButton
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.labels import label
 from app.ui.widgets.menus import EditMenu, cut, make_round
+from nep.i18n import _, lazy
 
 # What a robot's lamps show, not how Studio looks: values of the action, so they are no tokens.
 LAMP_COLOURS: tuple[tuple[str, str], ...] = (
-    ("#ffffff", "white"),
-    ("#3ab7ff", "sky blue"),
-    ("#35c26b", "green"),
-    ("#ffc53d", "amber"),
-    ("#ff6b5e", "coral"),
-    ("#b06bff", "violet"),
+    ("#ffffff", lazy("white")),
+    ("#3ab7ff", lazy("sky blue")),
+    ("#35c26b", lazy("green")),
+    ("#ffc53d", lazy("amber")),
+    ("#ff6b5e", lazy("coral")),
+    ("#b06bff", lazy("violet")),
 )
 SWATCH = 32
 SHOWN_AT_ONCE = 12
@@ -127,11 +128,12 @@ class ColourSwatches(QWidget):
         value: str = LAMP_COLOURS[0][0],
         colours: Sequence[tuple[str, str]] = LAMP_COLOURS,
         *,
-        name: str = "Colour",
+        name: str = "",
     ) -> None:
         super().__init__()
-        self._names = {colour.lower(): words for colour, words in colours}
+        self._names = {colour.lower(): _(words) for colour, words in colours}
         self._value = ""
+        name = name or _("Colour")
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         row = Flow(self, gap=2)
@@ -144,10 +146,10 @@ class ColourSwatches(QWidget):
         self._name = label("", "bodyLarge", role="textSecondary")
         self._name.setContentsMargins(6, 0, 0, 0)
         row.addWidget(self._name)
-        self._other = Button(theme, "Other", kind="ghost", size="small")
+        self._other = Button(theme, _("Other"), kind="ghost", size="small")
         self._field = QLineEdit()
         EditMenu(theme, self._field)
-        self._field.setAccessibleName(f"{name}, as a number like #33aaff")
+        self._field.setAccessibleName(_("{value}, as a number like #33aaff").format(value=name))
         self._field.setPlaceholderText("#33aaff")
         self._field.setMaxLength(7)
         self._field.setFixedWidth(92)

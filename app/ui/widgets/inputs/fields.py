@@ -13,6 +13,8 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.menus import EditMenu
+from nep.i18n import _
+from nep.i18n import number as number_text
 
 MOST_LINES = 5
 LEAST_HEIGHT = 34
@@ -55,7 +57,7 @@ class FilterField(SearchField):
 
     def __init__(self, theme: Theme, name: str) -> None:
         """``name`` is what a screen reader says: "Filter topics"."""
-        super().__init__(theme, "Filter", "/")
+        super().__init__(theme, _("Filter"), "/")
         self.setAccessibleName(name)
         self.setMaximumWidth(190)
         self.setMinimumWidth(90)
@@ -95,24 +97,31 @@ class NumberField(QLineEdit):
 
     def show_number(self, value: float) -> None:
         """Show a value that is known to be right."""
-        self.setText(f"{value:.{self._decimals}f}")
+        self.setText(self.written(value))
         self._judge("")
+
+    def written(self, value: float) -> str:
+        """How it writes a number."""
+        return number_text(value, f".{self._decimals}f")
 
     def _read(self) -> None:
         try:
             value = float(self.text().strip().replace(",", "."))
         except ValueError:
-            self._judge("This needs a number.")
+            self._judge(_("This needs a number."))
             return
         if not math.isfinite(value):
-            self._judge("This needs a number.")
+            self._judge(_("This needs a number."))
         elif self._minimum is not None and value < self._minimum:
-            self._judge(f"The least is {self._minimum:g} {self._unit}".rstrip() + ".")
+            self._judge(_("The least is {value}.").format(value=self._limit(self._minimum)))
         elif self._maximum is not None and value > self._maximum:
-            self._judge(f"The most is {self._maximum:g} {self._unit}".rstrip() + ".")
+            self._judge(_("The most is {value}.").format(value=self._limit(self._maximum)))
         else:
             self._judge("")
             self.number.emit(value)
+
+    def _limit(self, value: float) -> str:
+        return f"{number_text(value)} {self._unit}".rstrip()
 
     def _judge(self, sentence: str) -> None:
         if sentence == self.sentence:

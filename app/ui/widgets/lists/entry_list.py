@@ -16,6 +16,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.lists.fuzzy import Entry, Found
+from nep.i18n import _
 
 ROW, HEADING, INSET = 40, 30, 8
 ICON_LEFT, TEXT_LEFT, RIGHT = 10, 38, 10
@@ -77,7 +78,7 @@ class EntryModel(QAbstractListModel):
 
 def spoken(entry: Entry) -> str:
     """What a screen reader says about an entry."""
-    key = f"key {spoken_key(entry.key)}" if entry.key else ""
+    key = _("key {key}").format(key=spoken_key(entry.key)) if entry.key else ""
     return ", ".join(part for part in (entry.words, entry.note, key, entry.reason) if part)
 
 
@@ -135,7 +136,7 @@ class EntryDelegate(QStyledItemDelegate):
         if entry.id == self.waiting:
             font = theme.font("body")
             font.setWeight(QFont.Weight.Medium)
-            words = "Press the new key"
+            words = _("Press the new key")
             width = paint.width_of(font, words)
             area = QRectF(right - width, rect.top(), width, rect.height())
             paint.words(painter, area, words, font, theme.colour(quiet))

@@ -13,6 +13,7 @@ from app.ui.theme.icons import paint_icon, paint_icon_again
 from app.ui.theme.theme import Theme
 from app.ui.widgets.indicators import SPARK, paint_sparkline
 from app.ui.widgets.table.model import Cell, Column, Order
+from nep.i18n import _
 
 Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
@@ -165,7 +166,7 @@ class Head(QHeaderView):
         ordered = self._view.shown_order.column is column
         metrics = QFontMetricsF(font)
         arrow = 16.0 if ordered else 0.0
-        text = metrics.elidedText(column.title, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
+        text = metrics.elidedText(_(column.title), Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
         advance = metrics.horizontalAdvance(text)
         x = box.right() - advance - arrow if column.figures else box.left()
         painter.setFont(font)

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Column
+from nep.i18n import _
 
 
 class ColumnChoice:
@@ -58,7 +59,7 @@ class ColumnChoice:
 
     def menu(self, theme: Theme, parent: QWidget, changed: Callable[[], object]) -> Menu:
         """A new menu as `fill` fills it."""
-        menu = Menu(theme, parent, "Columns")
+        menu = Menu(theme, parent, _("Columns"))
         self.fill(menu, changed)
         return menu
 
@@ -78,12 +79,12 @@ class ColumnChoice:
             changed()
 
         for column in self._columns[1:]:
-            action = menu.addAction(column.words or column.title)
+            action = menu.addAction(_(column.words or column.title))
             action.setCheckable(True)
             action.setChecked(self.wanted(column))
             action.toggled.connect(lambda on, name=column.name: choose(name, on))
         menu.addSeparator()
-        again = menu.addAction("As at first")
+        again = menu.addAction(_("As at first"))
         again.setEnabled(self.changed)
         again.triggered.connect(lambda _on=False: begin_anew())
 

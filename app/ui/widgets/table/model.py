@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 
 from app.ui.text import plain
+from nep.i18n import _
 
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
@@ -45,10 +46,11 @@ class Cell:
 class Column(Generic[Row]):
     """One column: its head, its width, and what it shows of a row.
 
-    ``key`` gives what it is sorted by (None at the end, whatever the direction); without it the column
-    can't be sorted. ``stretch`` takes the width that is left. ``tip`` is the tooltip's sentence. Where there
-    is too little room (large text) columns that ``yield`` are not shown, the largest number first. ``off``
-    ones are shown only when a person chooses them; ``words`` names one whose head is blank.
+    ``title`` and ``words`` are marked with `lazy`. ``key`` gives what it is sorted by (None at the end,
+    whatever the direction); without it the column can't be sorted. ``stretch`` takes the width that is left.
+    ``tip`` is the tooltip's sentence. Where there is too little room (large text) columns that ``yield`` are
+    not shown, the largest number first. ``off`` ones are shown only when a person chooses them; ``words``
+    names one whose head is blank.
     """
 
     name: str
@@ -79,7 +81,7 @@ class Order(Generic[Row]):
         known = [(key(row), row) for row in rows]
         good = [pair for pair in known if pair[0] is not None]
         good.sort(key=lambda pair: pair[0], reverse=self.falling)  # type: ignore[arg-type, return-value]
-        return [row for _, row in good] + [row for value, row in known if value is None]
+        return [row for _key, row in good] + [row for value, row in known if value is None]
 
 
 @dataclass(slots=True)
@@ -117,8 +119,8 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(column.tip(row)) if column.tip is not None else None
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            cell = column.cell(row)
-            return ", ".join(part for part in (column.title or column.words, cell.text, cell.chip) if part)
+            cell, head = column.cell(row), _(column.title or column.words)
+            return ", ".join(part for part in (head, cell.text, cell.chip) if part)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.figures)
         return None
@@ -129,7 +131,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if orientation != Qt.Orientation.Horizontal or not 0 <= section < len(self.columns):
             return None
         if role == Qt.ItemDataRole.DisplayRole:
-            return self.columns[section].title
+            return _(self.columns[section].title)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(self.columns[section].figures)
         return None
@@ -188,8 +190,8 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if fresh:
             first = len(self._rows.keys)
             self.beginInsertRows(_ROOT, first, first + len(fresh) - 1)
-            self._rows.shown.extend(row for row, _ in fresh)
-            self._rows.keys.extend(key for _, key in fresh)
+            self._rows.shown.extend(row for row, _key in fresh)
+            self._rows.keys.extend(key for _row, key in fresh)
             self.endInsertRows()
 
     def _reorder(self, rows: Sequence[Row], keys: list[str]) -> None:

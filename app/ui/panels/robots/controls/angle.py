@@ -9,6 +9,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, Q
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.theme.theme import Theme
+from nep.i18n import _, number
 
 SIDE = 44
 PAGE_STEPS = 10
@@ -45,7 +46,7 @@ class AngleDial(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", SIDE // 2)
-        self.setToolTip("Drag to turn; a double click sets it back")
+        self.setToolTip(_("Drag to turn; a double click sets it back"))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     @property
@@ -56,7 +57,7 @@ class AngleDial(QWidget):
     def set_value(self, value: float) -> None:
         """Show an angle without telling."""
         self._value = value
-        self.setAccessibleDescription(f"{value:g}°")
+        self.setAccessibleDescription(f"{number(value)}°")
         self.update()
 
     def sizeHint(self) -> QSize:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLineEdit, QWidget
 from app.robots.description.description import Parameter
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import EditMenu
+from nep.i18n import _
 
 VALUE_WIDTH, ROW_HEIGHT = 104, 36
 
@@ -77,7 +78,7 @@ def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
     field.setAccessibleName(parameter.title)
     field.setMinimumHeight(ROW_HEIGHT - 2)
     if not parameter.required and parameter.default is None:
-        field.setPlaceholderText("May stay empty")
+        field.setPlaceholderText(_("May stay empty"))
     return field
 
 

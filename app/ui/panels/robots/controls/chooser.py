@@ -11,6 +11,7 @@ from app.ui.panels.robots.controls.number import number_control
 from app.ui.panels.robots.controls.picture import NoPictures, Pictures, picture_control
 from app.ui.panels.robots.controls.text import text_control
 from app.ui.panels.robots.input_text import NUMBERS
+from app.ui.text.sensor_values import yes_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Choice, Segments, Switch
 
@@ -43,7 +44,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
     pairs = [(str(choice.value), choice.title) for choice in parameter.choices] or [(o, o) for o in options]
     values: dict[str, object] = {str(choice.value): choice.value for choice in parameter.choices}
     made: Control
-    if len(pairs) <= SEGMENTS_AT_MOST and sum(len(words) for _, words in pairs) <= SEGMENT_LETTERS:
+    if len(pairs) <= SEGMENTS_AT_MOST and sum(len(words) for _value, words in pairs) <= SEGMENT_LETTERS:
         segments = Segments(
             theme,
             [(value, sentence_case(title), None) for value, title in pairs],
@@ -77,9 +78,9 @@ def _chosen(values: dict[str, object], key: str) -> object:
 
 
 def _switch(theme: Theme, parameter: Parameter) -> Control:
-    switch = Switch(theme, "yes" if parameter.default is True else "no", parameter.default is True)
+    switch = Switch(theme, yes_words(parameter.default is True), parameter.default is True)
     switch.setAccessibleName(parameter.title)
-    switch.toggled.connect(lambda on: switch.setText("yes" if on else "no"))
+    switch.toggled.connect(lambda on: switch.setText(yes_words(on)))
     return Control(
         switch,
         switch.isChecked,

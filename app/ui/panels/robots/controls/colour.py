@@ -13,6 +13,7 @@ from app.ui.panels.robots.controls.base import Control, connect, line_field
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ColourSwatches, label
 from app.ui.widgets.flow_layout import Flow
+from nep.i18n import _
 
 _HEX = re.compile(r"#?([0-9a-fA-F]{6})")
 STRIP = QSize(168, 34)
@@ -31,7 +32,7 @@ class HueStrip(QWidget):
         self._theme = theme
         self._hue, self._light = 0.55, 0.6
         self.setAccessibleName(name)
-        self.setToolTip("Press a colour; arrow keys go through them")
+        self.setToolTip(_("Press a colour; arrow keys go through them"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", theme.radius("control"))
@@ -116,12 +117,12 @@ class ColourChoice(QWidget):
         self.setAccessibleName(parameter.title)
         self.swatches = ColourSwatches(theme, start, name=parameter.title)
         self.swatches._other.hide()  # noqa: SLF001  ours has a strip beside the number
-        self.other = Button(theme, "Other", "palette", kind="ghost", size="small")
-        self.other.setAccessibleName(f"Another colour for {parameter.title}")
+        self.other = Button(theme, _("Other"), "palette", kind="ghost", size="small")
+        self.other.setAccessibleName(_("Another colour for {value}").format(value=parameter.title))
         self.other.setCheckable(True)
-        self.strip = HueStrip(theme, f"{parameter.title}, all colours")
+        self.strip = HueStrip(theme, _("{value}, all colours").format(value=parameter.title))
         self.field = line_field(theme, parameter)
-        self.field.setAccessibleName(f"{parameter.title}, as a number like #33aaff")
+        self.field.setAccessibleName(_("{value}, as a number like #33aaff").format(value=parameter.title))
         self.field.setPlaceholderText("#33aaff")
         self.field.setFixedWidth(round(theme.scaled(96)))
         self.sentence = ""
@@ -187,7 +188,7 @@ class ColourChoice(QWidget):
         if found is not None:
             self.swatches.set_value(f"#{found[1].lower()}")
             self.strip.show_colour(QColor(self.swatches.value))
-        self._judge("" if found is not None else "A colour is written like #33aaff.", quiet=not final)
+        self._judge("" if found is not None else _("A colour is written like #33aaff."), quiet=not final)
         self.changed.emit()
         if final:
             self.finished.emit()

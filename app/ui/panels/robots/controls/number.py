@@ -14,6 +14,7 @@ from app.ui.widgets import NumberField, SliderWithUnit, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.slider import decimals_of
 from app.ui.widgets.keyboard import is_plain
+from nep.i18n import number as number_text
 
 COARSE_FROM = 20
 UPRIGHT = ("pitch", "tilt", "down", "up", "nod")
@@ -62,7 +63,7 @@ def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
     """What the slider says, or what was typed beside it, also when that is wrong."""
     whole = parameter.kind == "integer"
     typed = slider.field.text()
-    if typed != f"{slider.value:.{decimals_of(step_of(parameter))}f}":
+    if typed != slider.field.written(slider.value):
         return read_number(typed, whole=whole)
     return round(slider.value) if whole else float(slider.value)
 
@@ -176,7 +177,7 @@ def _open_number(theme: Theme, parameter: Parameter) -> Control:
         if number is None:
             field.setText("" if given is None else f"{given}")
         else:
-            field.setText(f"{number:g}")
+            field.setText(number_text(number))
 
     show(parameter.default)
     return Control(

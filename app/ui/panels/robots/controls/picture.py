@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QFileDialog, QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import Control, connect, line_field
-from app.ui.panels.robots.controls.picture_file import FILES, encoded, image_of, read_picture
+from app.ui.panels.robots.controls.picture_file import encoded, file_filter, image_of, read_picture
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -26,6 +26,7 @@ from app.ui.widgets.file_dialogs import show_free
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.menus import Menu, drop_below
 from nep.errors import DecodeError
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
@@ -64,7 +65,7 @@ class Thumbnail(QWidget):
         self._theme = theme
         self._image: QImage | None = None
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("The chosen picture")
+        self.setAccessibleName(_("The chosen picture"))
 
     @property
     def image(self) -> QImage | None:
@@ -118,11 +119,11 @@ class PictureChoice(QWidget):
         self.setAcceptDrops(True)
         self.thumbnail = Thumbnail(theme)
         self.field = line_field(theme, parameter)
-        self.field.setPlaceholderText("A file, a camera, or an address")
-        self.choose = Button(theme, "File", "folder-open", size="form")
-        self.choose.setAccessibleName(f"Choose a file for {parameter.title}")
-        self.camera = Button(theme, "Camera", "camera", size="form")
-        self.camera.setAccessibleName(f"Take {parameter.title} from a camera")
+        self.field.setPlaceholderText(_("A file, a camera, or an address"))
+        self.choose = Button(theme, _("File"), "folder-open", size="form")
+        self.choose.setAccessibleName(_("Choose a file for {value}").format(value=parameter.title))
+        self.camera = Button(theme, _("Camera"), "camera", size="form")
+        self.camera.setAccessibleName(_("Take {value} from a camera").format(value=parameter.title))
         self._wrong = label("", "small", role="error", wrap=True)
         self._wrong.hide()
         self._lay_out()
@@ -165,7 +166,7 @@ class PictureChoice(QWidget):
         if text.startswith("data:"):
             self._image = _image_in(text)
             self.thumbnail.show_image(self._image)
-            self.field.setText("the picture of that time" if self._image is not None else "")
+            self.field.setText(_("the picture of that time") if self._image is not None else "")
         else:
             self._typed(text)
             self.field.setText(text)
@@ -173,7 +174,7 @@ class PictureChoice(QWidget):
     # -- a file -------------------------------------------------------------------------------------------
 
     def _ask(self) -> None:
-        dialog = QFileDialog(self, "Choose a picture", "", FILES)
+        dialog = QFileDialog(self, _("Choose a picture"), "", file_filter())
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.fileSelected.connect(lambda chosen: self.use_file(Path(chosen)))
         show_free(dialog)
@@ -219,7 +220,7 @@ class PictureChoice(QWidget):
                 lambda _on=False, topic=topic: self.use_topic(topic)
             )
         if not topics:
-            menu.addAction("No camera sends pictures now").setEnabled(False)
+            menu.addAction(_("No camera sends pictures now")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.camera)
 
@@ -228,7 +229,7 @@ class PictureChoice(QWidget):
         self.close_stream()
         self._show_none()
         self._stream = self._pictures.stream(topic)
-        self.field.setText(f"newest picture of {topic}")
+        self.field.setText(_("newest picture of {topic}").format(topic=topic))
         self._timer.start()
         self.changed.emit()
 

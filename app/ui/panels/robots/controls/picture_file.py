@@ -16,28 +16,36 @@ from PySide6.QtCore import QBuffer, QByteArray, QIODevice, Qt
 from PySide6.QtGui import QImage, QImageReader, QTransform
 
 from nep.errors import DecodeError
+from nep.i18n import _
 from nep.messages.image_files import MOST_BYTES, ImageFile, examine
 
-FILES = "Pictures (*.png *.jpg *.jpeg)"
+PATTERNS = "*.png *.jpg *.jpeg"
 LONGEST_SIDE, QUALITY = 1280, 85
 MOST_FILE_BYTES = 40_000_000
+
+
+def file_filter() -> str:
+    """What a file dialog offers: "Pictures (*.png …)"."""
+    return f"{_('Pictures')} ({PATTERNS})"
 
 
 def read_picture(path: Path) -> tuple[QImage | None, str]:
     """A picture file, turned as its camera says, or the sentence that says why it can't be used."""
     try:
         if not path.is_file() and path.exists():
-            return None, f"“{path.name}” is no file."
+            return None, _("“{file}” is no file.").format(file=path.name)
         with path.open("rb") as file:
             data = file.read(MOST_FILE_BYTES + 1)
     except OSError as error:
-        return None, f"“{path.name}” can't be read: {(error.strerror or 'unknown').lower()}."
+        reason = (error.strerror or _("unknown")).lower()
+        return None, _("“{file}” can't be read: {reason}.").format(file=path.name, reason=reason)
     if len(data) > MOST_FILE_BYTES:
-        return None, f"“{path.name}” is too large; use one below {MOST_FILE_BYTES // 1_000_000} MB."
+        said = _("“{file}” is too large; use one below {size} MB.")
+        return None, said.format(file=path.name, size=MOST_FILE_BYTES // 1_000_000)
     try:
         return image_of(data), ""
     except DecodeError as error:
-        return None, f"“{path.name}” can't be used: {error.reason}."
+        return None, _("“{file}” can't be used: {reason}.").format(file=path.name, reason=error.reason)
 
 
 def image_of(data: bytes) -> QImage:
@@ -51,7 +59,7 @@ def image_of(data: bytes) -> QImage:
     reader.setDecideFormatFromContent(False)
     image = reader.read()
     if image.isNull():
-        raise DecodeError("image", len(data), "they are no picture that can be read")
+        raise DecodeError("image", len(data), _("they are no picture that can be read"))
     return upright(image, file)
 
 

@@ -9,6 +9,7 @@ from app.robots.description.inputs import from_words, to_words
 from app.ui.panels.robots.controls.base import Control, connect, line_field
 from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.fields import LongText
+from nep.i18n import _
 
 LONG_FROM = 200
 """A text that may have as many characters gets several lines."""
@@ -84,7 +85,7 @@ def _hint(parameter: Parameter) -> str:
     if parameter.places:
         return ", ".join(each.kind for each in parameter.places)
     is_number = parameter.each is not None and parameter.each.kind in ("number", "integer", "angle")
-    return "Numbers with commas between them" if is_number else "Words with commas between them"
+    return _("Numbers with commas between them") if is_number else _("Words with commas between them")
 
 
 def _words(given: object) -> str:
