@@ -52,7 +52,7 @@ class RoomView(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setToolTip(_("Press its head or a hand to touch it; drag the ball"))
+        self.setToolTip(plain.tip(_("Press its head or a hand to touch it; drag the ball")))
         theme.changed.connect(self.update)
 
     def show_state(self, data: Mapping[str, object]) -> None:

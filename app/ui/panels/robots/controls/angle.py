@@ -8,6 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from nep.i18n import _, number
 
@@ -46,7 +47,7 @@ class AngleDial(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", SIDE // 2)
-        self.setToolTip(_("Drag to turn; a double click sets it back"))
+        self.setToolTip(plain.tip(_("Drag to turn; a double click sets it back")))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     @property

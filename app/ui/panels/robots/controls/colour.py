@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import Control, connect, line_field
+from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ColourSwatches, label
 from app.ui.widgets.flow_layout import Flow
@@ -32,7 +33,7 @@ class HueStrip(QWidget):
         self._theme = theme
         self._hue, self._light = 0.55, 0.6
         self.setAccessibleName(name)
-        self.setToolTip(_("Press a colour; arrow keys go through them"))
+        self.setToolTip(plain.tip(_("Press a colour; arrow keys go through them")))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", theme.radius("control"))
