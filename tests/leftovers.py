@@ -65,12 +65,18 @@ def told(number: int, target: str) -> str:
     try:
         with socket.socket(fileno=os.dup(number)) as copy:
             address = copy.getsockname()
-            if copy.family is socket.AF_UNIX and not address:
+            if _is_unnamed(copy.family.name, address):
                 return "unnamed socket"
             listens = "listening " if copy.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN) else ""
             return f"{listens}socket {address!r}"
     except OSError:
         return target
+
+
+def _is_unnamed(family: str, address: object) -> bool:
+    """Whether nobody gave a socket its address: one of a pair, of the kernel, or named by the system."""
+    chosen = isinstance(address, bytes) and re.fullmatch(rb"\0[0-9a-f]{5}", address)
+    return family == "AF_NETLINK" or (family == "AF_UNIX" and (not address or bool(chosen)))
 
 
 class Allowances:
