@@ -51,9 +51,13 @@ def venv_python(folder: Path, platform: str) -> Path:
 
 
 def stamp(folder: Path, extra: str) -> str:
-    """What the environment must be made of: changes when pyproject.toml or a file of pinned packages does."""
+    """What the environment must be made of: pyproject.toml, pinned packages, translations."""
     digest = hashlib.sha256()
-    for path in (folder / "pyproject.toml", *sorted((folder / "requirements").glob("*.txt"))):
+    made_of = [
+        *sorted((folder / "requirements").glob("*.txt")),
+        *sorted((folder / "nep").glob("locale/*/*/*.po")),
+    ]
+    for path in (folder / "pyproject.toml", *made_of):
         digest.update(path.read_bytes())
     return f"{digest.hexdigest()} {extra}"
 

@@ -6,10 +6,6 @@ import math
 import re
 from collections.abc import Iterator
 
-from app.blocks.categories.robot import GROUPS
-from app.blocks.toolbox.catalogue import english_categories, has_words
-from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap
-
 MARKUP = re.compile(r"\[(?:bold|dim|blue|red|green|yellow|cyan)[a-z ]*\]|\[/\]|</?[a-z]+>|`[^`]*`")
 _KEPT = re.compile(rf"\{{[^{{}}]*\}}|%[A-Za-z_]\w*|%(?:\(\w+\)[sdr]|\d)|{MARKUP.pattern}")
 _ACCENTS = str.maketrans(
@@ -33,6 +29,11 @@ def pseudo(english: str) -> str:
 
 def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
     """(context, English, its file) of what stands in the descriptions of blocks, not in calls of `_`."""
+    # not above: catalogues are compiled where only what builds the project is installed
+    from app.blocks.categories.robot import GROUPS  # noqa: PLC0415
+    from app.blocks.toolbox.catalogue import english_categories, has_words  # noqa: PLC0415
+    from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap  # noqa: PLC0415
+
     found: dict[tuple[str | None, str], str] = {}
     for category in english_categories():
         place = f"app/blocks/categories/{category.name}.py"

@@ -31,10 +31,7 @@ from babel.messages.pofile import read_po, write_po
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from app.blocks.toolbox.catalogue import has_words  # noqa: E402 - this file is started by its path
-from nep.cli.app import app as nep_command  # noqa: E402
-from nep.cli.app import docstrings  # noqa: E402
-from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402
+from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402 - started by its path
 from tools.pseudo import MARKUP, pseudo, sentences_of_blocks  # noqa: E402
 
 KEYWORDS = {
@@ -76,6 +73,10 @@ class Key(NamedTuple):
 
 def template(root: Path = ROOT) -> Catalog:
     """All sentences that the sources have."""
+    # not above: hatch_build.py compiles where only what builds the project is installed
+    from nep.cli.app import app as nep_command  # noqa: PLC0415
+    from nep.cli.app import docstrings  # noqa: PLC0415
+
     made = Catalog(project="NEP Studio", creation_date=_MADE, header_comment=_HEADER, fuzzy=False)
     for folder, pattern, method in SOURCES:
         for path in sorted((root / folder).rglob(pattern)):
@@ -100,6 +101,8 @@ def template(root: Path = ROOT) -> Catalog:
 
 def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
     """(English, its file) of what the descriptions that we ship say to people."""
+    from app.blocks.toolbox.catalogue import has_words  # noqa: PLC0415 - as above
+
     for path in sorted((root / "resources" / "robots").glob("*.tm.jsonld")):
         place = path.relative_to(root).as_posix()
         for english in _of_description(json.loads(path.read_text(encoding="utf-8")), is_inside=False):

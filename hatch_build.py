@@ -1,0 +1,23 @@
+"""What a build, also that of an editable checkout, does besides: it compiles the words of every language.
+
+Programs read .mo files and never compile: nothing is made at run time. The sources are nep/locale/*/*.po.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+
+class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # hatchling's own parameter says nothing here
+    """Asked by hatchling before each build."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - hatchling's call
+        """Compile all catalogues."""
+        sys.path.insert(0, str(Path(__file__).resolve().parent))
+        from tools.words import compile_all  # noqa: PLC0415 - Babel is there only while something is built
+
+        compile_all()
