@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 
+from nep.i18n import _
+
 __all__ = ["control_in", "escaped", "harmless", "shortened"]
 
 _CONTROLS = (
@@ -47,7 +49,9 @@ def harmless(text: str, *, lines: bool = False) -> str:
 
 def shortened(text: str, most: int) -> str:
     """`text` as it is, or its first `most` letters and how many there are."""
-    return text if len(text) <= most else f"{text[:most]}… ({len(text)} characters)"
+    if len(text) <= most:
+        return text
+    return _("{beginning}… ({count} characters)").format(beginning=text[:most], count=len(text))
 
 
 def _readable(found: re.Match[str]) -> str:

@@ -12,8 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from nep.errors import NepError
+from nep.i18n import _, ngettext
 from nep.messages.message import Message
 from nep.nodes import log_handler
+from nep.text import shortened
 
 CAPACITY = 5000
 TEXT_LIMIT = 2000
@@ -67,8 +69,12 @@ class Console:
         """Add records of the bus; ``dropped`` are those that were lost before these."""
         if dropped:
             self.left_out += dropped
-            lost = "1 log record was" if dropped == 1 else f"{dropped} log records were"
-            self.add("warn", "studio", f"{lost} left out: too many at once")
+            words = ngettext(
+                "{count} log record was left out: too many at once",
+                "{count} log records were left out: too many at once",
+                dropped,
+            )
+            self.add("warn", "studio", words.format(count=dropped))
         if messages:
             self._put(messages)
 
@@ -90,7 +96,7 @@ class Console:
 
     def _read(self) -> None:
         """Put records in the place of the messages at the end, and number them."""
-        unread = [self._lines.pop() for _ in range(self._unread)]
+        unread = [self._lines.pop() for _unread in range(self._unread)]
         self._unread = 0
         for line in reversed(unread):
             for record in self._of_bus(line) if isinstance(line, Message) else (line,):
@@ -114,7 +120,7 @@ class Console:
         return LogRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
             _LEVELS.get(given.level, given.level),
-            given.node or given.name or "somebody",
+            given.node or given.name or _("somebody"),
             _cut(given.text),
             logger="" if given.name == given.node else given.name,
             place=place,
@@ -122,4 +128,4 @@ class Console:
 
 
 def _cut(text: str) -> str:
-    return text if len(text) <= TEXT_LIMIT else f"{text[:TEXT_LIMIT]}… ({len(text)} characters)"
+    return shortened(text, TEXT_LIMIT)

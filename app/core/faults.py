@@ -21,6 +21,7 @@ from types import TracebackType
 import platformdirs
 
 from app.core.alerts import Alerts
+from nep.i18n import _
 
 FILE_BYTES, FILES_KEPT = 1_000_000, 3
 FAULTS_KEPT = 500
@@ -101,7 +102,7 @@ def _place(record: logging.LogRecord) -> tuple[object, ...] | None:
     """The type of an exception and the line that raised it; None when a record has none."""
     if not record.exc_info or record.exc_info[0] is None:
         return None
-    kind, _, trace = record.exc_info
+    kind, _error, trace = record.exc_info
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     where = (trace.tb_frame.f_code.co_filename, trace.tb_lineno) if trace is not None else ()
@@ -192,16 +193,17 @@ class OwnFaults:
         self._faults: dict[str, _Fault] = {}
 
     @contextmanager
-    def surviving(self, what: str) -> Iterator[None]:
+    def surviving(self, what: str, **holes: object) -> Iterator[None]:
         """One thing: when it raises, the log and an alert say so, and the next has its turn.
 
-        ``what`` completes the sentence "can't ...".
+        ``what`` completes the sentence "can't ..."; it is marked with `lazy`, its ``holes`` are filled here.
         """
         try:
             yield
         except Exception as error:  # noqa: BLE001  whatever it is: what comes after must still arrive
-            _log.exception("can't %s", what)
-            self._failed(what, f"It can't {what}: {words_of(error)}")
+            english, told = what.format(**holes), _(what).format(**holes)
+            _log.exception("can't %s", english)
+            self._failed(english, _("It can't {what}: {error}").format(what=told, error=words_of(error)))
         else:
             if self._faults and what in self._faults:
                 self._faults[what].is_well = True
@@ -230,7 +232,7 @@ class OwnFaults:
             self._tell(self._faults[what], count=1)  # of others and of how often the log tells
 
     def _tell(self, fault: _Fault, *, count: int) -> None:
-        title = "Studio has a fault and may show old values."
+        title = _("Studio has a fault and may show old values.")
         self._alerts.put(
-            ALERT, "error", title, fault.said, button="Show the log", action="help.log", count=count
+            ALERT, "error", title, fault.said, button=_("Show the log"), action="help.log", count=count
         )

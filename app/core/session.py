@@ -47,6 +47,7 @@ from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, CompanionFailed, C
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.core.storage.settings import Settings
+from nep.i18n import _, lazy, ngettext
 from nep.masters.master import master_address
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE
@@ -134,7 +135,7 @@ class Session:
     def start(self) -> None:
         """Start the threads; a master is started when none answers."""
         self.source.start()
-        self.source.submit("watch over the robots", self._make_stopper)
+        self.source.submit(_("watch over the robots"), self._make_stopper)
         if self._start_companions:
             self.companions.ensure_master()
 
@@ -152,20 +153,20 @@ class Session:
         now, now_ns = began, self._clock_ns()
         drained = self._mailbox.drain()
         for event in drained.events:
-            with self.surviving(f"take over {type(event).__name__}"):
+            with self.surviving(lazy("take over {event}"), event=type(event).__name__):
                 self._on_event(event, now)
         self._on_messages(drained, now)
-        with self.surviving("let topics and nodes age"):
+        with self.surviving(lazy("let topics and nodes age")):
             self.topics.age(now, now_ns)
             self.nodes.age(now)
-        with self.surviving("follow the robots"):
+        with self.surviving(lazy("follow the robots")):
             self._follow_robots()
-        with self.surviving("tell the program of its robots"):
+        with self.surviving(lazy("tell the program of its robots")):
             self.runs.follow_robots()
-        with self.surviving("stop robots again"):
+        with self.surviving(lazy("stop robots again")):
             for name in self.fleet.take_settled():
                 self.runs.stop_again(name)
-        with self.surviving("follow what was started here"):
+        with self.surviving(lazy("follow what was started here")):
             self.companions.follow()
         with self.surviving("show the run"):
             self.runs.tick()
@@ -174,28 +175,28 @@ class Session:
             self._check(now)
         self.tick_ms = (self._clock() - began) * 1000
 
-    def surviving(self, what: str) -> AbstractContextManager[None]:
+    def surviving(self, what: str, **holes: object) -> AbstractContextManager[None]:
         """One thing of a tick: when it raises, the log and an alert say so, and the next has its turn.
 
-        ``what`` completes the sentence "can't ...".
+        ``what`` completes the sentence "can't ..."; it is marked with `lazy`, its ``holes`` are filled later.
         """
-        return self._faults.surviving(what)
+        return self._faults.surviving(what, **holes)
 
     def _check(self, now: float) -> None:
         """What is looked at once a second."""
         self._faults.check()
-        with self.surviving("check what was started here"):
+        with self.surviving(lazy("check what was started here")):
             self.companions.check()
             if self.master.kind == "none" and self._start_companions:
                 self.companions.keep_master()
-        with self.surviving("count what was missed"):
+        with self.surviving(lazy("count what was missed")):
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
-        with self.surviving("tell what is wrong with Stop"):
+        with self.surviving(lazy("tell what is wrong with Stop")):
             self._look_for_problems_of_stop()
             if self.runs.kept and self.companions.ended >= self.runs.kept:
                 self.runs.confirm_still()  # virtual robots whose programs are gone: nothing could move
-        with self.surviving("check what is wrong"):
+        with self.surviving(lazy("check what is wrong")):
             self._health.check(self.runs.kept if self.runs.active else (), self.companions.virtual_robots)
             self.documents.unkept()
             self._health.journal(self.documents.journal_error)
@@ -204,16 +205,16 @@ class Session:
     def close(self) -> None:
         """End the program, the threads and the processes that were started here, whatever one does."""
         ends: list[tuple[str, Callable[[], object]]] = [
-            ("end the program", self.runs.close),
-            ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
-            ("end the behaviours", self.documents.end),
-            ("end the robots", self.fleet.close),
-            ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
-            ("end the pictures", self.images.close),
-            ("end the doctor", self.doctor.close),
-            ("leave the network", self.source.close),
-            ("end what was started here", self.companions.close),
-            ("end the reach", self.reach.close),
+            (lazy("end the program"), self.runs.close),
+            (lazy("keep the tabs"), lambda: self.tabs.keep(ended_well=True)),
+            (lazy("end the behaviours"), self.documents.end),
+            (lazy("end the robots"), self.fleet.close),
+            (lazy("end the stopper"), self.stopper.close if self.stopper is not None else _nothing),
+            (lazy("end the pictures"), self.images.close),
+            (lazy("end the doctor"), self.doctor.close),
+            (lazy("leave the network"), self.source.close),
+            (lazy("end what was started here"), self.companions.close),
+            (lazy("end the reach"), self.reach.close),
         ]
         for what, end in ends:
             with survived(what):
@@ -240,21 +241,25 @@ class Session:
 
     def _on_messages(self, drained: Drained, now: float) -> None:
         for topic, batch in drained.batches.items():
-            with self.surviving(f"take over messages of {topic}"):
+            with self.surviving(lazy("take over messages of {topic}"), topic=topic):
                 self._on_batch(topic, batch, now)
-        with self.surviving("count messages"):
+        with self.surviving(lazy("count messages")):
             self.traffic.add(drained.batches, now)
-        with self.surviving("take over what robots say"):
+        with self.surviving(lazy("take over what robots say")):
             self.fleet.add(drained.batches)
-        with self.surviving("check messages"):
+        with self.surviving(lazy("check messages")):
             found = self._checks.take()
             self._health.look({topic: what for topic, what in found.items() if self._watches.watched(topic)})
         if drained.lost_events:
             self.alerts.put(
                 "mailbox",
                 "warn",
-                f"{drained.lost_events} events were lost because the window was busy.",
-                "What panels show may be out of date for a second.",
+                ngettext(
+                    "{count} event was lost because the window was busy.",
+                    "{count} events were lost because the window was busy.",
+                    drained.lost_events,
+                ).format(count=drained.lost_events),
+                _("What panels show may be out of date for a second."),
                 count=drained.lost_events,
             )
 
@@ -273,7 +278,7 @@ class Session:
                 self.master = MasterState("connected", event.address)
                 self.alerts.cure("master")
                 self.alerts.cure("companion:master")
-                self.console.add("info", "master", f"connected to {event.address}")
+                self.console.add("info", "master", _("connected to {address}").format(address=event.address))
             case MasterLost():
                 self._on_master_lost(event)
             case RunnerEvent():
@@ -287,17 +292,24 @@ class Session:
                     "error",
                     event.sentence,
                     event.detail.splitlines()[-1] if event.detail else "",
-                    button="Start it again" if event.is_robot else ASK_DOCTOR,
+                    button=_("Start it again") if event.is_robot else _(ASK_DOCTOR),
                     action=f"connect:{event.what}" if event.is_robot else "help.doctor",
                 )
             case WatchFailed():
                 self.alerts.put(
-                    f"watch:{event.topic}", "warn", f"{event.topic} can't be read.", event.sentence
+                    f"watch:{event.topic}",
+                    "warn",
+                    _("{topic} can't be read.").format(topic=event.topic),
+                    event.sentence,
                 )
             case ReachChanged():
                 self.reach.changed(event)
             case JobFailed() if event.what:
-                self.console.add("error", "studio", f"can't {event.what}: {event.sentence}")
+                self.console.add(
+                    "error",
+                    "studio",
+                    _("can't {what}: {error}").format(what=event.what, error=event.sentence),
+                )
             case _:
                 pass
 
@@ -328,9 +340,9 @@ class Session:
             self.alerts.put(
                 "master",
                 "warn",
-                "The master has gone; a new one is being started.",
-                "Programs that are connected go on; new ones can't join until it is back.",
-                button=ASK_DOCTOR,
+                _("The master has gone; a new one is being started."),
+                _("Programs that are connected go on; new ones can't join until it is back."),
+                button=_(ASK_DOCTOR),
                 action="help.doctor",
             )
             self.topics.values_revision += 1
@@ -368,7 +380,7 @@ class Session:
         if stopper is not None and (targets != self._reachable or self._tries_to_reach):
             self._reachable, self._tries_to_reach = targets, False
             stopper.expect(targets)
-            self.source.submit("watch over the robots", lambda _node: stopper.set_robots(targets))
+            self.source.submit(_("watch over the robots"), lambda _node: stopper.set_robots(targets))
 
 
 def _nothing() -> None:

@@ -21,6 +21,7 @@ from app.robots.driver.common_actions import (
 )
 from app.robots.driver.declare import Kind, action, event, picture, safe_stop, sensor
 from app.robots.driver.schema import Colour, Range
+from nep.i18n import _
 
 LIGHTS = "Lights"
 STEP_S = 1 / 30
@@ -158,7 +159,7 @@ class DiffDrive:
         with self._steering:  # what was being done has been canceled: it does not steer any more
             self.wheels.drive(0.0, 0.0)
         waited = threading.Event()
-        for _ in range(round(STAND_STILL_S / 0.005)):
+        for _turn in range(round(STAND_STILL_S / 0.005)):
             if self.wheels.still():
                 return
             waited.wait(0.005)
@@ -227,7 +228,7 @@ class DiffDrive:
         try:
             while (left := amount - made()) > near:
                 if steps and self.wheels.bumped() and self.wheels.still():
-                    raise Failed(f"{call.action}: something is in the way")
+                    raise Failed(_("{action}: something is in the way").format(action=call.action))
                 steer(left)
                 if steps % FEEDBACK_STEPS == 0:
                     tell(made())
@@ -245,7 +246,11 @@ class Pattern(DiffDrive):
     """The description without a base: a driver puts its own class in this one's place."""
 
     def __init__(self, link: Link) -> None:
-        raise Failed(f"{link.name} has no wheels; its driver must bring them, as app.robots.turtle does")
+        raise Failed(
+            _("{robot} has no wheels; its driver must bring them, as app.robots.turtle does").format(
+                robot=link.name
+            )
+        )
 
 
 DIFFDRIVE = Kind(

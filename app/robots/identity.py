@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from app.robots.description.description import topic_of
 from app.robots.description.model import Robot
+from nep.i18n import _, lazy
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 from nep.text import harmless, shortened
@@ -24,6 +25,7 @@ SHARED = frozenset({"robot_action", "action_state"})
 """Topics of all robots of RIZE together (`app.robots.rize`)."""
 MOST_SENDERS = 20_000
 WORDS_MOST = 200
+MAY_MOVE = lazy("{robot} may still move: {why}")
 ERROR_MOST = 1000
 _NATIVE = frozenset({"native", GATEWAY})
 
@@ -41,7 +43,7 @@ class Identity:
     def words(self) -> str:
         """For people: "“rover driver” on lab-2"."""
         name = f"“{self.node or self.node_id}”"
-        return f"{name} on {self.host}" if self.host else name
+        return _("{program} on {host}").format(program=name, host=self.host) if self.host else name
 
 
 def identity_of(view: GraphView, node_id: str) -> Identity:
@@ -88,7 +90,9 @@ def wrong_topic(robot: Robot, topic: str) -> str | None:
     home = topic_of(robot.name, "description")
     if topic == home and robot.topics.description == home:
         return None
-    return f"{topic} says that it is {robot.name}, which is announced on {home} only; it is left out"
+    return _("{topic} says that it is {robot}, which is announced on {home} only; it is left out").format(
+        topic=topic, robot=robot.name, home=home
+    )
 
 
 def reserved(robot: Robot) -> tuple[str, ...]:
@@ -118,9 +122,17 @@ def said(error: object) -> str:
 
 def said_of_stop(name: str, error: object) -> str:
     """What a robot said that has not stopped, in its own words: "Arm may still move: the brake is stuck"."""
-    words = "".join(sign if sign.isprintable() else " " for sign in str(error or "its stop failed"))
+    words = "".join(sign if sign.isprintable() else " " for sign in str(error or _("its stop failed")))
     words = " ".join(words[:WORDS_MOST].split()).rstrip(".")
-    return words if words.startswith(f"{name} may still move") else f"{name} may still move: {words}"
+    return words if may_move(name, words) else _(MAY_MOVE).format(robot=name, why=words)
+
+
+def may_move(name: str, words: str) -> bool:
+    """Whether these words say that this robot may still move: in our language, or in English as its own."""
+    return any(
+        words.startswith(sentence.partition("{why}")[0].rstrip(": ").format(robot=name))
+        for sentence in (MAY_MOVE, _(MAY_MOVE))
+    )
 
 
 def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
@@ -134,7 +146,9 @@ def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
             continue
         for other in known:
             if is_home(other.name, topic) or topic in reserved(other):
-                return f"{robot.name} says that {topic} is its own, which belongs to {other.name}"
+                return _("{robot} says that {topic} is its own, which belongs to {other}").format(
+                    robot=robot.name, topic=topic, other=other.name
+                )
     return None
 
 

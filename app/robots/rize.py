@@ -17,10 +17,11 @@ from app.robots.description.description import parse
 from app.robots.description.inputs import pretty_number
 from app.robots.description.json_access import as_part, names, part, text
 from app.robots.description.model import Robot
+from nep.i18n import _, lazy
 
 COMMANDS, ANSWERS, EVENTS = "robot_action", "action_state", "rize_event"
 _STATES = {"success": "succeeded", "failure": "failed"}
-_FAILED = "{robot} could not {action}"
+_FAILED = lazy("{robot} could not {action}")
 
 
 @lru_cache(maxsize=1)
@@ -58,7 +59,7 @@ def to_command(robot: Robot, action: str, given: Mapping[str, object], command_i
         }
     known = robot.action(action)
     if known is None:
-        raise RobotInputError((f"{robot.name} can't “{action}”",))
+        raise RobotInputError((_("{name} can't “{action}”").format(name=robot.name, action=action),))
     sentences = known.check(given)
     if sentences:
         raise RobotInputError(sentences)
@@ -99,7 +100,7 @@ def from_answer(message: object) -> dict[str, object] | None:
     primitives = said.get("primitives")
     first = as_part(primitives[0] if isinstance(primitives, list) and primitives else primitives)
     action = str(first.get("primitive") or "")
-    error = _FAILED.format(robot=said.get("robots") or "the robot", action=action or "do it")
+    error = _(_FAILED).format(robot=said.get("robots") or _("the robot"), action=action or _("do it"))
     return {
         "id": wanted,
         "op": "invoke",

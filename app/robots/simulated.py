@@ -22,6 +22,7 @@ from app.robots.driver.schema import Colour, Range, Suggested, Text, Title, Word
 from app.robots.virtual.acting import FEEDBACK_S, Acting
 from app.robots.virtual.body import START_PITCH
 from app.robots.virtual.room import Room
+from nep.i18n import _, number
 
 SPEECH, FACE = "Speech", "Face and lights"
 Emotion: TypeAlias = Literal["happy", "surprised", "sad", "angry", "neutral"]
@@ -131,7 +132,11 @@ class VirtualPepper(Acting):
         """Walk straight, backwards when the distance is negative."""
         motion = self._roll(call, lambda body: body.walk(distance, speed))
         if motion.blocked:
-            raise Failed(f"walk: something is in the way after {abs(motion.moved):.2f} m")
+            raise Failed(
+                _("walk: something is in the way after {metres} m").format(
+                    metres=number(abs(motion.moved), ".2f")
+                )
+            )
 
     @moves("look at %target", "eye", "looks at %target", "head", timeout_s=10, title="look at")
     def look_at(self, call: Call, target: Target = "face") -> None:

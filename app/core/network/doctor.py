@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nep.i18n import _
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
@@ -63,13 +64,15 @@ class Doctor:
         try:
             found = tuple(self._look())
         except Exception as error:  # noqa: BLE001  a doctor that breaks off must say so, not vanish
-            words = f"The doctor could not finish: {type(error).__name__}: {error}."
-            found = (doctor.Finding("doctor", "error", words, "Tell the people who make NEP Studio."),)
+            words = _("The doctor could not finish: {kind}: {error}.").format(
+                kind=type(error).__name__, error=error
+            )
+            found = (doctor.Finding("doctor", "error", words, _("Tell the people who make NEP Studio.")),)
         self._found, self._looked_s = found, self._clock()
         self.revision += 1
 
 
 def doctor_of(address: str, folder: Path) -> Doctor:
     """A doctor for the master at this address, who also looks at Studio's own folder."""
-    folders = [("Settings and unsaved work", folder)]
+    folders = [(_("Settings and unsaved work"), folder)]
     return Doctor(lambda: doctor.findings(doctor.gather(address, folders=folders)))

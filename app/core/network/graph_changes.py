@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from nep.i18n import _, ngettext
 from nep.protocol.graph_view import GraphView, NodeInfo
 
 NATIVE = "native"
@@ -26,31 +27,48 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
     topics_of = _topics_by_node(after)
     for node in came:
         new = [name for name in topics_of.get(node, ()) if not _published(before, name)]
-        origin = "" if after.nodes[node].generation == NATIVE else " (original NEP)"
+        name, original = after.nodes[node].name, after.nodes[node].generation != NATIVE
         if len(new) > FEW:
-            name = after.nodes[node].name
-            here.append((name, f"{name} is here with {len(new)} topics{origin}"))
+            here.append((name, _here_with(name, len(new), original=original)))
             told.update(new)
         elif not new:
-            here.append((after.nodes[node].name, f"{after.nodes[node].name} is here{origin}"))
+            words = _("{node} is here (original NEP)") if original else _("{node} is here")
+            here.append((name, words.format(node=name)))
     for name, info in after.topics.items():
         count = len(info.publishers)
         if count and name not in told and not _ours(name) and not _published(before, name):
-            more.append((name, f"{name} is new, {count} publisher{'' if count == 1 else 's'}"))
+            words = ngettext("{topic} is new, {count} publisher", "{topic} is new, {count} publishers", count)
+            more.append((name, words.format(topic=name, count=count)))
     left = [node.name for id, node in before.nodes.items() if id not in after.nodes and _told(node)]
     return [
-        *_gathered(here, "nodes are here"),
-        *_gathered(more, "new topics"),
-        *_gathered([(name, f"{name} has left") for name in left], "nodes have left"),
+        *_gathered(here, _("{count} nodes are here: {names} and {more} more")),
+        *_gathered(more, _("{count} new topics: {names} and {more} more")),
+        *_gathered(
+            [(name, _("{node} has left").format(node=name)) for name in left],
+            _("{count} nodes have left: {names} and {more} more"),
+        ),
     ]
 
 
-def _gathered(lines: Sequence[tuple[str, str]], what: str) -> list[str]:
-    """The lines, each with the name that it is about; one line for all when they are many."""
+def _gathered(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
+    """The lines, each with the name that it is about; one, ``many``, for all when they are many."""
     if len(lines) <= MOST_LINES:
-        return [line for _, line in lines]
-    named = ", ".join(name for name, _ in lines[:NAMED])
-    return [f"{len(lines)} {what}: {named} and {len(lines) - NAMED} more"]
+        return [line for _name, line in lines]
+    named = ", ".join(name for name, _line in lines[:NAMED])
+    return [many.format(count=len(lines), names=named, more=len(lines) - NAMED)]
+
+
+def _here_with(node: str, count: int, *, original: bool) -> str:
+    words = (
+        ngettext(
+            "{node} is here with {count} topic (original NEP)",
+            "{node} is here with {count} topics (original NEP)",
+            count,
+        )
+        if original
+        else ngettext("{node} is here with {count} topic", "{node} is here with {count} topics", count)
+    )
+    return words.format(node=node, count=count)
 
 
 def _told(node: NodeInfo) -> bool:

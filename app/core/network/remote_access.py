@@ -10,6 +10,7 @@ from app.core.alerts import Alerts
 from app.core.storage.settings import KeepsLists
 from app.errors import SettingsError
 from nep.errors import NepError
+from nep.i18n import _
 from nep.masters.master import listen
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import OwnAddress, host_of, is_loopback, own_addresses
@@ -71,13 +72,17 @@ class Reach:
         try:
             self._settings.set(KEPT, list(hosts))
         except SettingsError as error:
-            words = "Other computers may connect again" if not hosts else "They can't connect any more"
+            words = (
+                _("They can't connect any more after the next start: {error}.")
+                if hosts
+                else _("Other computers may connect again after the next start: {error}.")
+            )
             self._alerts.put(
                 NOT_KEPT,
                 "warn",
-                "Who may connect is not kept.",
-                f"{words} after the next start: {error}.",
-                button="Choose again",
+                _("Who may connect is not kept."),
+                words.format(error=error),
+                button=_("Choose again"),
                 action="network.others",
                 count=0,
             )
@@ -103,9 +108,9 @@ class Reach:
         self._alerts.put(
             ALERT,
             "warn",
-            "Other computers can't connect.",
+            _("Other computers can't connect."),
             f"{event.sentence[:1].upper()}{event.sentence[1:]}.",
-            button="Choose an address",
+            button=_("Choose an address"),
             action="network.others",
         )
 
@@ -134,7 +139,11 @@ class Reach:
 def words_of(reach: Reach) -> tuple[str, str, str | None]:
     """What the status bar says of it: icon, words, status."""
     if reach.hosts:
-        return "wifi", f"Other computers connect at {', '.join(reach.hosts)}", "warn"
+        return (
+            "wifi",
+            _("Other computers connect at {addresses}").format(addresses=", ".join(reach.hosts)),
+            "warn",
+        )
     if not reach.is_near:
-        return "network", f"Master on {reach.master_host}", None
-    return "lock", "This computer only", None
+        return "network", _("Master on {master_host}").format(master_host=reach.master_host), None
+    return "lock", _("This computer only"), None

@@ -16,6 +16,7 @@ from typing import Protocol
 import nep
 from app.core.faults import survived, words_of
 from nep.errors import NepError
+from nep.i18n import _
 from nep.masters.process import look
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -196,7 +197,7 @@ class LiveSource:
     def _join(self) -> bool:
         view = look(self.address, timeout_s=0.5)
         if view is None:
-            self._lost(f"no master answers at {self.address}")
+            self._lost(_("no master answers at {address}").format(address=self.address))
             return False
         try:
             self._node = nep.node(_free_name(view), master=self.address)

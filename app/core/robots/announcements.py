@@ -18,7 +18,7 @@ from app.robots import rize
 from app.robots.description.description import Robot, announced
 from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
 from nep.errors import NepError
-from nep.i18n import listed
+from nep.i18n import _, listed, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
@@ -95,16 +95,24 @@ class Announcements:
                 continue
             if known.twins and known.owner is not None:
                 name = known.robot.name if known.robot is not None else topic
-                others = listed([twin.words for twin in known.twins[:MOST_CLAIMANTS]])
                 found[topic] = Claim(
-                    f"{len(known.twins) + 1} programs say that they are {name}.",
-                    f"{known.owner.words} was first and is the robot; {others} changes nothing. Close one.",
+                    _("{count} programs say that they are {robot}.").format(
+                        count=len(known.twins) + 1, robot=name
+                    ),
+                    _("{first} was first and is the robot; {others} changes nothing. Close one.").format(
+                        first=known.owner.words,
+                        others=listed([twin.words for twin in known.twins[:MOST_CLAIMANTS]]),
+                    ),
                 )
             elif known.wrong is not None:
                 found[topic] = known.wrong
         if self._left_out:
-            title = f"{self._left_out} more robots than the {MOST_ROBOTS} that Studio shows are announced."
-            found["robots"] = Claim(title, "Find out which program announces them and close it.")
+            title = ngettext(
+                "{count} more robot than the {most} that Studio shows is announced.",
+                "{count} more robots than the {most} that Studio shows are announced.",
+                self._left_out,
+            ).format(count=self._left_out, most=MOST_ROBOTS)
+            found["robots"] = Claim(title, _("Find out which program announces them and close it."))
         return found
 
     def update(self, view: GraphView) -> None:
@@ -230,13 +238,19 @@ class Announcements:
         except DescriptionError as error:
             said = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
             whose = known.owner.words if known.owner is not None else topic
-            before = "" if known.robot is None else " What it said before still counts."
-            known.wrong = Claim(said, f"It comes from {whose}, whose driver is to be mended.{before}")
+            words = (
+                _("It comes from {program}, whose driver is to be mended.")
+                if known.robot is None
+                else _(
+                    "It comes from {program}, whose driver is to be mended. What it said before still counts."
+                )
+            )
+            known.wrong = Claim(said, words.format(program=whose))
             return
         wrong = wrong_topic(robot, topic)
         known.robot = robot if wrong is None else None
         if wrong is not None:
-            known.wrong = Claim(f"{wrong}.", "Find out what this program is and close it.")
+            known.wrong = Claim(f"{wrong}.", _("Find out what this program is and close it."))
 
 
 class RizeNames:

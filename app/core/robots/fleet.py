@@ -35,6 +35,7 @@ from app.robots.identity import (
     said_of_stop,
 )
 from nep.errors import NepError
+from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
@@ -164,7 +165,7 @@ class Fleet:
         link = self._get(name)
         described = link.robot.action(action)
         if described is None:
-            raise RobotInputError((f"{name} can't {action}",))
+            raise RobotInputError((_("{robot} can't {action}").format(robot=name, action=action),))
         wrong = described.check(input)
         if wrong:
             raise RobotInputError(tuple(wrong))
@@ -360,7 +361,10 @@ class Fleet:
         why = foreign_topic(robot, (link.robot for link in self._links.values()))
         if why is None:
             return None
-        return Claim(f"{why}.", f"{robot.name} is left out. Find out what this program is and close it.")
+        return Claim(
+            f"{why}.",
+            _("{robot} is left out. Find out what this program is and close it.").format(robot=robot.name),
+        )
 
     def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
         """A robot is there, known by ``topic``; said again it does nothing unless the robot changed."""
@@ -394,7 +398,11 @@ class Fleet:
         before, link.identity = link.identity, identity
         if before is None or identity is None or before.node_id == identity.node_id:
             return
-        self._notes.append(f"{link.name} was started anew: it is {identity.words} now, before {before.words}")
+        self._notes.append(
+            _("{robot} was started anew: it is {now} now, before {before}").format(
+                robot=link.name, now=identity.words, before=before.words
+            )
+        )
         goes_on, link.goes_on = link.goes_on, ""
         if not self._processes.has_ended(before):
             link.earlier = (before, *link.earlier)[:MOST_EARLIER]
@@ -405,7 +413,7 @@ class Fleet:
     def _leave_topics(self, link: RobotLink) -> None:
         """Its description names other topics: what was asked on the old ones has ended."""
         self._alive.rest(link.name)
-        self._tries.end_all(link, "failed", f"{link.name} has changed; try it again")
+        self._tries.end_all(link, "failed", _("{robot} has changed; try it again").format(robot=link.name))
         if link.watch is not None:
             link.watch.close()
             link.watch = None
@@ -417,7 +425,7 @@ class Fleet:
                 publisher.close()
 
         if old:
-            self._submit(f"leave the old topics of {link.name}", close_them)
+            self._submit(_("leave the old topics of {robot}").format(robot=link.name), close_them)
 
     def _open_publisher(self, link: RobotLink) -> None:
         topics = link.robot.topics
@@ -436,7 +444,7 @@ class Fleet:
             finally:
                 link.is_opening = False
 
-        self._submit(f"reach {link.name}", open_them)
+        self._submit(_("reach {robot}").format(robot=link.name), open_them)
 
     def _away(self, link: RobotLink) -> None:
         link.connected, link.gone_s = False, self._clock()
@@ -452,7 +460,9 @@ class Fleet:
         link.mute = False
         if self.moving.question is not None and link.name in self.moving.question.moves:
             self.moving.withdraw()
-        self._tries.end_all(link, "failed", f"{link.name} has gone; check that it is on")
+        self._tries.end_all(
+            link, "failed", _("{robot} has gone; check that it is on").format(robot=link.name)
+        )
         self.revision += 1
 
     def _send(self, link: RobotLink, command: Payload) -> bool:
@@ -524,7 +534,7 @@ class Fleet:
             return
         before, link.goes_on = link.goes_on, ""
         if answer["not_ended"]:
-            link.goes_on = said_of_stop(link.name, answer.get("error") or "an action has not ended")
+            link.goes_on = said_of_stop(link.name, answer.get("error") or _("an action has not ended"))
         elif before and link.not_stopped:
             self._settled[link.name] = None
 

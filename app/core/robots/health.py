@@ -10,17 +10,18 @@ from app.core.network.decode_checks import Checked
 from app.core.network.topics import Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.robot_link import RobotLink
+from nep.i18n import _, lazy, ngettext
 from nep.protocol.graph_view import GraphView
 
 SILENT_S = 3.0
 CURE_S = 1.0
 AWAY_S = 5.0
 """A driver that is started again is back by then."""
-ASK_DOCTOR = "Open the connection doctor"
+ASK_DOCTOR = lazy("Open the connection doctor")
 GIVES_UP = "leaving"
 
-REAL = "Check that it is on and in the same Wi-Fi."
-VIRTUAL = "Start the virtual robot again."
+REAL = lazy("Check that it is on and in the same Wi-Fi.")
+VIRTUAL = lazy("Start the virtual robot again.")
 
 
 @dataclass(slots=True)
@@ -88,9 +89,11 @@ class Health:
                 self._alerts.put(
                     f"robot:{link.name}",
                     "error",
-                    f"{link.name} does not answer.",
-                    f"The behaviour uses it. {VIRTUAL if link.virtual else REAL}",
-                    button="Stop",
+                    _("{robot} does not answer.").format(robot=link.name),
+                    _("The behaviour uses it. {next_step}").format(
+                        next_step=_(VIRTUAL if link.virtual else REAL)
+                    ),
+                    button=_("Stop"),
                     action="run.stop",
                     count=0,
                 )
@@ -106,9 +109,9 @@ class Health:
         self._alerts.put(
             "journal",
             "error",
-            "Your unsaved work is not kept.",
+            _("Your unsaved work is not kept."),
             f"{sentence[0].upper()}{sentence[1:]}.",
-            button="Save",
+            button=_("Save"),
             action="file.save",
             count=0,
         )
@@ -124,9 +127,9 @@ class Health:
         self._alerts.put(
             GIVES_UP,
             "error",
-            f"Studio stays open: the unsaved work in {name} would be lost.",
-            f"{sentence[0].upper()}{sentence[1:]}. Closing once more gives it up.",
-            button="Save somewhere else",
+            _("Studio stays open: the unsaved work in {name} would be lost.").format(name=name),
+            _("{why}. Closing once more gives it up.").format(why=f"{sentence[0].upper()}{sentence[1:]}"),
+            button=_("Save somewhere else"),
             action="file.save_as",
             count=0,
         )
@@ -140,7 +143,7 @@ class Health:
         self._alerts.put(
             "settings",
             "warn",
-            "What you choose now is forgotten when Studio ends.",
+            _("What you choose now is forgotten when Studio ends."),
             f"{sentence[0].upper()}{sentence[1:]}.",
             count=0,
         )
@@ -156,7 +159,7 @@ class Health:
                 "warn",
                 found.sentence,
                 found.hint,
-                button=ASK_DOCTOR if helps else None,
+                button=_(ASK_DOCTOR) if helps else None,
                 action="help.doctor" if helps else None,
                 count=0,
             )
@@ -165,15 +168,23 @@ class Health:
         self._from_graph = ids
 
     def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
-        messages = "1 message" if bad.count == 1 else f"{bad.count} messages"
+        title = ngettext(
+            "{topic} sends what can't be read ({count} message).",
+            "{topic} sends what can't be read ({count} messages).",
+            bad.count,
+        )
+        detail = (
+            _("{why} Look at the raw bytes in the Inspector. {count} more came too fast to be tried.")
+            if bad.unchecked
+            else _("{why} Look at the raw bytes in the Inspector.")
+        )
         why = f"{checked.sentence[:1].upper()}{checked.sentence[1:]}."
-        more = f" {bad.unchecked} more came too fast to be tried." if bad.unchecked else ""
         self._alerts.put(
             f"message:{topic}",
             "warn",
-            f"{topic} sends what can't be read ({messages}).",
-            f"{why} Look at the raw bytes in the Inspector.{more}",
-            button="Look at it",
+            title.format(topic=topic, count=bad.count),
+            detail.format(why=why, count=bad.unchecked),
+            button=_("Look at it"),
             action=f"inspect:{topic}",
             count=checked.bad,
         )
@@ -187,9 +198,11 @@ class Health:
         self._alerts.put(
             f"robot:{link.name}",
             "warn",
-            f"{link.name} does not answer." if link.virtual else f"{link.name} has gone.",
-            VIRTUAL if link.virtual else REAL,
-            button="Start it again" if link.virtual else ASK_DOCTOR,
+            (_("{robot} does not answer.") if link.virtual else _("{robot} has gone.")).format(
+                robot=link.name
+            ),
+            _(VIRTUAL if link.virtual else REAL),
+            button=_("Start it again") if link.virtual else _(ASK_DOCTOR),
             action=f"connect:{link.name}" if link.virtual else "help.doctor",
             count=0,
         )
@@ -208,8 +221,9 @@ class Health:
         for name in self._unreachable - problems.keys():
             self._alerts.cure(f"stop:{name}")
         for name, why in problems.items():
-            said = f"{why[:1].upper()}{why[1:]}. It is tried again each second."
-            self._alerts.put(f"stop:{name}", "error", f"Stop can't reach {name}.", said, count=0)
+            said = _("{why}. It is tried again each second.").format(why=f"{why[:1].upper()}{why[1:]}")
+            title = _("Stop can't reach {robot}.").format(robot=name)
+            self._alerts.put(f"stop:{name}", "error", title, said, count=0)
         self._unreachable = set(problems)
 
     def _check_motion(self, link: RobotLink) -> None:
@@ -217,13 +231,13 @@ class Health:
         if not (link.connected and link.goes_on):
             self._alerts.cure(f"moving:{link.name}")
             return
-        said = "Switch it off by hand if it does not stand still."
+        said = _("Switch it off by hand if it does not stand still.")
         self._alerts.put(
             f"moving:{link.name}",
             "error",
             f"{link.goes_on}.",
             said,
-            button="Stop",
+            button=_("Stop"),
             action="run.stop",
             count=0,
         )
@@ -243,13 +257,15 @@ class Health:
             link.silent = None
             self._alerts.cure(id)
             return
-        link.silent = "camera silent"
+        link.silent = _("camera silent")
         self._alerts.put(
             id,
             "error",
-            f"The camera of {link.name} has been silent for {int(topic.silent_s)} s.",
-            "What needs its picture waits.",
-            button=ASK_DOCTOR,
+            _("The camera of {robot} has been silent for {seconds} s.").format(
+                robot=link.name, seconds=int(topic.silent_s)
+            ),
+            _("What needs its picture waits."),
+            button=_(ASK_DOCTOR),
             action="help.doctor",
             count=0,
         )

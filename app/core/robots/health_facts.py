@@ -12,6 +12,7 @@ from typing import TypeGuard
 from app.core.network.topics import Topic, Topics
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Sensor
+from nep.i18n import _, lazy, ngettext, number
 
 SILENT_S = 3.0
 MISSED = 5
@@ -20,14 +21,20 @@ LOW_PERCENT = 20
 WARM_C = 60
 """From here on motors of small robots begin to lose their strength."""
 
-TOLD = frozenset({"Battery", "Temperature", "Camera", "Sensors"})
+CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
+STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
+LEFT_ALONE, SIGN_OF_LIFE = lazy("Left alone"), lazy("Sign of life")
+TOLD = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
 
 AgeWords = Callable[[float], str]
 
 
 @dataclass(frozen=True, slots=True)
 class HealthFact:
-    """One line: ``status`` is ok, warn, error, or off for what is not there or not known yet."""
+    """One line: ``status`` is ok, warn, error, or off for what is not there or not known yet.
+
+    ``title`` is one of those above: people read it by `nep.i18n`.
+    """
 
     title: str
     status: str
@@ -62,16 +69,32 @@ def has_told(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
 def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
     age = age_words(now - link.answered_s) if link.answered_s is not None else ""
     if not link.connected:
-        since = f" for {age_words(now - link.gone_s)}" if link.gone_s is not None else ""
-        return HealthFact("Connection", "warn", f"gone{since}; {_next_step(link)}")
+        if link.gone_s is None:
+            words = _("gone; start it again") if link.virtual else _("gone; check that it is on")
+            return HealthFact(CONNECTION, "warn", words)
+        words = (
+            _("gone for {age}; start it again") if link.virtual else _("gone for {age}; check that it is on")
+        )
+        return HealthFact(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
     if link.mute:
-        last = f"; its last answer is {age} old" if age else ""
-        return HealthFact("Connection", "error", f"does not answer{last}; {_next_step(link)}")
-    return HealthFact("Connection", "ok", f"last answer {age} ago" if age else "connected; not asked yet")
+        return HealthFact(CONNECTION, "error", _mute(link, age))
+    words = _("last answer {age} ago").format(age=age) if age else _("connected; not asked yet")
+    return HealthFact(CONNECTION, "ok", words)
 
 
-def _next_step(link: RobotLink) -> str:
-    return "start it again" if link.virtual else "check that it is on"
+def _mute(link: RobotLink, age: str) -> str:
+    if not age:
+        return (
+            _("does not answer; start it again")
+            if link.virtual
+            else _("does not answer; check that it is on")
+        )
+    words = (
+        _("does not answer; its last answer is {age} old; start it again")
+        if link.virtual
+        else _("does not answer; its last answer is {age} old; check that it is on")
+    )
+    return words.format(age=age)
 
 
 def _battery(link: RobotLink) -> Iterable[HealthFact]:
@@ -80,11 +103,11 @@ def _battery(link: RobotLink) -> Iterable[HealthFact]:
             continue
         value = link.values.get(sensor.name)
         if not _is_number(value):
-            yield HealthFact("Battery", "off", "not told yet")
+            yield HealthFact(BATTERY, "off", _("not told yet"))
         elif value < LOW_PERCENT:
-            yield HealthFact("Battery", "warn", f"{value:.0f} %; charge it soon")
+            yield HealthFact(BATTERY, "warn", _("{percent} %; charge it soon").format(percent=f"{value:.0f}"))
         else:
-            yield HealthFact("Battery", "ok", f"{value:.0f} %")
+            yield HealthFact(BATTERY, "ok", f"{value:.0f} %")
         return
 
 
@@ -93,9 +116,13 @@ def _temperature(link: RobotLink) -> Iterable[HealthFact]:
     if told:
         value, what = max(told)
         if value >= WARM_C:
-            yield HealthFact("Temperature", "warn", f"{what} warm, {value:.0f} °C; let it rest")
+            yield HealthFact(
+                TEMPERATURE,
+                "warn",
+                _("{what} warm, {degrees} °C; let it rest").format(what=what, degrees=f"{value:.0f}"),
+            )
         else:
-            yield HealthFact("Temperature", "ok", f"{what} {value:.0f} °C")
+            yield HealthFact(TEMPERATURE, "ok", f"{what} {value:.0f} °C")
 
 
 def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[float, str]]:
@@ -110,14 +137,14 @@ def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[flo
 
 def _stop(link: RobotLink) -> HealthFact:
     if link.goes_on:
-        return HealthFact("Stop", "error", link.goes_on)
+        return HealthFact(STOP, "error", link.goes_on)
     if link.stopping:
-        return HealthFact("Stop", "off", "told to stop; its answer is waited for")
+        return HealthFact(STOP, "off", _("told to stop; its answer is waited for"))
     if link.last_stop is not None:
         kinds = {"answered": "ok", "sent": "off"}
-        return HealthFact("Stop", kinds.get(link.last_stop.partition(" ")[0], "error"), link.last_stop)
-    said = "not used yet" if link.can_confirm_stop else "not used yet; this robot cannot confirm"
-    return HealthFact("Stop", "off", said)
+        return HealthFact(STOP, kinds.get(link.last_stop.partition(" ")[0], "error"), link.last_stop)
+    said = _("not used yet") if link.can_confirm_stop else _("not used yet; this robot cannot confirm")
+    return HealthFact(STOP, "off", said)
 
 
 def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
@@ -126,13 +153,15 @@ def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[He
         return
     topic = topics.get(camera.topic)
     if link.silent is not None and topic is not None and topic.silent_s is not None:
-        yield HealthFact("Camera", "error", f"silent for {age_words(topic.silent_s)}")
+        yield HealthFact(CAMERA, "error", _("silent for {age}").format(age=age_words(topic.silent_s)))
     elif topic is not None and topic.rate_hz:
-        yield HealthFact("Camera", "ok", f"sends {topic.rate_hz:.0f} pictures a second")
+        yield HealthFact(
+            CAMERA, "ok", _("sends {rate} pictures a second").format(rate=f"{topic.rate_hz:.0f}")
+        )
     elif topic is not None and topic.gone_s is None and topic.heard_since is None:
-        yield HealthFact("Camera", "off", "ready; nobody looks")
+        yield HealthFact(CAMERA, "off", _("ready; nobody looks"))
     else:
-        yield HealthFact("Camera", "off", "no picture yet")
+        yield HealthFact(CAMERA, "off", _("no picture yet"))
 
 
 def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
@@ -141,17 +170,25 @@ def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[H
     if not felt:
         return
     if silent:
-        age = age_words(max(topic.silent_s or 0.0 for _, topic in silent if topic is not None))
-        yield HealthFact("Sensors", "warn", f"{_listed([each.title for each, _ in silent])} silent for {age}")
+        age = age_words(max(topic.silent_s or 0.0 for _sensor, topic in silent if topic is not None))
+        first, more = silent[0][0].title, len(silent) - 1
+        words = _("{sensor} silent for {age}") if not more else _("{sensor} and {more} more silent for {age}")
+        yield HealthFact(SENSORS, "warn", words.format(sensor=first, more=more, age=age))
         return
     sent = sum(1 for sensor in felt if _has_sent(topics.get(sensor.topic)))
     if not sent:
-        words = "has sent nothing yet" if len(felt) == 1 else f"none of {len(felt)} has sent anything yet"
-        yield HealthFact("Sensors", "off", words)
+        words = ngettext("has sent nothing yet", "none of {count} has sent anything yet", len(felt))
+        yield HealthFact(SENSORS, "off", words.format(count=len(felt)))
     elif sent < len(felt):
-        yield HealthFact("Sensors", "ok", f"{sent} of {len(felt)} have sent something")
+        yield HealthFact(
+            SENSORS, "ok", _("{sent} of {count} have sent something").format(sent=sent, count=len(felt))
+        )
     else:
-        yield HealthFact("Sensors", "ok", "1 sensor sends" if len(felt) == 1 else f"all {len(felt)} send")
+        yield HealthFact(
+            SENSORS,
+            "ok",
+            ngettext("{count} sensor sends", "all {count} send", len(felt)).format(count=len(felt)),
+        )
 
 
 def _has_sent(topic: Topic | None) -> bool:
@@ -169,20 +206,18 @@ def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
 def _left_alone(link: RobotLink) -> HealthFact:
     after = link.robot.safe_stop.watchdog_s
     if after is None:
-        return HealthFact("Left alone", "off", "does not stop by itself; stay near its switch")
-    return HealthFact("Left alone", "ok", f"stops by itself after {after:g} s")
+        return HealthFact(LEFT_ALONE, "off", _("does not stop by itself; stay near its switch"))
+    return HealthFact(LEFT_ALONE, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
 
 
 def _life(link: RobotLink) -> Iterable[HealthFact]:
     every = link.robot.beat_s
     if every is not None:
-        yield HealthFact("Sign of life", "ok", f"every {every:g} s while it works")
+        yield HealthFact(
+            SIGN_OF_LIFE, "ok", _("every {seconds} s while it works").format(seconds=number(every))
+        )
     elif link.robot.dialect == "native":
-        yield HealthFact("Sign of life", "off", "none while it works")
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{words[0]} and {len(words) - 1} more"
+        yield HealthFact(SIGN_OF_LIFE, "off", _("none while it works"))
 
 
 def _is_number(value: object) -> TypeGuard[float]:

@@ -16,7 +16,7 @@ from app.core.storage.settings import KeepsLists
 from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
-from nep.i18n import listed
+from nep.i18n import _, listed, ngettext
 
 ALWAYS = "robots.may_move"
 MOST_NAMED = 4
@@ -28,7 +28,9 @@ class MayNotMoveError(AppError):
     def __init__(self, names: Sequence[str]) -> None:
         """Make the sentence from the robots' names."""
         self.names = tuple(names)
-        super().__init__(f"{listed(names)} may not move yet; answer the question above first")
+        super().__init__(
+            _("{robots} may not move yet; answer the question above first").format(robots=listed(list(names)))
+        )
 
 
 @dataclass(frozen=True)
@@ -41,16 +43,20 @@ class Question:
     @property
     def title(self) -> str:
         """In bold: "Let Rover move?"."""
-        return f"Let {listed(list(self.moves))} move?"
+        return _("Let {robots} move?").format(robots=listed(list(self.moves)))
 
     @property
     def sentence(self) -> str:
         """What would move, and how it is stopped."""
         told = [
-            f"{listed(list(actions))} {'moves' if len(actions) == 1 else 'move'} {name}."
+            ngettext("{actions} moves {robot}.", "{actions} move {robot}.", len(actions)).format(
+                actions=listed(actions), robot=name
+            )
             for name, actions in self.moves.items()
         ]
-        return f"{' '.join(told)} See that nobody stands in the way. Stop is F12, at any time."
+        return _("{moves} See that nobody stands in the way. Stop is F12, at any time.").format(
+            moves=" ".join(told)
+        )
 
 
 class Moving:
@@ -82,7 +88,7 @@ class Moving:
         open_ = [(robot, moves) for robot, moves in asked if moves]
         if not open_:
             return True
-        self._asked = tuple((self._now(robot), self._key(robot)) for robot, _ in open_)
+        self._asked = tuple((self._now(robot), self._key(robot)) for robot, _key in open_)
         self.question = Question({robot.name: moves for robot, moves in open_}, go_on)
         self.revision += 1
         return False
@@ -93,10 +99,10 @@ class Moving:
         self.revision += 1
         if question is None or not let:
             return
-        self._allowed.update(now for now, _ in self._asked)
+        self._allowed.update(now for now, _key in self._asked)
         try:
             if always and self._settings is not None:
-                self._settings.set(ALWAYS, sorted({*self._always(), *(key for _, key in self._asked)}))
+                self._settings.set(ALWAYS, sorted({*self._always(), *(key for _now, key in self._asked)}))
         finally:
             question.go_on()
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from app.core.network.watches import Watch
 from app.robots.description.description import Robot, RobotTopics
-from app.robots.identity import Identity
+from app.robots.identity import Identity, may_move
 from nep.i18n import _, lazy
 from nep.nodes.publisher import Publisher
 
@@ -18,7 +18,6 @@ SENDER = "studio"
 TRIES_KEPT = 40
 NOT_STOPPED = "not stopped"
 STOPPING = "stopping"
-MAY_MOVE = "may still move"
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 STATE_WORDS = {
     NOT_STOPPED: lazy("not stopped"),
@@ -154,7 +153,9 @@ class RobotLink:
     def state_words(self) -> str:
         """How it is, as people read it: ``ready``, ``may still move``, ``does not answer``."""
         state = self.state
-        if state == NOT_STOPPED and MAY_MOVE in f"{self.goes_on} {self.not_stopped}":
+        if state == NOT_STOPPED and (
+            may_move(self.name, self.goes_on) or may_move(self.name, self.not_stopped)
+        ):
             return _("may still move")
         if self.connected and state == "silent":
             return _("does not answer") if self.mute else self.silent or _(STATE_WORDS[state])

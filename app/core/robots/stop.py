@@ -28,6 +28,7 @@ from app.robots.identity import (
     said_of_stop,
 )
 from nep.errors import NepError
+from nep.i18n import _, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
@@ -407,7 +408,7 @@ class RobotStopper:
                 way.publisher.publish(command)
                 sent = True
             except NepError as failed:
-                error = f"{robot.name} can't be told: {failed}"
+                error = _("{robot} can't be told: {why}").format(robot=robot.name, why=failed)
         return "" if sent else error
 
     # ---- who must answer, and who did
@@ -456,7 +457,9 @@ class RobotStopper:
         listening = [node for node in others if node not in answering]
         programs = [identity_of(view, node).node or node for node in listening[:MOST_LISTENING]]
         if len(listening) > MOST_LISTENING:
-            programs = [f"{len(listening)} programs"]
+            programs = [
+                ngettext("{count} program", "{count} programs", len(listening)).format(count=len(listening))
+            ]
         for node, program in zip(listening, programs, strict=False):
             found[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
         for before in target.earlier:
@@ -557,7 +560,8 @@ def _stop_answer(message: Message) -> Mapping[str, object] | None:
 
 
 def _untold(line: _Line) -> str:
-    return f"{line.name} can't be told: {line.error or 'there is no way to it yet; press Stop again'}"
+    why = line.error or _("there is no way to it yet; press Stop again")
+    return _("{robot} can't be told: {why}").format(robot=line.name, why=why)
 
 
 def _id() -> str:

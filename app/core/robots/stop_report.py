@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-BY_HAND = "Switch it off by hand."
+from nep.i18n import _
 
 STOPPING_SHOWN_AFTER_S = 0.1
 
@@ -41,19 +41,21 @@ class RobotStop:
         if self.answered or not self.can_confirm:
             return ""
         if self.program and self.refused:
-            return f"{self.error} (says “{self.program}”)"
-        return self.error or f"{self.who} did not answer"
+            return _("{error} (says “{program}”)").format(error=self.error, program=self.program)
+        return self.error or _("{robot} did not answer").format(robot=self.who)
 
     @property
     def sentence(self) -> str:
         """In words: "Pepper stopped (41 ms)"."""
         if self.answered:
-            return f"{self.who} stopped ({self.elapsed_ms or 0:.0f} ms)"
+            return _("{robot} stopped ({elapsed} ms)").format(
+                robot=self.who, elapsed=f"{self.elapsed_ms or 0:.0f}"
+            )
         if self.program and not self.can_confirm:
-            return f"{self.who} hears the commands too and cannot confirm"
+            return _("{robot} hears the commands too and cannot confirm").format(robot=self.who)
         if not self.can_confirm:
-            return f"{self.name}: stop sent; this robot cannot confirm"
-        return f"{self.wrong}. {BY_HAND}"
+            return _("{robot}: stop sent; this robot cannot confirm").format(robot=self.name)
+        return _("{wrong}. Switch it off by hand.").format(wrong=self.wrong)
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,8 @@ class StopReport:
 
 def not_reached(name: str, why: str = "") -> RobotStop:
     """The line of a robot that could not be told to stop, and why."""
-    return RobotStop(name, False, None, error=f"{name} was not told to stop{f': {why}' if why else ''}")
+    words = _("{robot} was not told to stop: {why}") if why else _("{robot} was not told to stop")
+    return RobotStop(name, False, None, error=words.format(robot=name, why=why))
 
 
 @dataclass(frozen=True, slots=True)

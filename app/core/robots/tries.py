@@ -10,6 +10,7 @@ from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload
 from app.robots import rize
 from app.robots.description.description import Action, Robot
 from app.robots.identity import said
+from nep.i18n import _, number
 
 FIRST_ANSWER_S = 3.0
 """How long a robot may take to say anything to a command."""
@@ -47,7 +48,12 @@ class Tries:
         link.tried.append(made)
         link.heard_s = self._clock()
         if not self._send(link, command_of(link.robot, made, input)):
-            self._end(link, made, "failed", f"{link.name} can't be reached; check that it is on")
+            self._end(
+                link,
+                made,
+                "failed",
+                _("{robot} can't be reached; check that it is on").format(robot=link.name),
+            )
         return made
 
     def cancel(self, link: RobotLink, action: str) -> None:
@@ -92,17 +98,28 @@ class Tries:
         robot = link.robot
         if robot.dialect == "native" and made.state == "sent":
             if now - made.started_s > FIRST_ANSWER_S:
-                self._mute(link, made, f"{link.name} does not answer. Check that it is on.")
+                self._mute(
+                    link, made, _("{robot} does not answer. Check that it is on.").format(robot=link.name)
+                )
             return
         silence = max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
         if silence is not None and now - link.heard_s > silence:
-            said = f"{link.name} has stopped answering. Check that it is on; Stop tells it to stand still."
+            said = _(
+                "{robot} has stopped answering. Check that it is on; Stop tells it to stand still."
+            ).format(robot=link.name)
             self._mute(link, made, said)
             return
         left_s = made.left_s
         if left_s is not None and left_s < -GRACE_S:
             self._send_cancel(link, made)
-            self._end(link, made, "failed", f"{made.action} took longer than {made.timeout_s:g} s")
+            self._end(
+                link,
+                made,
+                "failed",
+                _("{action} took longer than {seconds} s").format(
+                    action=made.action, seconds=number(made.timeout_s or 0.0)
+                ),
+            )
 
     def _mute(self, link: RobotLink, made: Invocation, sentence: str) -> None:
         link.mute = True

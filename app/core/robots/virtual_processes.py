@@ -16,6 +16,7 @@ from typing import IO
 
 from app.core.network.master import MasterStart
 from app.robots.identity import Identity
+from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
 
 END_WAIT_S = 2.0
@@ -83,20 +84,20 @@ class Companions:
         """The virtual robots started here whose processes have ended by themselves."""
         self._master = MasterStart(
             address,
-            lambda why: post_event(CompanionFailed("master", "The master can't be started.", why, False)),
+            lambda why: post_event(CompanionFailed("master", _("The master can't be started."), why, False)),
         )
 
     @property
     def virtual_robots(self) -> tuple[str, ...]:
         """The names of the virtual robots that run because Studio started them."""
         with self._lock:
-            return tuple(name for name, (process, _) in self._robots.items() if process.poll() is None)
+            return tuple(name for name, (process, _log) in self._robots.items() if process.poll() is None)
 
     @property
     def process_ids(self) -> tuple[int, ...]:
         """The processes of the virtual robots that were started here and run."""
         with self._lock:
-            return tuple(process.pid for process, _ in self._robots.values() if process.poll() is None)
+            return tuple(process.pid for process, _log in self._robots.values() if process.poll() is None)
 
     @property
     def started_master(self) -> bool:
@@ -163,7 +164,9 @@ class Companions:
             except OSError as error:
                 log.close()
                 self._post_event(
-                    CompanionFailed(name, f"The virtual robot {name} can't be started.", str(error))
+                    CompanionFailed(
+                        name, _("The virtual robot {robot} can't be started.").format(robot=name), str(error)
+                    )
                 )
                 return
             self._robots[name] = (process, log)
@@ -192,11 +195,15 @@ class Companions:
     def check(self) -> None:
         """Notice processes that ended by themselves (called once in a while by the session's tick)."""
         with self._lock:
-            ended = [name for name, (process, _) in self._robots.items() if process.poll() is not None]
+            ended = [name for name, (process, _log) in self._robots.items() if process.poll() is not None]
             for name in ended:
-                _, log = self._robots.pop(name)
+                _process, log = self._robots.pop(name)
                 self.ended |= {name}
-                self._post_event(CompanionFailed(name, f"The virtual robot {name} has ended.", _tail(log)))
+                self._post_event(
+                    CompanionFailed(
+                        name, _("The virtual robot {robot} has ended.").format(robot=name), _tail(log)
+                    )
+                )
                 log.close()
 
     def close(self) -> None:

@@ -14,6 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from nep.i18n import _, number
 from nep.system.replace_file import replace_file
 
 LEFT_AFTER_S = 60.0
@@ -32,14 +33,20 @@ def read_whole(path: Path, most_bytes: int = LARGEST_BYTES) -> bytes:
     try:
         about = os.fstat(handle)
         if not stat.S_ISREG(about.st_mode):
-            raise OSError(errno.EINVAL, "it is no file but a folder, a pipe or a device", str(path))
+            raise OSError(errno.EINVAL, _("it is no file but a folder, a pipe or a device"), str(path))
         with os.fdopen(handle, "rb", closefd=False) as file:
             data = file.read(most_bytes + 1) if about.st_size <= most_bytes else b""
     finally:
         os.close(handle)
     if about.st_size > most_bytes or len(data) > most_bytes:
         size, most = max(about.st_size, len(data)) / 1e6, most_bytes / 1e6
-        raise OSError(errno.EFBIG, f"it has {size:.1f} MB, and at most {most:.0f} MB are read", str(path))
+        raise OSError(
+            errno.EFBIG,
+            _("it has {size} MB, and at most {most} MB are read").format(
+                size=number(size, ".1f"), most=number(most, ".0f")
+            ),
+            str(path),
+        )
     return data
 
 

@@ -16,6 +16,7 @@ from app.robots.description.json_access import as_part, part, text
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from app.robots.description.parser import read
 from app.robots.description.validate import validate
+from nep.i18n import _, number
 from nep.messages.message import Message
 from nep.text import harmless
 
@@ -43,7 +44,7 @@ def parse(document: Mapping[str, object]) -> Robot:
     problems = validate(document)
     if problems:
         title = as_part(document).get("title")
-        raise DescriptionError(title if isinstance(title, str) else "a robot", problems)
+        raise DescriptionError(title if isinstance(title, str) else _("a robot"), problems)
     cleaned = _cleaned(document)
     if cleaned != document:
         return parse(cleaned)
@@ -76,11 +77,13 @@ def announced(message: Message) -> Robot:
     """
     size = len(message.data)
     if size > LARGEST_BYTES:
-        said = f"it has {size / 1e6:.1f} MB, and at most {LARGEST_BYTES / 1e6:.0f} MB are read"
+        said = _("it has {size} MB, and at most {LARGEST_BYTES} MB are read").format(
+            size=number(size / 1000000.0, ".1f"), LARGEST_BYTES=number(LARGEST_BYTES / 1000000.0, ".0f")
+        )
         raise DescriptionError(message.topic, (said,))
     payload = message.payload
     if not isinstance(payload, Mapping):
-        raise DescriptionError(message.topic, ("a description must be a JSON object",))
+        raise DescriptionError(message.topic, (_("a description must be a JSON object"),))
     return parse(payload)
 
 

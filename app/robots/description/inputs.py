@@ -13,7 +13,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from app.robots.description.json_access import as_part, names, number, number_of, part, spoken, text
-from nep.i18n import listed, translate
+from nep.i18n import _, listed, ngettext, translate
+from nep.i18n import number as number_text
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
@@ -75,7 +76,7 @@ def pretty_number(value: float) -> str:
 def near_miss(wrong: str, known: Iterable[str]) -> str:
     """``; did you mean "turn"?`` when a known word is close, else nothing."""
     close = difflib.get_close_matches(wrong, list(known), n=1)
-    return f"; did you mean “{close[0]}”?" if close else ""
+    return _("; did you mean “{word}”?").format(word=close[0]) if close else ""
 
 
 def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
@@ -190,13 +191,17 @@ def _of_word(parameter: Parameter, word: str) -> object:
 def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
     """One sentence for each thing wrong with the input; empty when the robot may be asked."""
     if not isinstance(given, Mapping):
-        return (f"{action}: the input must be an object with named values",)
+        return (_("{action}: the input must be an object with named values").format(action=action),)
     known = {parameter.name: parameter for parameter in parameters}
     sentences = []
     for name in given:
         if name not in known:
             word = str(name)
-            sentences.append(f"{action}: there is no “{word}”{near_miss(word, known)}")
+            sentences.append(
+                _("{action}: there is no “{word}”{did_you_mean}").format(
+                    action=action, word=word, did_you_mean=near_miss(word, known)
+                )
+            )
     for name, parameter in known.items():
         if name in given and given[name] is None and parameter.nullable:
             continue
@@ -205,7 +210,7 @@ def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -
             if wrong is not None:
                 sentences.append(f"{action}: {parameter.title} {wrong}")
         elif parameter.required:
-            sentences.append(f"{action}: {parameter.title} is missing")
+            sentences.append(_("{action}: {value} is missing").format(action=action, value=parameter.title))
     return tuple(sentences)
 
 
@@ -214,14 +219,16 @@ def wrong_value(parameter: Parameter, value: object) -> str | None:
     if parameter.choices:
         if any(_same(choice.value, value) for choice in parameter.choices):
             return None
-        return f"must be {listed([choice.title for choice in parameter.choices], 'or')}"
+        return _("must be {choices}").format(
+            choices=listed([choice.title for choice in parameter.choices], "or")
+        )
     if parameter.kind in {"number", "integer", "angle"}:
         return _wrong_number(parameter, value)
     if parameter.kind == "boolean":
-        return None if isinstance(value, bool) else "must be yes or no"
+        return None if isinstance(value, bool) else _("must be yes or no")
     if parameter.kind == "colour":
         good = isinstance(value, str) and _COLOUR.fullmatch(value) is not None
-        return None if good else "must be a colour like #20c0e0"
+        return None if good else _("must be a colour like #20c0e0")
     if parameter.kind == "list":
         return _wrong_list(parameter, value)
     if parameter.kind == "object":
@@ -231,34 +238,38 @@ def wrong_value(parameter: Parameter, value: object) -> str | None:
 
 def _wrong_list(parameter: Parameter, value: object) -> str | None:
     if not isinstance(value, (list, tuple)):
-        return "must be a list"
+        return _("must be a list")
     least, most = parameter.min_length, parameter.max_length
     if least == most and len(value) != least:
-        return f"must have {least} values"
+        return ngettext("must have {count} value", "must have {count} values", least).format(count=least)
     if len(value) < least:
-        return f"must have at least {least} {'value' if least == 1 else 'values'}"
+        return ngettext(
+            "must have at least {count} value", "must have at least {count} values", least
+        ).format(count=least)
     if most is not None and len(value) > most:
-        return f"must have at most {most} {'value' if most == 1 else 'values'}"
+        return ngettext("must have at most {count} value", "must have at most {count} values", most).format(
+            count=most
+        )
     for place, item in enumerate(value):
         held = parameter.places[place] if place < len(parameter.places) else parameter.each
         wrong = None if held is None else wrong_value(held, item)
         if held is None and not _is_json(item):
-            wrong = "is nothing that a list can hold"
+            wrong = _("is nothing that a list can hold")
         if wrong is not None:
-            return f"value {place + 1} {wrong}"
+            return _("value {place} {wrong}").format(place=place + 1, wrong=wrong)
     return None
 
 
 def _wrong_object(parameter: Parameter, value: object) -> str | None:
     if not isinstance(value, Mapping):
-        return "must be an object with named values"
+        return _("must be an object with named values")
     known = {field.name: field for field in parameter.fields}
     for name, field in known.items():
         if name not in value and not field.required:
             continue
         if name in value and value[name] is None and field.nullable:
             continue
-        wrong = wrong_value(field, value[name]) if name in value else "is missing"
+        wrong = wrong_value(field, value[name]) if name in value else _("is missing")
         if wrong is not None:
             return f"{field.title} {wrong}"
     for name, item in value.items():
@@ -266,7 +277,9 @@ def _wrong_object(parameter: Parameter, value: object) -> str | None:
             continue
         wrong = None if parameter.each is None else wrong_value(parameter.each, item)
         if known and parameter.each is None:
-            return f"has no “{name}”{near_miss(str(name), known)}"
+            return _("has no “{word}”{did_you_mean}").format(
+                word=name, did_you_mean=near_miss(str(name), known)
+            )
         if wrong is not None:
             return f"“{name}” {wrong}"
     return None
@@ -287,20 +300,19 @@ def _same(allowed: object, given: object) -> bool:
 
 def _wrong_number(parameter: Parameter, value: object) -> str | None:
     whole = parameter.kind == "integer"
-    noun = "a whole number" if whole else "a number"
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not _is_finite(value):
-        return f"must be {noun}"
+        return _("must be a whole number") if whole else _("must be a number")
     if whole and float(value) != int(value):
-        return f"must be {noun}"
+        return _("must be a whole number")
     low, high = parameter.minimum, parameter.maximum
     if (low is None or value >= low) and (high is None or value <= high):
         return None
     unit = "" if parameter.unit is None else f" {parameter.unit}"
     if low is not None and high is not None:
-        return f"must be between {pretty_number(low)} and {pretty_number(high)}{unit}"
+        return _("must be between {low} and {high}").format(low=_shown(low), high=f"{_shown(high)}{unit}")
     if low is not None:
-        return f"must be at least {pretty_number(low)}{unit}"
-    return f"must be at most {pretty_number(high or 0.0)}{unit}"
+        return _("must be at least {low}").format(low=f"{_shown(low)}{unit}")
+    return _("must be at most {high}").format(high=f"{_shown(high or 0.0)}{unit}")
 
 
 def _is_finite(value: float) -> bool:
@@ -312,11 +324,21 @@ def _is_finite(value: float) -> bool:
 
 def _wrong_text(parameter: Parameter, value: object) -> str | None:
     if not isinstance(value, str):
-        return "must be text"
+        return _("must be text")
     if len(value) < parameter.min_length:
         return (
-            "must not be empty" if parameter.min_length == 1 else f"needs {parameter.min_length} characters"
+            _("must not be empty")
+            if parameter.min_length == 1
+            else _("needs {count} characters").format(count=parameter.min_length)
         )
     if parameter.max_length is not None and len(value) > parameter.max_length:
-        return f"must be at most {parameter.max_length} characters long"
+        return ngettext(
+            "must be at most {count} character long",
+            "must be at most {count} characters long",
+            parameter.max_length,
+        ).format(count=parameter.max_length)
     return None
+
+
+def _shown(value: float) -> str:
+    return number_text(value, ".10g")

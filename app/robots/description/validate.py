@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from app import resources
 from app.robots.description.inputs import parameter_of, wrong_value
 from app.robots.description.json_access import as_part, names, part
-from nep.i18n import listed
+from nep.i18n import _, lazy, listed
 from nep.text import control_in
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def _validator() -> Draft7Validator:
 def validate(model: object) -> tuple[str, ...]:
     """What is wrong with a Thing Model or Thing Description, one sentence each; empty when it can be used."""
     if not isinstance(model, Mapping):
-        return ("a description must be a JSON object",)
+        return (_("a description must be a JSON object"),)
     model = dict(model)
     strange = _not_json(model, count(1))
     if strange is not None:
@@ -51,7 +51,11 @@ def validate(model: object) -> tuple[str, ...]:
     problems = [_sentence(error) for error in islice(_validator().iter_errors(model), _MOST_PROBLEMS)]
     control = control_in(str(model.get("title")))
     if control:
-        problems.append(f"title: '{control}' can't be used in a name, which would look like another one")
+        problems.append(
+            _("title: '{control}' can't be used in a name, which would look like another one").format(
+                control=control
+            )
+        )
     if not problems:
         problems = list(_contradictions(model))
     return tuple(dict.fromkeys(problems))[:_MOST_PROBLEMS]
@@ -63,15 +67,14 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
     `seen` counts the values.
     """
     if next(seen) > MOST_VALUES or depth > _DEEPEST:
-        deep = f"{path} is nested too deeply"
-        return deep if depth > _DEEPEST else f"the description has more than {MOST_VALUES} values"
+        if depth > _DEEPEST:
+            return _("{place} is nested too deeply").format(place=path)
+        return _("the description has more than {count} values").format(count=MOST_VALUES)
     if isinstance(value, dict):
         for key, item in value.items():
-            if not isinstance(key, str):
-                return f"{path or 'the description'} has a name that is not text: {key!r}"
-            if key == "$ref":
-                return f"{path or 'the description'} uses $ref, which is not allowed here; write the part out"
-            found = _not_json(item, seen, f"{path}.{key}" if path else key, depth + 1)
+            found = _bad_key(key, path or _(WHOLE)) or _not_json(
+                item, seen, f"{path}.{key}" if path else str(key), depth + 1
+            )
             if found is not None:
                 return found
         return None
@@ -81,54 +84,71 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
         )
         return next((found for found in found_items if found is not None), None)
     if isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
-        return f"{path} is no usable number"
+        return _("{place} is no usable number").format(place=path)
     if value is None or isinstance(value, (str, bool, int, float)):
         return None
-    return f"{path} is not JSON: {type(value).__name__}"
+    return _("{place} is not JSON: {kind}").format(place=path, kind=type(value).__name__)
+
+
+def _bad_key(key: object, place: str) -> str | None:
+    if not isinstance(key, str):
+        return _("{place} has a name that is not text: {name}").format(place=place, name=repr(key))
+    if key == "$ref":
+        return _("{place} uses $ref, which is not allowed here; write the part out").format(place=place)
+    return None
 
 
 # ---- sentences for what the schema finds ----------------------------------------------------------
 
 _TYPE_WORDS = {
-    "string": "text",
-    "number": "a number",
-    "integer": "a whole number",
-    "boolean": "true or false",
-    "object": "an object",
-    "array": "a list",
+    "string": lazy("text"),
+    "number": lazy("a number"),
+    "integer": lazy("a whole number"),
+    "boolean": lazy("true or false"),
+    "object": lazy("an object"),
+    "array": lazy("a list"),
     "null": "null",
 }
 
 
+_EMPTY = lazy("{place} must not be empty")
+_LONG = lazy("{place} has more than {limit} entries")
+_RULES = {
+    "minimum": lazy("{place} must be at least {limit}"),
+    "exclusiveMinimum": lazy("{place} must be above {limit}"),
+    "maximum": lazy("{place} must be at most {limit}"),
+    "minLength": _EMPTY,
+    "maxLength": lazy("{place} is longer than {limit} characters"),
+    "minItems": _EMPTY,
+    "minProperties": _EMPTY,
+    "maxItems": _LONG,
+    "maxProperties": _LONG,
+    "anyOf": lazy("{place} has the wrong form"),
+}
+NOT_UNDERSTOOD = lazy("{place} can not be understood")
+WHOLE = lazy("the description")
+
+
 def _sentence(error: ValidationError) -> str:
-    place = ".".join(str(part) for part in error.absolute_path) or "the description"
+    place = ".".join(str(part) for part in error.absolute_path) or _(WHOLE)
     rule = str(error.validator)
     limit: object = error.validator_value
     if rule == "required":  # one error for each missing name, which only its message tells
-        return f"{place} has no '{error.message.split(chr(39))[1]}'"
+        return _("{place} has no '{name}'").format(place=place, name=error.message.split("'")[1])
     if rule == "type":
         kinds = limit if isinstance(limit, list) else [limit]
-        return f"{place} must be {listed([_TYPE_WORDS.get(str(kind), str(kind)) for kind in kinds], 'or')}"
+        words = listed([_(_TYPE_WORDS.get(str(kind), str(kind))) for kind in kinds], "or")
+        return _("{place} must be {kinds}").format(place=place, kinds=words)
     if rule == "enum":
-        return f"{place} must be one of {', '.join(names(limit))}"
+        return _("{place} must be one of {names}").format(place=place, names=", ".join(names(limit)))
     if rule == "const":
-        return f"{place} must be {limit}"
-    words = {
-        "minimum": f"must be at least {limit}",
-        "exclusiveMinimum": f"must be above {limit}",
-        "maximum": f"must be at most {limit}",
-        "minLength": "must not be empty",
-        "maxLength": f"is longer than {limit} characters",
-        "minItems": "must not be empty",
-        "minProperties": "must not be empty",
-        "maxItems": f"has more than {limit} entries",
-        "maxProperties": f"has more than {limit} entries",
-        "anyOf": "has the wrong form",
-    }
+        return _("{place} must be {value}").format(place=place, value=limit)
     if rule == "pattern":
         shown = _shortened(error.instance)
-        return f"{place}: {shown} can't be used here; use letters, digits, - and _ without spaces"
-    return f"{place} {words.get(rule, 'can not be understood')}"
+        return _("{place}: {value} can't be used here; use letters, digits, - and _ without spaces").format(
+            place=place, value=shown
+        )
+    return _(_RULES.get(rule, NOT_UNDERSTOOD)).format(place=place, limit=limit)
 
 
 def _shortened(value: object) -> str:
@@ -144,12 +164,12 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     properties = part(model, "properties")
     stop = str(part(model, "rb:safeStop").get("action"))
     if stop not in actions:
-        yield f"rb:safeStop.action names '{stop}', but there is no such action"
+        yield _("rb:safeStop.action names '{stop}', but there is no such action").format(stop=stop)
     elif part(part(actions, stop), "input").get("required"):
-        yield f"'{stop}' is the safe stop, so its input must not require anything"
+        yield _("'{stop}' is the safe stop, so its input must not require anything").format(stop=stop)
     resources_named = set(names(model.get("rb:resources")))
     for name in (set(properties) | _RESERVED) & set(part(model, "events")) | set(properties) & _RESERVED:
-        yield f"'{name}' names two things of one robot; its topics would be the same"
+        yield _("'{name}' names two things of one robot; its topics would be the same").format(name=name)
     for name, action in actions.items():
         yield from _of_action(name, as_part(action), resources_named, properties)
     for name, sensor in properties.items():
@@ -160,7 +180,9 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
         yield from _of_fields(f"events.{name}.data", data)
         for field in names(happening.get("rb:filter")):
             if field not in data:
-                yield f"events.{name}.rb:filter names '{field}', which is not in its data"
+                yield _("events.{name}.rb:filter names '{field}', which is not in its data").format(
+                    name=name, field=field
+                )
         yield from _of_texts(f"events.{name}", happening, data)
 
 
@@ -171,32 +193,38 @@ def _of_action(
     yield from _of_fields(f"actions.{name}.input", fields)
     for field in names(part(action, "input").get("required")):
         if field not in fields:
-            yield f"actions.{name}.input requires '{field}', which it does not describe"
+            yield _("actions.{name}.input requires '{field}', which it does not describe").format(
+                name=name, field=field
+            )
     for used in names(action.get("rb:uses")):
         if used not in resources_named:
-            yield f"actions.{name}.rb:uses names '{used}', which is not in rb:resources"
+            yield _("actions.{name}.rb:uses names '{used}', which is not in rb:resources").format(
+                name=name, used=used
+            )
     for field, data in fields.items():
         source = as_part(data).get("rb:optionsFrom")
         if source is not None and source not in properties:
-            yield f"actions.{name}.input.{field} takes its options from '{source}', which is no property"
+            yield _(
+                "actions.{name}.input.{field} takes its options from '{source}', which is no property"
+            ).format(name=name, field=field, source=source)
     yield from _of_texts(f"actions.{name}", action, fields)
 
 
 def _of_fields(place: str, fields: Mapping[str, object]) -> Iterator[str]:
     for name, data in fields.items():
         if name == "robot":
-            yield f"{place}: 'robot' is taken; name the value differently"
+            yield _("{place}: 'robot' is taken; name the value differently").format(place=place)
         yield from _of_data(f"{place}.{name}", as_part(data))
 
 
 def _of_data(place: str, data: Mapping[str, object]) -> Iterator[str]:
     low, high = data.get("minimum"), data.get("maximum")
     if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low > high:
-        yield f"{place}: minimum {low} is above maximum {high}"
+        yield _("{place}: minimum {low} is above maximum {high}").format(place=place, low=low, high=high)
     elif data.get("default") is not None:
         wrong = wrong_value(parameter_of(place, data), data["default"])
         if wrong is not None:
-            yield f"{place}: the default {wrong}"
+            yield _("{place}: the default {wrong}").format(place=place, wrong=wrong)
 
 
 def _of_texts(place: str, owner: Mapping[str, object], fields: Mapping[str, object]) -> Iterator[str]:
@@ -206,6 +234,10 @@ def _of_texts(place: str, owner: Mapping[str, object], fields: Mapping[str, obje
             used = PLACEHOLDER.findall(str(text))
             for name in used:
                 if name != "robot" and name not in fields:
-                    yield f"{place}.rb:block.{kind}.{language} uses %{name}, which is not described"
+                    yield _("{place}.rb:block.{kind}.{language} uses %{name}, which is not described").format(
+                        place=place, kind=kind, language=language, name=name
+                    )
             if kind == "text" and len(used) != len(set(used)):
-                yield f"{place}.rb:block.text.{language} uses a value twice"
+                yield _("{place}.rb:block.text.{language} uses a value twice").format(
+                    place=place, language=language
+                )

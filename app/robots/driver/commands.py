@@ -17,6 +17,7 @@ from app.robots.driver.schema_values import given
 from app.robots.driver.task import Answer, ProgramId, Task
 from app.robots.driver.tasks import NOTHING_RUNS, Tasks
 from app.robots.identity import program_of
+from nep.i18n import _
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 Done: TypeAlias = Callable[[object, Call], object]
@@ -68,7 +69,9 @@ class Desk:
             task = str(message.get("action") or ""), message.get("input")
             self._invoke(wanted, *task, program, publisher)
         else:
-            error = f"there is no “{operation}”; a command is invoke, cancel, stop or alive"
+            error = _("there is no “{operation}”; a command is invoke, cancel, stop or alive").format(
+                operation=operation
+            )
             self._answering(wanted, str(operation), "")(Answer("failed", error=error))
 
     def beat(self, not_ended: Sequence[str] = (), error: str | None = None) -> None:
@@ -99,7 +102,11 @@ class Desk:
             try:
                 return spec.returns.told(returned)
             except RobotValueError as error:
-                raise Failed(f"{action.name} was done, but its result is wrong: {error}") from error
+                raise Failed(
+                    _("{name} was done, but its result is wrong: {error}").format(
+                        name=action.name, error=error
+                    )
+                ) from error
 
         return Task(
             id=wanted,
@@ -118,7 +125,11 @@ class Desk:
 
     def unknown(self, name: str) -> str:
         """The sentence for an action that the robot has not."""
-        return f"{self._robot.name} can't “{name}”{near_miss(name, [a.name for a in self._robot.actions])}"
+        return _("{robot} can't “{action}”{did_you_mean}").format(
+            robot=self._robot.name,
+            action=name,
+            did_you_mean=near_miss(name, [each.name for each in self._robot.actions]),
+        )
 
     def _invoke(
         self, wanted: str, name: str, given: object, program: ProgramId | None, publisher: int | None
@@ -128,7 +139,7 @@ class Desk:
         answer = self._answering(wanted, "invoke", name)
         if program is not None and program.name in self._ended:
             # sent before its program was ended, come after the stop: it must not move the robot again
-            answer(Answer("canceled", error="its program was stopped"))
+            answer(Answer("canceled", error=_("its program was stopped")))
             return
         action = self._robot.action(name)
         if action is None:
@@ -147,8 +158,11 @@ class Desk:
     def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
         if error is not None and wanted in self._open and error == NOTHING_RUNS:
-            error = f"only who asked for “{name or wanted}” can cancel it; a stop is for everybody"
+            error = _("only who asked for “{action}” can cancel it; a stop is for everybody").format(
+                action=name or wanted
+            )
         if error is not None:
+            error = _(error) if error == NOTHING_RUNS else error
             self._answering(wanted, "cancel", name)(Answer("failed", error=error))
 
     def _answering(self, wanted: str, operation: str, name: str) -> Callable[[Answer], None]:

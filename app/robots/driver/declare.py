@@ -29,6 +29,7 @@ from app.robots.driver.schema import (
 )
 from app.robots.driver.schema_values import check_sendable, plain, told, told_fields
 from app.robots.driver.tasks import BEAT_S
+from nep.i18n import _
 
 Function = TypeVar("Function", bound=Callable[..., object])
 Described = TypeVar("Described")
@@ -285,7 +286,7 @@ class Kind:
         """The name of the stop method and what its decorator was told."""
         found = [(name, getattr(m, _STOP_MARK)) for name, m in self._members() if hasattr(m, _STOP_MARK)]
         if len(found) != 1:
-            raise DescriptionError(self.model, ("exactly one method must be marked with safe_stop",))
+            raise DescriptionError(self.model, (_("exactly one method must be marked with safe_stop"),))
         return found[0]
 
     def _twice(self, lines: Mapping[str, list[Line]]) -> list[str]:
@@ -293,12 +294,15 @@ class Kind:
         declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
         twice = [(name, found) for name, found in lines.items() if len(found) > 1 and name in declared]
         return [
-            f"{found[-1]}: '{name}' is there twice, first in line {found[0].number}" for name, found in twice
+            _("{found}: '{name}' is there twice, first in line {number}").format(
+                found=found[-1], name=name, number=found[0].number
+            )
+            for name, found in twice
         ]
 
     def _members(self) -> list[tuple[str, object]]:
         if not isinstance(self.body, type):
-            raise DescriptionError(self.model, ("a robot is declared by a class",))
+            raise DescriptionError(self.model, (_("a robot is declared by a class"),))
         found: dict[str, object] = {}
         for owner in reversed(self.body.__mro__):
             found.update(vars(owner))
@@ -340,10 +344,12 @@ class Kind:
 def _check_function(function: Callable[..., object]) -> None:
     """TypeError for a function that could not be called, or that would not run when it is."""
     if inspect.isgeneratorfunction(function) or inspect.isasyncgenfunction(function):
-        raise TypeError("it has a yield, so a call would run nothing; tell what happens with call.feedback")
+        raise TypeError(
+            _("it has a yield, so a call would run nothing; tell what happens with call.feedback")
+        )
     names = list(inspect.signature(function).parameters)
     if names[1:2] != ["call"]:
-        raise TypeError("after 'self' an action takes its call; write def NAME(self, call: Call, ...)")
+        raise TypeError(_("after 'self' an action takes its call; write def NAME(self, call: Call, ...)"))
 
 
 def _described(schema: Callable[[Described], Schema], kind: Described) -> Schema:
@@ -382,7 +388,7 @@ class Line:
 
     def __str__(self) -> str:
         """In words."""
-        return f"{self.file}, line {self.number}"
+        return _("{file}, line {number}").format(file=self.file, number=self.number)
 
 
 def line_of(function: object) -> Line | None:

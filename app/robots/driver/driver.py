@@ -24,6 +24,7 @@ from app.robots.driver.declare import Kind
 from app.robots.driver.rize_dialect import Dialect
 from app.robots.driver.schema_values import told_fields
 from app.robots.driver.tasks import Tasks
+from nep.i18n import _, number
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -48,7 +49,12 @@ class Driver:
         self.robot = parse(self.description)
         if len(json.dumps(self.description)) > LARGEST_BYTES:
             raise DescriptionError(
-                name, (f"it is larger than {LARGEST_BYTES / 1e6:.0f} MB; nobody would read it",)
+                name,
+                (
+                    _("it is larger than {LARGEST_BYTES} MB; nobody would read it").format(
+                        LARGEST_BYTES=number(LARGEST_BYTES / 1000000.0, ".0f")
+                    ),
+                ),
             )
         self._node = node
         self.clock = clock or MonotonicClock()
@@ -156,8 +162,12 @@ class Driver:
         try:
             told = spec.told(value)
         except RobotValueError as error:
-            what = "" if spec.is_object else "the value "
-            raise RobotValueError(f"{self.name}'s sensor '{sensor}': {what}{error}") from error
+            words = (
+                _("{robot}'s sensor '{sensor}': {error}")
+                if spec.is_object
+                else _("{robot}'s sensor '{sensor}': the value {error}")
+            )
+            raise RobotValueError(words.format(robot=self.name, sensor=sensor, error=error)) from error
         self._publish(topic_of(self.name, sensor), told)
 
     def happen(self, event: str, **data: object) -> None:
@@ -169,7 +179,9 @@ class Driver:
         try:
             data = told_fields(spec.fields, data)
         except RobotValueError as error:
-            raise RobotValueError(f"{self.name}'s event '{event}': {error}") from error
+            raise RobotValueError(
+                _("{robot}'s event '{event}': {error}").format(robot=self.name, event=event, error=error)
+            ) from error
         self._publish(topic_of(self.name, event), data)
         if spec.to_rize is not None:
             primitive, given = spec.to_rize(data)
@@ -270,9 +282,9 @@ class EventLoop:
         self._soon(partial(waited.begin, loop, f"{self._name}: {call.action if call else 'run'}"))
         if call is not None:
             call.on_cancel(partial(self._soon, waited.cancel))
-        if not waited.ended.wait(within_s):
+        if not waited.ended.wait(within_s) and within_s is not None:
             self._soon(waited.cancel)
-            raise TimeoutError(f"it has not ended within {within_s:g} s")
+            raise TimeoutError(_("it has not ended within {seconds} s").format(seconds=number(within_s)))
         if waited.error is not None:
             raise waited.error
         return waited.result
@@ -294,8 +306,11 @@ class EventLoop:
             if self._closed or threading.current_thread() is self._thread:
                 if asyncio.iscoroutine(work):
                     work.close()
-                why = "the robot has ended" if self._closed else "use await: this is the event loop itself"
-                raise RuntimeError(f"a coroutine can't be run here; {why}")
+                if self._closed:
+                    raise RuntimeError(_("a coroutine can't be run here; the robot has ended"))
+                raise RuntimeError(
+                    _("a coroutine can't be run here; use await: this is the event loop itself")
+                )
             if self._loop is None:
                 self._loop = asyncio.new_event_loop()
                 name = f"{self._name} asyncio"

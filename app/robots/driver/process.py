@@ -20,6 +20,7 @@ from app.robots.description.description import topic_of
 from app.robots.driver.call import Failed
 from app.robots.driver.declare import Kind
 from app.robots.driver.driver import Driver
+from nep.i18n import _
 from nep.system.addresses import master_address
 from nep.system.terminal import Terminal, log_to
 from nep.text import escaped
@@ -34,10 +35,10 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     0 on an orderly end, 1 when the robot can't be connected (its class raised Failed) or described, 2 for
     wrong arguments.
     """
-    parser = argparse.ArgumentParser(description=f"Drive a robot: {kind.title}.")
-    parser.add_argument("--name", default=kind.title, help="the robot's name; its topics begin with it")
-    parser.add_argument("--master", default=None, help="the master's address (default: $NEP_MASTER)")
-    parser.add_argument("--owner-pid", type=int, default=None, help="end when this process is gone")
+    parser = argparse.ArgumentParser(description=_("Drive a robot: {title}.").format(title=kind.title))
+    parser.add_argument("--name", default=kind.title, help=_("the robot's name; its topics begin with it"))
+    parser.add_argument("--master", default=None, help=_("the master's address (default: $NEP_MASTER)"))
+    parser.add_argument("--owner-pid", type=int, default=None, help=_("end when this process is gone"))
     chosen = parser.parse_args(arguments)
     ended = threading.Event()
     _on_signals(ended)
@@ -78,19 +79,30 @@ def run(
     address = master_address(master)
     with Terminal(sys.stdout) as said, nep.node(name, master=master) as node, _published(node):
         driver = Driver(kind, name, node)
-        model = f"virtual {kind.model}" if kind.virtual else kind.model
-        _say(f"{name}: a robot, model {model}; its topics are {topic_of(name, '...')}", said)
+        words = (
+            _("{robot}: a robot, model virtual {model}; its topics are {topics}")
+            if kind.virtual
+            else _("{robot}: a robot, model {model}; its topics are {topics}")
+        )
+        _say(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")), said)
         has_waited = False
         try:
             while not _started(driver):
                 if not has_waited:
-                    start = "start Studio or `nep master`"
-                    _say(f"{name}: no master answers at {address}; waiting for one, {start}", said)
+                    words = _(
+                        "{robot}: no master answers at {address}; waiting for one, "
+                        "start Studio or `nep master`"
+                    )
+                    _say(words.format(robot=name, address=address), said)
                 has_waited = True
                 if _over(ended, owner):
                     return
-            found = "found the master" if has_waited else "the master is"
-            _say(f"{name}: {found} at {address}; the robot is ready, Ctrl+C ends it", said)
+            words = (
+                _("{robot}: found the master at {address}; the robot is ready, Ctrl+C ends it")
+                if has_waited
+                else _("{robot}: the master is at {address}; the robot is ready, Ctrl+C ends it")
+            )
+            _say(words.format(robot=name, address=address), said)
             while not _over(ended, owner):
                 ended.wait(_OWNER_CHECK_S)
         finally:

@@ -15,6 +15,7 @@ from typing import Annotated, Any, NoReturn, TypeAlias, get_args, get_origin, ge
 from app.errors import RobotValueError
 from app.robots.description.json_access import as_part
 from app.robots.driver.schema_values import bare, choices_in, fields_of, shown, told, without_none
+from nep.i18n import _
 
 Schema: TypeAlias = dict[str, object]
 _LONGEST_UNIT = 16
@@ -123,27 +124,39 @@ def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
         free = arguments[1] in (Any, object)
         return {"type": "object"} | ({} if free else {"additionalProperties": _held(arguments[1], inside)})
     if annotation in inside:
-        raise TypeError(f"a robot's value can't hold itself: {shown(annotation)}")
+        raise TypeError(
+            _("a robot's value can't hold itself: {annotation}").format(annotation=shown(annotation))
+        )
     fields = fields_of(annotation)
     if fields is not None:
         return _object(fields, (*inside, annotation))
     raise TypeError(
-        f"a robot's value can't be {shown(annotation)}; use float, int, bool, str, list[...], tuple[...], "
-        "dict[str, ...], Literal, Optional, an Enum, a dataclass or a TypedDict"
+        _(
+            "a robot's value can't be {annotation}; use float, int, bool, str, list[...], "
+            "tuple[...], dict[str, ...], Literal, Optional, an Enum, a dataclass or a TypedDict"
+        ).format(annotation=shown(annotation))
     )
 
 
 def _held(annotation: object, inside: tuple[object, ...]) -> Schema:
     """What a list or the like holds: always a value, never None."""
     if without_none(bare(annotation)[0])[1]:
-        raise TypeError(f"a robot's list can't hold None: {shown(annotation)}; leave the value out")
+        raise TypeError(
+            _("a robot's list can't hold None: {annotation}; leave the value out").format(
+                annotation=shown(annotation)
+            )
+        )
     return _schema_of(annotation, inside)
 
 
 def _choice(annotation: object, choices: tuple[tuple[object, object, str | None], ...]) -> Schema:
     values = [value for value, _, _ in choices]
     if not all(isinstance(value, (str, int, float)) and not isinstance(value, bool) for value in values):
-        raise TypeError(f"a robot's choice is between texts or numbers, not {shown(annotation)}; use bool")
+        raise TypeError(
+            _("a robot's choice is between texts or numbers, not {annotation}; use bool").format(
+                annotation=shown(annotation)
+            )
+        )
     texts = [isinstance(value, str) for value in values]
     schema: Schema = {} if any(texts) and not all(texts) else {"type": "string" if all(texts) else "number"}
     if any(word is not None for _, _, word in choices):
@@ -185,7 +198,7 @@ def _noted(note: object, schema: Schema) -> Schema:
         return {"pattern": "^#[0-9a-fA-F]{6}$", "rb:widget": "colour"}
     if isinstance(note, _PictureText):
         return {"format": "uri-reference", "contentMediaType": "image/jpeg", "rb:widget": "image"}
-    raise TypeError(f"{note!r} says nothing about a robot's value")
+    raise TypeError(_("{note} says nothing about a robot's value").format(note=repr(note)))
 
 
 def _given(found: Mapping[str, object]) -> Schema:
@@ -197,12 +210,18 @@ def _check_unit(unit: object) -> None:
     if unit is None:
         return
     if not isinstance(unit, str):
-        raise TypeError(f"a unit is a text like 'm', not {unit!r}; write Range(0, 1, unit='m')")
+        raise TypeError(
+            _("a unit is a text like 'm', not {unit}; write Range(0, 1, unit='m')").format(unit=repr(unit))
+        )
     sign = _UNIT_WORDS.get(unit.lower())
     if sign is not None:
-        raise TypeError(f"there is no unit {unit!r}; write {sign!r}")
+        raise TypeError(_("there is no unit {unit}; write {sign}").format(unit=repr(unit), sign=repr(sign)))
     if not unit or len(unit) > _LONGEST_UNIT or not unit.isprintable() or " " in unit:
-        raise TypeError(f"there is no unit {unit!r}; write it as UCUM does: 'm', 'deg', 's', 'm/s', '%'")
+        raise TypeError(
+            _("there is no unit {unit}; write it as UCUM does: 'm', 'deg', 's', 'm/s', '%'").format(
+                unit=repr(unit)
+            )
+        )
 
 
 def input_types(function: Callable[..., object]) -> dict[str, object]:
@@ -215,14 +234,20 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
         if name in {"self", "call"}:
             continue
         if parameter.kind is parameter.VAR_POSITIONAL or parameter.kind is parameter.VAR_KEYWORD:
-            raise TypeError(f"'{name}' can't stand for any number of values; name each, or take a list")
+            raise TypeError(
+                _("'{name}' can't stand for any number of values; name each, or take a list").format(
+                    name=name
+                )
+            )
         if parameter.kind is parameter.POSITIONAL_ONLY:
-            raise TypeError(f"'{name}' must be given by its name; leave out the '/'")
+            raise TypeError(_("'{name}' must be given by its name; leave out the '/'").format(name=name))
         if name not in hints:
-            where = f"{function.__qualname__}: '{name}' has no type"
-            if place < 2 and "call" not in {each.name for each in parameters}:
-                raise TypeError(f"{where}; after 'self' an action takes 'call: Call'")
-            raise TypeError(f"{where}; robots need to know it")
+            words = (
+                _("{function}: '{value}' has no type; after 'self' an action takes 'call: Call'")
+                if place < 2 and "call" not in {each.name for each in parameters}
+                else _("{function}: '{value}' has no type; robots need to know it")
+            )
+            raise TypeError(words.format(function=function.__qualname__, value=name))
         found[name] = hints[name]
     return found
 
@@ -261,7 +286,7 @@ def _default(kind: object, default: object, name: str) -> object:
     try:
         return told(kind, default)
     except RobotValueError as error:
-        raise TypeError(f"the default of '{name}' {error}") from error
+        raise TypeError(_("the default of '{name}' {error}").format(name=name, error=error)) from error
 
 
 def fields_schema(fields: Mapping[str, object]) -> Schema:

@@ -15,9 +15,15 @@ from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
 
 from app.errors import RobotValueError
-from nep.i18n import listed
+from nep.i18n import _, lazy, listed
 
 _LONGEST_SHOWN = 40
+_SIMPLE = {
+    bool: lazy("must be True or False, not {value}"),
+    str: lazy("must be text, not {value}"),
+    int: lazy("must be a whole number, not {value}"),
+    float: lazy("must be a number, not {value}"),
+}
 _DEEPEST = 40
 
 
@@ -38,7 +44,11 @@ def without_none(annotation: object) -> tuple[object, bool]:
     if set(kinds) == {int, float}:
         return float, is_optional
     if len(kinds) != 1:
-        raise TypeError(f"a robot's value can't be one of several types: {shown(annotation)}")
+        raise TypeError(
+            _("a robot's value can't be one of several types: {annotation}").format(
+                annotation=shown(annotation)
+            )
+        )
     return kinds[0], is_optional
 
 
@@ -106,14 +116,14 @@ def given(annotation: object, value: object) -> object:
         return None
     choices = choices_in(kind)
     if choices is not None:
-        return next((python for json, python, _ in choices if same(json, value)), value)
+        return next((python for json, python, _title in choices if same(json, value)), value)
     if kind is float and isinstance(value, (int, float)):
         return float(value)
     if kind is int and isinstance(value, (int, float)):
         return int(value)
     fields = fields_of(kind)
     if fields is not None and isinstance(value, Mapping):
-        made = {name: given(each, value[name]) for name, (each, _) in fields.items() if name in value}
+        made = {name: given(each, value[name]) for name, (each, _must) in fields.items() if name in value}
         if not dataclasses.is_dataclass(kind):
             return made
         absent = {name: None for name, (each, must) in fields.items() if must and name not in made}
@@ -140,16 +150,20 @@ def told(annotation: object, value: object) -> object:
     value = _out_of_numpy(value)
     choices = choices_in(kind)
     if choices is not None:
-        found = [json for json, python, _ in choices if python is value or same(json, value)]
+        found = [json for json, python, _title in choices if python is value or same(json, value)]
         if not found:
-            words = [str(json) for json, _, _ in choices]
-            raise RobotValueError(f"must be {listed(words, 'or')}, not {_shown_value(value)}")
+            words = [str(json) for json, _python, _title in choices]
+            raise RobotValueError(
+                _("must be {choices}, not {value}").format(
+                    choices=listed(words, "or"), value=_shown_value(value)
+                )
+            )
         return found[0]
     if kind in (float, int, bool, str):
         return _simple(kind, value)
     fields = fields_of(kind)
     if fields is not None:
-        return told_fields({name: each for name, (each, _) in fields.items()}, value, _required(fields))
+        return told_fields({name: each for name, (each, _must) in fields.items()}, value, _required(fields))
     return _many(kind, value)
 
 
@@ -165,8 +179,9 @@ def told_fields(
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
     if not isinstance(value, Mapping):
+        wanted = listed(list(kinds)) or _("named values")
         raise RobotValueError(
-            f"must have {listed(list(kinds)) or 'named values'}, not be {_shown_value(value)}"
+            _("must have {names}, not be {value}").format(names=wanted, value=_shown_value(value))
         )
     made: dict[str, object] = {}
     for name, each in value.items():
@@ -177,7 +192,7 @@ def told_fields(
             raise RobotValueError(f"{name} {error}") from error
     for name in required:
         if name not in made:
-            raise RobotValueError(f"{name} is missing")
+            raise RobotValueError(_("{name} is missing").format(name=name))
     return made
 
 
@@ -193,22 +208,22 @@ def plain(value: object, depth: int = 0) -> object:
     if isinstance(value, numbers.Real):
         return float(value)
     if depth > _DEEPEST:
-        raise RobotValueError("is nested too deeply")
+        raise RobotValueError(_("is nested too deeply"))
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(name): plain(item, depth + 1) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item, depth + 1) for item in value]
-    raise RobotValueError(f"must be what JSON has, not {_shown_value(value)}")
+    raise RobotValueError(_("must be what JSON has, not {value}").format(value=_shown_value(value)))
 
 
 def check_sendable(value: object) -> None:
     """RobotValueError when a message can't hold a JSON value: an endless number, half a letter."""
     if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
-        raise RobotValueError("must be text of whole letters")
+        raise RobotValueError(_("must be text of whole letters"))
     if isinstance(value, float) and not math.isfinite(value):
-        raise RobotValueError(f"must be a finite number, not {value}")
+        raise RobotValueError(_("must be a finite number, not {value}").format(value=value))
     if isinstance(value, Mapping):
         for item in value.values():
             check_sendable(item)
@@ -223,8 +238,7 @@ def same(allowed: object, value: object) -> bool:
 
 
 def _simple(kind: object, value: object) -> object:
-    nouns = {bool: "True or False", str: "text", int: "a whole number", float: "a number"}
-    wanted, noun = next((each, noun) for each, noun in nouns.items() if each is kind)
+    wanted, words = next((each, words) for each, words in _SIMPLE.items() if each is kind)
     if wanted is bool or wanted is str:
         good = isinstance(value, wanted)
     else:
@@ -233,7 +247,7 @@ def _simple(kind: object, value: object) -> object:
         if good and found is not None:
             return found if wanted is float else int(found)
     if not good:
-        raise RobotValueError(f"must be {noun}, not {_shown_value(value)}")
+        raise RobotValueError(_(words).format(value=_shown_value(value)))
     return value
 
 
@@ -248,13 +262,17 @@ def _many(kind: object, value: object) -> object:
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in {dict, Mapping}:
         if not isinstance(value, Mapping):
-            raise RobotValueError(f"must be an object with named values, not {_shown_value(value)}")
+            raise RobotValueError(
+                _("must be an object with named values, not {value}").format(value=_shown_value(value))
+            )
         return {str(name): _placed(arguments[1], item, str(name)) for name, item in value.items()}
     if not isinstance(value, (list, tuple)):
-        raise RobotValueError(f"must be a list, not {_shown_value(value)}")
+        raise RobotValueError(_("must be a list, not {value}").format(value=_shown_value(value)))
     if origin is tuple and arguments[1:] != (Ellipsis,):
         if len(value) != len(arguments):
-            raise RobotValueError(f"must have {len(arguments)} values, not {len(value)}")
+            raise RobotValueError(
+                _("must have {count} values, not {given}").format(count=len(arguments), given=len(value))
+            )
         return [
             _placed(each, item, place)
             for place, (each, item) in enumerate(zip(arguments, value, strict=True), 1)
@@ -266,8 +284,9 @@ def _placed(kind: object, value: object, place: int | str) -> object:
     try:
         return told(kind, value)
     except RobotValueError as error:
-        name = f"“{place}”" if isinstance(place, str) else f"value {place}"
-        raise RobotValueError(f"{name} {error}") from error
+        if isinstance(place, str):
+            raise RobotValueError(f"“{place}” {error}") from error
+        raise RobotValueError(_("value {place} {wrong}").format(place=place, wrong=error)) from error
 
 
 def _required(fields: Mapping[str, tuple[object, bool]]) -> list[str]:

@@ -14,6 +14,8 @@ from functools import partial
 
 from app.robots.driver.call import Call, Canceled, Clock, Failed
 from app.robots.driver.task import Answer, ProgramId, Task
+from app.robots.identity import MAY_MOVE
+from nep.i18n import _, lazy, ngettext, number
 
 BEAT_S = 0.5
 """While something runs or waits, the robot says at least so often that it lives."""
@@ -26,8 +28,8 @@ _GRACE_S = 1.0
 _LONGEST_QUEUE = 50
 _MOST_RUNNING = 50
 """What uses nothing runs side by side, each in a thread of its own."""
-THE_STOP = "the stop itself"
-NOTHING_RUNS = "nothing with this id runs"
+THE_STOP = lazy("the stop itself")
+NOTHING_RUNS = lazy("nothing with this id runs")
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
 
@@ -139,7 +141,7 @@ class Tasks:
             self._take_unasked(answer)
             stopped.set()
 
-        self.call_soon(lambda: self.stop(take, "the driver ends"))
+        self.call_soon(lambda: self.stop(take, _("the driver ends")))
         stopped.wait(self._patience_s + _GRACE_S)
         self._closing.set()
         self._wake.set()
@@ -155,15 +157,21 @@ class Tasks:
             return
         clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
         if clashing and task.on_busy == "reject":
-            busy = f"{task.action}: {self._name} is busy with {clashing[0].title or clashing[0].action}"
+            busy = _("{action}: {robot} is busy with {other}").format(
+                action=task.action, robot=self._name, other=clashing[0].title or clashing[0].action
+            )
             task.finish(Answer("failed", error=busy))
             return
         if len(self._running) >= _MOST_RUNNING:
-            full = f"{task.action}: {_MOST_RUNNING} other actions run already"
+            full = _("{action}: {count} other actions run already").format(
+                action=task.action, count=_MOST_RUNNING
+            )
             task.finish(Answer("failed", error=full))
             return
         if len(self._queue) >= _LONGEST_QUEUE:
-            full = f"{task.action}: {_LONGEST_QUEUE} other actions are waiting already"
+            full = _("{action}: {count} other actions are waiting already").format(
+                action=task.action, count=_LONGEST_QUEUE
+            )
             task.finish(Answer("failed", error=full))
             return
         ended = []
@@ -172,7 +180,9 @@ class Tasks:
         waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in ended))
         replaces = tuple(dict.fromkeys(other.action for other in ended))
         task.answer(Answer("accepted", waits_for=waits_for, replaces=replaces))
-        replaced = Answer("canceled", error=f"{task.title or task.action} took its place")
+        replaced = Answer(
+            "canceled", error=_("{action} took its place").format(action=task.title or task.action)
+        )
         self._drop([other for other in ended if other in self._queue], replaced)
         for other in ended:
             self._end(other, replaced)
@@ -186,7 +196,7 @@ class Tasks:
             return NOTHING_RUNS
         stubborn = [task for task in found if task in self._running and not task.cancellable]
         if stubborn:
-            return f"{stubborn[0].action} can't be canceled; it ends by itself"
+            return _("{action} can't be canceled; it ends by itself").format(action=stubborn[0].action)
         self._drop([task for task in found if task in self._queue], Answer("canceled"))
         for task in found:
             self._end(task, Answer("canceled"))
@@ -247,7 +257,11 @@ class Tasks:
         stopped = [task for task in self._running if task.stopped]
         if self._stop_is_late or any(task.answered for task in stopped):
             return still_moving(self._name, self._not_ended())
-        return f"{self._name} is stopping" if self._stopper is not None or stopped else None
+        return (
+            _("{robot} is stopping").format(robot=self._name)
+            if self._stopper is not None or stopped
+            else None
+        )
 
     def _not_ended(self) -> tuple[str, ...]:
         """What goes on although it should have ended, and was answered so."""
@@ -283,7 +297,10 @@ class Tasks:
         acting = [task.program for task in (*self._running, *self._queue)]
         if self._watchdog.bites(now, acting):
             self.stop(
-                self._take_unasked, f"no sign of life from its program for {self._watchdog.patience_s:g} s"
+                self._take_unasked,
+                _("no sign of life from its program for {seconds} s").format(
+                    seconds=number(self._watchdog.patience_s or 0.0)
+                ),
             )
         self._tell_beat(now)
 
@@ -301,7 +318,15 @@ class Tasks:
 
     def _overdue(self, task: Task) -> None:
         if task.ending is None:
-            self._end(task, Answer("failed", error=f"{task.action} took longer than {task.timeout_s:g} s"))
+            self._end(
+                task,
+                Answer(
+                    "failed",
+                    error=_("{action} took longer than {seconds} s").format(
+                        action=task.action, seconds=number(task.timeout_s or 0.0)
+                    ),
+                ),
+            )
             return
         task.due_s = None
         why = "" if task.stopped or task.ending.error is None else f" ({task.ending.error})"
@@ -348,7 +373,10 @@ class Tasks:
             done = Answer("failed", error=_said(failed))
         except BaseException as error:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
-            done = Answer("failed", error=f"{task.action} broke off: {_said(error)}")
+            done = Answer(
+                "failed",
+                error=_("{action} broke off: {error}").format(action=task.action, error=_said(error)),
+            )
         self.call_soon(partial(self._ended, task, done))
 
     def _ended(self, task: Task, done: Answer) -> None:
@@ -376,10 +404,12 @@ class Tasks:
         try:
             self._stop_body()
         except Failed as failed:
-            error = f"{self._name} may still move: {_said(failed)}"
+            error = _(MAY_MOVE).format(robot=self._name, why=_said(failed))
         except BaseException as failed:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
-            error = f"{self._name} may still move: its stop broke off: {_said(failed)}"
+            error = _(MAY_MOVE).format(
+                robot=self._name, why=_("its stop broke off: {error}").format(error=_said(failed))
+            )
         self.call_soon(partial(self._stop_ended, error))
 
     def _stop_ended(self, error: str | None) -> None:
@@ -393,7 +423,7 @@ class Tasks:
             elif self._not_stopped is not None:
                 self._not_stopped = error
             answers, self._stop_answers = self._stop_answers, []
-            for _, answer in answers:
+            for _program, answer in answers:
                 answer(failed)
         else:
             self._not_stopped = None
@@ -403,13 +433,15 @@ class Tasks:
         """Answer the stops once its function is through and nothing runs any more."""
         if self._stopper is None and not self._running:
             answers, self._stop_answers = self._stop_answers, []
-            for _, answer in answers:
+            for _program, answer in answers:
                 answer(Answer("succeeded"))
 
 
 def still_moving(name: str, actions: Sequence[str]) -> str:
     """The sentence about functions that go on although they were told to end."""
-    return f"{name} may still move: {', '.join(actions)} {'has' if len(actions) == 1 else 'have'} not ended"
+    why = ngettext("{actions} has not ended", "{actions} have not ended", len(actions))
+    told = ", ".join(_(THE_STOP) if each == THE_STOP else each for each in actions)
+    return _(MAY_MOVE).format(robot=name, why=why.format(actions=told))
 
 
 def _said(error: BaseException) -> str:

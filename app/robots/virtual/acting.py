@@ -15,6 +15,7 @@ from app.robots.virtual.life import Life
 from app.robots.virtual.motion import Motion
 from app.robots.virtual.room import Room
 from app.robots.virtual.vision import angles_to
+from nep.i18n import _
 
 _HEAD = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
 _HEAD |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
@@ -130,7 +131,11 @@ class Acting(Senses):
             return _HEAD[target]
         found = self._life.seen.get("faces" if target == "face" else "balls", [])
         if not found:
-            raise Failed(f"look at: there is no {target} in the picture")
+            raise Failed(
+                _("look at: there is no face in the picture")
+                if target == "face"
+                else _("look at: there is no ball in the picture")
+            )
         left, down = angles_to(lens_of(self._life.body), found[0].middle)
         body = self._life.body
         return body.head_yaw.angle + left, body.head_pitch.angle + down

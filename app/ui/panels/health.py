@@ -67,9 +67,9 @@ class HealthRow(QWidget):
             return
         self.fact = fact
         self.icon.set(fact.status)
-        self.title.setText(fact.title)
+        self.title.setText(_(fact.title))
         self.words.setText(fact.words)
-        self.setAccessibleName(fact.title)
+        self.setAccessibleName(_(fact.title))
         self.setAccessibleDescription(fact.words)
 
 

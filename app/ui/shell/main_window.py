@@ -35,6 +35,7 @@ from app.ui.startup.interpreter import GcFreezeTimer
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
 from app.ui.widgets.file_dialogs import Asks, SystemDialogs
+from nep.i18n import lazy
 
 TICK_MS = 33
 SMALLEST = QSize(1100, 700)
@@ -332,9 +333,9 @@ class MainWindow(QMainWindow):
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
         if self._ticks % FACTS_EVERY == 0:
-            with self.session.surviving("show the figures"):
+            with self.session.surviving(lazy("show the figures")):
                 self._show_facts()
-        with self.session.surviving("show the alerts"):
+        with self.session.surviving(lazy("show the alerts")):
             self._show_alerts()
 
     def _show_facts(self) -> None:
