@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from nep.i18n import _
 from nep.text import escaped, shortened
 
 LONGEST_NAME, LONGEST_PROBLEM = 40, 300
@@ -66,7 +67,7 @@ class SettingsError(AppError):
         """Make the sentence from the file's name and the reason."""
         self.path = path
         self.reason = reason
-        super().__init__(f"settings can't be kept in '{path}': {reason}")
+        super().__init__(_("settings can't be kept in '{path}': {reason}").format(path=path, reason=reason))
 
 
 class DescriptionError(AppError):
@@ -76,10 +77,14 @@ class DescriptionError(AppError):
         """Make the sentence from the first problem, without what a stranger's text may do to a reader."""
         self.name = name
         self.problems = problems
-        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
         shown = shortened(escaped(name), LONGEST_NAME)
-        first = shortened(escaped(problems[0]), LONGEST_PROBLEM) if problems else "empty"
-        super().__init__(f"the description of '{shown}' can't be used: {first}{more}")
+        first = shortened(escaped(problems[0]), LONGEST_PROBLEM) if problems else _("empty")
+        words = (
+            _("the description of '{name}' can't be used: {problem} (and {count} more)")
+            if len(problems) > 1
+            else _("the description of '{name}' can't be used: {problem}")
+        )
+        super().__init__(words.format(name=shown, problem=first, count=len(problems) - 1))
 
 
 class DeclarationError(DescriptionError):
@@ -118,4 +123,6 @@ class RobotUnknownError(AppError):
     def __init__(self, name: str) -> None:
         """Make the sentence from the name."""
         self.name = name
-        super().__init__(f"no robot '{name}' is connected; switch it on or use a virtual one")
+        super().__init__(
+            _("no robot '{robot}' is connected; switch it on or use a virtual one").format(robot=name)
+        )

@@ -20,6 +20,7 @@ from nep.doctor.facts import ClockFact, Facts, FileFact, FolderFact, PackageFact
 from nep.doctor.network import loopback, masters
 from nep.doctor.verdict import Finding
 from nep.gateway.portmap import default_file
+from nep.i18n import _, lazy
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.system import descriptors
@@ -37,10 +38,10 @@ else:
 __all__ = ["PORTS", "gather", "hindrance", "loopback_problem"]
 
 PORTS: Mapping[int, str] = {
-    7000: "where programs of nep up to 0.5.4.5, nep-js and C# ask",
-    50000: "where programs of nep 0.5.4.8 ask",
-    7777: "where tools of the original NEP hear of topics",
-    12345: "where original nodes are told to end",
+    7000: lazy("where programs of nep up to 0.5.4.5, nep-js and C# ask"),
+    50000: lazy("where programs of nep 0.5.4.8 ask"),
+    7777: lazy("where tools of the original NEP hear of topics"),
+    12345: lazy("where original nodes are told to end"),
 }
 _ASK_S = 1.0
 _AHEAD_S = 0.5
@@ -65,7 +66,7 @@ def gather(
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
     package = Path(nep.errors.__file__).parent
-    state = ("The ports of original programs", default_file(number).parent)
+    state = (_("The ports of original programs"), default_file(number).parent)
     return Facts(
         time.time(),
         chosen,
@@ -211,7 +212,7 @@ def _folder(purpose: str, path: Path) -> FolderFact:
         free = psutil.disk_usage(str(existing)).free
     except OSError as error:
         return FolderFact(str(path), purpose, (error.strerror or str(error)).lower())
-    problem = "the disk is full" if free < _LEAST_FREE_BYTES else ""
+    problem = _("the disk is full") if free < _LEAST_FREE_BYTES else ""
     return FolderFact(str(path), purpose, problem)
 
 

@@ -9,6 +9,7 @@ from typing import Literal
 from nep.doctor.facts import Facts, FolderFact
 from nep.doctor.network import clocks, loopback, masters, originals, ports, told_by_master
 from nep.doctor.verdict import Finding, Severity
+from nep.i18n import _
 
 __all__ = ["findings", "report", "to_plain", "worst"]
 
@@ -58,28 +59,38 @@ def _packages(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "package:nep",
             "error",
-            f"The original package nep {each.version} is installed beside NEP Studio; both are called “nep”.",
-            "Take it out and put NEP Studio back; give programs of the original a Python environment of their"
-            " own.",
+            _(
+                "The original package nep {version} is installed beside NEP Studio; both are called “nep”."
+            ).format(version=each.version),
+            _(
+                "Take it out and put NEP Studio back; give programs of the original a Python "
+                "environment of their own."
+            ),
             command="pip uninstall -y nep && pip install --force-reinstall --no-deps nep-studio",
         )
     if facts.strange_files and not originals:
         yield Finding(
             "package:files",
             "error",
-            f"Files of the original NEP lie in {facts.nep_file}: {', '.join(facts.strange_files)}.",
-            "Install NEP Studio anew.",
+            _("Files of the original NEP lie in {folder}: {names}.").format(
+                folder=facts.nep_file, names=", ".join(facts.strange_files)
+            ),
+            _("Install NEP Studio anew."),
             command="pip install --force-reinstall --no-deps nep-studio",
         )
     if facts.shadow:
         yield Finding(
             "package:shadow",
             "warning",
-            f"{facts.shadow} hides the package “nep” from programs that are started in this folder.",
-            "Give that file another name.",
+            _("{file} hides the package “nep” from programs that are started in this folder.").format(
+                file=facts.shadow
+            ),
+            _("Give that file another name."),
         )
     if not originals and not facts.strange_files:
-        yield Finding("package", "ok", f"“import nep” gives the one in {facts.nep_file}.")
+        yield Finding(
+            "package", "ok", _("“import nep” gives the one in {folder}.").format(folder=facts.nep_file)
+        )
 
 
 def _files(facts: Facts) -> Iterator[Finding]:
@@ -88,20 +99,23 @@ def _files(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "files",
             "warning",
-            f"A program may open {files.soft} files only; that is enough for"
-            f" about {files.soft // _FILES_A_TOPIC} topics.",
-            "Allow more in the terminal from which you start programs.",
+            _("A program may open {files} files only; that is enough for about {topics} topics.").format(
+                files=files.soft, topics=files.soft // _FILES_A_TOPIC
+            ),
+            _("Allow more in the terminal from which you start programs."),
             command=f"ulimit -n {min(8192, files.hard or 8192)}",
         )
     elif files.soft is not None:
-        yield Finding("files", "ok", f"A program may open {files.soft} files.")
+        yield Finding("files", "ok", _("A program may open {files} files.").format(files=files.soft))
     opened, limit = files.master_open, files.master_limit
     if opened is not None and limit is not None and opened > NEARLY * limit:
         yield Finding(
             "files:master",
             "warning",
-            f"The master has {opened} of at most {limit} files open; soon nobody else can join.",
-            "End the master and start it from a terminal that allows more.",
+            _("The master has {opened} of at most {limit} files open; soon nobody else can join.").format(
+                opened=opened, limit=limit
+            ),
+            _("End the master and start it from a terminal that allows more."),
             command="ulimit -n 8192 && nep master",
         )
 
@@ -112,9 +126,11 @@ def _programs(facts: Facts) -> Iterator[Finding]:
             yield Finding(
                 f"files:{program.pid}",
                 "warning",
-                f"The program of “{program.name}” has {program.opened} of at most {program.limit} files open;"
-                " soon it can make no publisher or subscriber, and nobody can connect to it.",
-                "Let it close what it no longer needs, or start it from a terminal that allows more.",
+                _(
+                    "The program of “{name}” has {opened} of at most {limit} files open; soon it can "
+                    "make no publisher or subscriber, and nobody can connect to it."
+                ).format(name=program.name, opened=program.opened, limit=program.limit),
+                _("Let it close what it no longer needs, or start it from a terminal that allows more."),
                 command="ulimit -n 8192",
             )
 
@@ -124,15 +140,21 @@ def _folders(facts: Facts) -> Iterator[Finding]:
         if folder.problem:
             yield _folder_problem(folder)
         else:
-            yield Finding(f"folder:{folder.path}", "ok", f"{folder.purpose} can be kept in {folder.path}.")
+            yield Finding(
+                f"folder:{folder.path}",
+                "ok",
+                _("{purpose} can be kept in {path}.").format(purpose=folder.purpose, path=folder.path),
+            )
 
 
 def _folder_problem(folder: FolderFact) -> Finding:
     return Finding(
         f"folder:{folder.path}",
         "error",
-        f"{folder.purpose} can't be kept in {folder.path}: {folder.problem}.",
-        "Make the folder yours and writable, or make room on the disk.",
+        _("{purpose} can't be kept in {path}: {problem}.").format(
+            purpose=folder.purpose, path=folder.path, problem=folder.problem
+        ),
+        _("Make the folder yours and writable, or make room on the disk."),
     )
 
 
@@ -141,8 +163,8 @@ def _clock(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "clock",
             "warning",
-            "The clock of this computer is wrong: it says that 2024 has not begun.",
-            "Set it, so that ages of messages are right.",
+            _("The clock of this computer is wrong: it says that 2024 has not begun."),
+            _("Set it, so that ages of messages are right."),
         )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from nep.doctor.facts import Facts, PortFact, ProcessFact
-from nep.doctor.verdict import Finding, ago, counted
+from nep.doctor.verdict import Finding, ago
+from nep.i18n import _, ngettext, number
 from nep.system.addresses import host_of, is_loopback
 
 __all__ = ["clocks", "loopback", "masters", "originals", "ports", "told_by_master"]
@@ -22,12 +23,12 @@ def loopback(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "loopback",
             "error",
-            f"Programs of this computer cannot reach each other: {facts.loopback}.",
-            "Switch the loopback interface on; a firewall or a sandbox may have switched it off.",
+            _("Programs of this computer cannot reach each other: {problem}.").format(problem=facts.loopback),
+            _("Switch the loopback interface on; a firewall or a sandbox may have switched it off."),
             command="ip link set lo up" if facts.platform == "linux" else "",
         )
     else:
-        yield Finding("loopback", "ok", "Programs of this computer can reach each other (127.0.0.1).")
+        yield Finding("loopback", "ok", _("Programs of this computer can reach each other (127.0.0.1)."))
 
 
 def masters(facts: Facts) -> Iterator[Finding]:
@@ -42,15 +43,19 @@ def masters(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "master:unknown",
             "error",
-            f"No computer is called “{host_of(facts.address)}” here, so no master is found.",
-            "Look for a typing error, or write its address in numbers.",
+            _("No computer is called “{host}” here, so no master is found.").format(
+                host=host_of(facts.address)
+            ),
+            _("Look for a typing error, or write its address in numbers."),
         )
     elif holder is not None and holder.is_master:
         yield Finding(
             "master:hung",
             "error",
-            f"The master at {facts.address}{_process(holder)} does not answer; it hangs or is halted.",
-            "End it and start a new one; programs that have found each other go on meanwhile.",
+            _("The master at {master} does not answer; it hangs or is halted.").format(
+                master=_master(facts, holder)
+            ),
+            _("End it and start a new one; programs that have found each other go on meanwhile."),
             command=_kill(facts, holder),
         )
     elif port is not None and port.is_taken:
@@ -58,19 +63,25 @@ def masters(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "master:foreign",
             "error",
-            f"Port {number} is held by {_who(holder)}, which is no master.",
-            f"End that program, or start the master on port {other} and tell it to all programs"
-            f" (NEP_MASTER=127.0.0.1:{other}).",
+            _("Port {number} is held by {program}, which is no master.").format(
+                number=number, program=_who(holder)
+            ),
+            _(
+                "End that program, or start the master on port {other} and tell it to all programs "
+                "(NEP_MASTER=127.0.0.1:{other})."
+            ).format(other=other),
             command=f"nep master --port {other}",
         )
     else:
         yield Finding(
             "master:none",
             "error",
-            f"No master runs at {facts.address}, so new programs cannot find each other.",
-            "Start one."
+            _("No master runs at {address}, so new programs cannot find each other.").format(
+                address=facts.address
+            ),
+            _("Start one.")
             if is_loopback(facts.address)
-            else "Start one on that computer, and check that it is in the same network.",
+            else _("Start one on that computer, and check that it is in the same network."),
             command="nep master" if number == "7780" else f"nep master --port {number}",
         )
     yield from _several(facts)
@@ -82,17 +93,24 @@ def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
     if view is not None:
         # what nep itself only waits for, such as log records, is nobody's topic yet
         live = [name for name, info in view.topics.items() if info.publishers or not name.startswith("/nep/")]
-        people = f"{counted(len(view.nodes), 'node')}, {counted(len(live), 'topic')}"
-    since = ""
+        nodes = ngettext("{count} node", "{count} nodes", len(view.nodes)).format(count=len(view.nodes))
+        topics = ngettext("{count} topic", "{count} topics", len(live)).format(count=len(live))
+        people = f"{nodes}, {topics}"
     if holder is not None and holder.since_s is not None:
-        since = f" for {ago(facts.now_s - holder.since_s)}"
-    sentence = f"A master runs at {facts.address}{_process(holder)}{since}: {people}"
+        since = ago(facts.now_s - holder.since_s)
+        words = _("A master runs at {master} for {since}: {people}")
+    else:
+        since = ""
+        words = _("A master runs at {master}: {people}")
+    sentence = words.format(master=_master(facts, holder), since=since, people=people)
     if facts.answered_s is not None and facts.answered_s > SLOW_S:
         return Finding(
             "master:slow",
             "warning",
-            f"{sentence}. It took {facts.answered_s:.1f} s to answer.",
-            "This computer is very busy; look for the program that is.",
+            _("{sentence}. It took {seconds} s to answer.").format(
+                sentence=sentence, seconds=number(facts.answered_s, ".1f")
+            ),
+            _("This computer is very busy; look for the program that is."),
         )
     return Finding("master", "ok", f"{sentence}.")
 
@@ -103,17 +121,25 @@ def _of_another_version(facts: Facts, holder: ProcessFact | None) -> Iterator[Fi
     if install is None or holder is None or not own[:1].isdigit():
         return
     if install.version != own:
-        why = f"is of NEP Studio {install.version} ({install.place}); this is {own}"
+        words = _(
+            "The master at {master} is of NEP Studio {version} ({place}); this is {own}. "
+            "What is new or mended may not work with it."
+        )
     elif holder.since_s is not None and holder.since_s < install.since_s:
-        why = f"has run since before NEP Studio {own} was installed, so it is of the one before"
+        words = _(
+            "The master at {master} has run since before NEP Studio {own} was installed, so it is of the one "
+            "before. What is new or mended may not work with it."
+        )
     else:
         return
     yield Finding(
         "master:version",
         "warning",
-        f"The master at {facts.address}{_process(holder)} {why}. What is new or mended may not work with it.",
-        "End it: an open Studio starts a new one, else type “nep master”. Programs that have found each other"
-        " go on.",
+        words.format(master=_master(facts, holder), version=install.version, place=install.place, own=own),
+        _(
+            "End it: an open Studio starts a new one, else type “nep master”. Programs that have "
+            "found each other go on."
+        ),
         command=_kill(facts, holder),
     )
 
@@ -125,23 +151,24 @@ def _kill(facts: Facts, holder: ProcessFact) -> str:
 def _several(facts: Facts) -> Iterator[Finding]:
     if len(facts.masters) < 2:
         return
-    listed = ", ".join(
-        f"port {port} (process {process.pid})" if port else f"process {process.pid}"
+    places = ", ".join(
+        (_("port {port} (process {pid})") if port else _("process {pid}")).format(port=port, pid=process.pid)
         for process, port in facts.masters
     )
     yield Finding(
         "master:several",
         "warning",
-        f"{len(facts.masters)} masters run on this computer: {listed}."
-        " Programs of one don't see those of the other.",
-        "End all but one, or give every program the same NEP_MASTER.",
+        _(
+            "{count} masters run on this computer: {places}. Programs of one don't see those of the other."
+        ).format(count=len(facts.masters), places=places),
+        _("End all but one, or give every program the same NEP_MASTER."),
     )
 
 
 def ports(facts: Facts) -> Iterator[Finding]:
     """The ports where original programs ask."""
     if not facts.joins_originals:
-        yield Finding("ports", "info", "Programs of the original NEP are not joined (NEP_GATEWAY=0).")
+        yield Finding("ports", "info", _("Programs of the original NEP are not joined (NEP_GATEWAY=0)."))
         return
     for port in facts.ports:
         holder = port.holder
@@ -150,11 +177,17 @@ def ports(facts: Facts) -> Iterator[Finding]:
                 yield Finding(
                     f"port:{port.port}",
                     "info",
-                    f"Nobody listens on port {port.port}, {port.purpose}.",
-                    "The master was started without its gateway." if port.port != 12345 else "",
+                    _("Nobody listens on port {port}, {purpose}.").format(
+                        port=port.port, purpose=_(port.purpose)
+                    ),
+                    _("The master was started without its gateway.") if port.port != 12345 else "",
                 )
         elif holder is not None and holder.is_master:
-            yield Finding(f"port:{port.port}", "ok", f"The master holds port {port.port}, {port.purpose}.")
+            yield Finding(
+                f"port:{port.port}",
+                "ok",
+                _("The master holds port {port}, {purpose}.").format(port=port.port, purpose=_(port.purpose)),
+            )
         else:
             yield _taken(facts, port)
 
@@ -166,20 +199,24 @@ def _taken(facts: Facts, port: PortFact) -> Finding:
         return Finding(
             "port:7000",
             "warning",
-            f"The AirPlay Receiver holds port 7000, {port.purpose}.",
-            "Switch it off in the system settings, under General, AirDrop & Handoff.",
+            _("The AirPlay Receiver holds port 7000, {purpose}.").format(purpose=_(port.purpose)),
+            _("Switch it off in the system settings, under General, AirDrop & Handoff."),
         )
     if port.port == 12345:  # the originals' kill channel: whoever wants to end nodes holds it
         return Finding(
             "port:12345",
             "info",
-            f"Port 12345 is held by {_who(holder)}; original nodes take orders to end from there.",
+            _("Port 12345 is held by {program}; original nodes take orders to end from there.").format(
+                program=_who(holder)
+            ),
         )
     return Finding(
         f"port:{port.port}",
         "warning",
-        f"Port {port.port}, {port.purpose}, is held by {_who(holder)}.",
-        "End that program; an original master may be one: this one joins its programs when it has gone.",
+        _("Port {port}, {purpose}, is held by {program}.").format(
+            port=port.port, purpose=_(port.purpose), program=_who(holder)
+        ),
+        _("End that program; an original master may be one: this one joins its programs when it has gone."),
     )
 
 
@@ -193,14 +230,21 @@ def originals(facts: Facts) -> Iterator[Finding]:
             yield Finding(
                 f"original:{node.id}",
                 "error",
-                f"“{node.name}” uses nep {node.generation}, which no other version understands.",
-                "Install 0.5.4.8 or 0.5.4.5 for this program.",
+                _("“{program}” uses nep {generation}, which no other version understands.").format(
+                    program=node.name, generation=node.generation
+                ),
+                _("Install 0.5.4.8 or 0.5.4.5 for this program."),
                 command="pip install nep==0.5.4.8",
             )
     served = [node for node in nodes if node.generation not in NOT_SERVED]
     if served:
         names = ", ".join(f"{node.name} ({_wire(node.generation)})" for node in served)
-        yield Finding("originals", "info", f"{counted(len(served), 'program')} of the original NEP: {names}.")
+        words = ngettext(
+            "{count} program of the original NEP: {names}.",
+            "{count} programs of the original NEP: {names}.",
+            len(served),
+        )
+        yield Finding("originals", "info", words.format(count=len(served), names=names))
 
 
 def told_by_master(facts: Facts) -> Iterator[Finding]:
@@ -219,23 +263,32 @@ def clocks(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             f"clock:{clock.host}",
             "warning",
-            f"The clock of {clock.host} is {clock.ahead_s:.1f} s ahead, so ages of its messages are wrong.",
-            "Let both computers set their clocks by the network.",
+            _("The clock of {host} is {seconds} s ahead, so ages of its messages are wrong.").format(
+                host=clock.host, seconds=number(clock.ahead_s, ".1f")
+            ),
+            _("Let both computers set their clocks by the network."),
         )
 
 
 def _wire(generation: str) -> str:
-    return {"A": "up to 0.5.4.5", "B": "0.5.4.8"}.get(generation, generation)
+    return {"A": _("up to 0.5.4.5"), "B": "0.5.4.8"}.get(generation, generation)
 
 
-def _process(holder: ProcessFact | None) -> str:
-    return f" (process {holder.pid})" if holder is not None and holder.pid is not None else ""
+def _master(facts: Facts, holder: ProcessFact | None) -> str:
+    """Where it is: "127.0.0.1:7780 (process 12)"."""
+    return _with_process(facts.address, holder)
+
+
+def _with_process(words: str, holder: ProcessFact | None) -> str:
+    if holder is None or holder.pid is None:
+        return words
+    return _("{program} (process {pid})").format(program=words, pid=holder.pid)
 
 
 def _who(holder: ProcessFact | None) -> str:
     if holder is None:
-        return "a program that the system does not name"
-    return f"“{holder.name}”{_process(holder)}"
+        return _("a program that the system does not name")
+    return _with_process(f"“{holder.name}”", holder)
 
 
 def _other_port(number: str) -> int:

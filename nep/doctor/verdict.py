@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Finding", "Severity", "ago", "counted"]
+from nep.i18n import ngettext, number
+
+__all__ = ["Finding", "Severity", "ago"]
 
 Severity = Literal["error", "warning", "info", "ok"]
 
@@ -32,15 +34,13 @@ class Finding:
         return words[:1].lower() + words[1:]
 
 
-def counted(count: int, one: str) -> str:
-    """How many there are, as in "1 node", "2 nodes"."""
-    return f"{count} {one}" if count == 1 else f"{count} {one}s"
-
-
 def ago(seconds: float) -> str:
     """How long something has been running."""
     if seconds < 90:
         return f"{max(0, round(seconds))} s"
     if seconds < 5400:
         return f"{round(seconds / 60)} min"
-    return f"{seconds / 3600:.1f} h" if seconds < 172_800 else f"{round(seconds / 86_400)} days"
+    if seconds < 172_800:
+        return f"{number(seconds / 3600, '.1f')} h"
+    days = round(seconds / 86_400)
+    return ngettext("{count} day", "{count} days", days).format(count=days)

@@ -19,6 +19,7 @@ from nep.gateway.processes import SystemProcesses
 from nep.gateway.programs import OriginalProgram
 from nep.gateway.relay import Key
 from nep.gateway.request_server import Ports
+from nep.i18n import _, ngettext
 from nep.masters.master import Master
 from nep.messages import image_codec
 from nep.messages.image_files import examine
@@ -162,11 +163,14 @@ class NativeNetwork:
                 return message.data
             made = image_codec.encode(message.payload)
             if image_codec.raw_layout((made.extension or {}).get("encoding")) is not None:
-                raise EncodeError("image", "picture", "they read JPEG and PNG, which have no such numbers")
+                raise EncodeError("image", "picture", _("they read JPEG and PNG, which have no such numbers"))
             return made.data
         except (DecodeError, EncodeError) as error:
             self.tell(
-                f"message:{message.topic}", f"Original programs get no pictures of “{message.topic}”: {error}"
+                f"message:{message.topic}",
+                _("Original programs get no pictures of “{topic}”: {error}").format(
+                    topic=message.topic, error=error
+                ),
             )
             return None
 
@@ -192,8 +196,12 @@ class NativeNetwork:
             self._again_at[topic] = now + _AGAIN_S
             why, hint = str(error), ""
             if isinstance(error, BadTopicError):
-                why, hint = error.reason, "Give the topic another name."
-            self.tell(id, f"“{topic}” stays among programs of the original NEP: {why}", hint)
+                why, hint = error.reason, _("Give the topic another name.")
+            self.tell(
+                id,
+                _("“{topic}” stays among programs of the original NEP: {why}").format(topic=topic, why=why),
+                hint,
+            )
             return None
         self._again_at.pop(topic, None)
         self.cure(id)
@@ -211,7 +219,14 @@ class NativeNetwork:
         if self._inbox is not None and self._inbox.dropped != self._dropped:
             lost = self._inbox.dropped - self._dropped
             self._dropped = self._inbox.dropped
-            self.tell("gateway:full", f"{lost} messages did not reach original programs in the last second")
+            self.tell(
+                "gateway:full",
+                ngettext(
+                    "{count} message did not reach original programs in the last second",
+                    "{count} messages did not reach original programs in the last second",
+                    lost,
+                ).format(count=lost),
+            )
         else:
             self.cure("gateway:full")
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from nep.backends.zeromq.legacy import has_prefix
+from nep.i18n import _
 
 Framing = Literal["prefixed", "bare"]
 
@@ -99,16 +100,22 @@ class Shape:
                 return frame[len(own) :]
             if self.codec == "json" and frame.startswith((b"{", b"[", b'"')):
                 return frame
-            raise FrameError(f"A message on “{self.topic}” does not begin with the topic")
+            raise FrameError(
+                _("A message on “{topic}” does not begin with the topic").format(topic=self.topic)
+            )
         if self.codec == "json":
             self._refuse_unserved(frame, own)
         return frame
 
     def _refuse_unserved(self, frame: bytes, own: bytes) -> None:
         if frame.startswith(own):
-            raise FrameError(f"A message on “{self.topic}” begins with the topic", version="0.5.4.6")
+            raise FrameError(
+                _("A message on “{topic}” begins with the topic").format(topic=self.topic), version="0.5.4.6"
+            )
         if frame[:1] == b'"' and _is_json_in_json(frame):
-            raise FrameError(f"A message on “{self.topic}” is JSON inside JSON", version="0.5.4.7")
+            raise FrameError(
+                _("A message on “{topic}” is JSON inside JSON").format(topic=self.topic), version="0.5.4.7"
+            )
 
 
 def lost_numbers(frame: bytes, data: bytes) -> bool:
@@ -162,7 +169,7 @@ def _from_base64(data: bytes) -> bytes:
     try:
         return base64.b64decode(data, validate=True)
     except binascii.Error as error:
-        raise FrameError("A picture is not base64") from error
+        raise FrameError(_("A picture is not base64")) from error
 
 
 def _is_json_in_json(frame: bytes) -> bool:

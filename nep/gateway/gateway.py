@@ -18,6 +18,7 @@ from nep.gateway.proxy_pair import ProxyPair, is_free, port_to_tell
 from nep.gateway.relay import AlertSink, NativeSide, Relay
 from nep.gateway.request_server import Ports, RequestServer
 from nep.gateway.requests import LOOPBACK, Request, RequestError, Role
+from nep.i18n import _
 from nep.messages.message import Message
 from nep.system.descriptors import SPARE, has_room
 from nep.system.forks import give_up, watch
@@ -199,8 +200,10 @@ class Gateway:
             if base is not None and not self._open(line, base):
                 self._outside.tell(
                     f"port:{base}",
-                    f"Port {base} or {base + 1} of “{line.topic}” is taken by another program",
-                    "Close that program, then restart the programs of the original NEP on this topic.",
+                    _("Port {first} or {second} of “{topic}” is taken by another program").format(
+                        first=base, second=base + 1, topic=line.topic
+                    ),
+                    _("Close that program, then restart the programs of the original NEP on this topic."),
                 )
 
     def _decide(self, request: Request) -> int:
@@ -211,7 +214,9 @@ class Gateway:
             line = TopicLine(request.topic, "bare", codec, "many2many")
         base = self._port_for(line)
         if len(self._known.registrations) >= _PROGRAMS_MAX and not self._programs.make_room():
-            raise RequestError(f"{_PROGRAMS_MAX} programs have asked already", line.topic)
+            raise RequestError(
+                _("{count} programs have asked already").format(count=_PROGRAMS_MAX), line.topic
+            )
         registration = self._registration(request, line)
         self._known.add(registration)
         self._programs.expect(registration)
@@ -225,12 +230,14 @@ class Gateway:
         if known is not None and (line.is_service or self._relay.pair(line) or self._open(line, known)):
             return known
         if not has_room(_PAIR_FILES + SPARE):
-            raise RequestError("the master has too many files open; end programs, or restart it", line.topic)
+            raise RequestError(
+                _("the master has too many files open; end programs, or restart it"), line.topic
+            )
         for base in self._known.candidates(self._programs.is_used):
             if self._open(line, base):
                 self._known.give(line, base)
                 return base
-        raise RequestError("no ports are left between 9000 and 9999", line.topic)
+        raise RequestError(_("no ports are left between 9000 and 9999"), line.topic)
 
     def _open(self, line: TopicLine, base: int) -> bool:
         """Open a line's sockets on `base`; whether that port and the next were to be had."""
@@ -259,8 +266,10 @@ class Gateway:
         except OSError as error:
             self._outside.tell(
                 "gateway:file",
-                f"The list of the ports of original programs cannot be kept: {error.strerror}",
-                "Restart the programs of the original NEP when the master was restarted.",
+                _("The list of the ports of original programs cannot be kept: {strerror}").format(
+                    strerror=error.strerror
+                ),
+                _("Restart the programs of the original NEP when the master was restarted."),
             )
         else:
             self._outside.cure("gateway:file")

@@ -12,6 +12,7 @@ from nep.gateway.framing import FrameError, lost_numbers
 from nep.gateway.portmap import TopicLine
 from nep.gateway.proxy_pair import ProxyPair
 from nep.gateway.requests import Role
+from nep.i18n import _, ngettext
 
 _BATCH = 200
 """Frames taken from one line before the others have their turn."""
@@ -180,8 +181,10 @@ class Relay:
         if pair.line.codec == "json" and lost_numbers(frame, data):
             self._alerts.tell(
                 f"nan:{pair.line.topic}",
-                f"“{pair.line.topic}” has NaN or infinity; JSON has neither, and native programs get null",
-                "Let the program that publishes it send null where it has no value.",
+                _("“{topic}” has NaN or infinity; JSON has neither, and native programs get null").format(
+                    topic=pair.line.topic
+                ),
+                _("Let the program that publishes it send null where it has no value."),
             )
         for other in self._of(key):
             if other is pair:
@@ -204,8 +207,8 @@ class Relay:
 
     def _tell_refused(self, topic: str, refused: _Refused) -> None:
         refused.told = refused.count
-        times = f" ({refused.count} messages)" if refused.count > 1 else ""
-        self._alerts.tell(f"message:{topic}", refused.reason + times)
+        words = ngettext("{reason}", "{reason} ({count} messages)", refused.count)
+        self._alerts.tell(f"message:{topic}", words.format(reason=refused.reason, count=refused.count))
 
     def _judge(self, pair: ProxyPair) -> None:
         """Name again who can't be served (its name may be known by now), or take it back."""
@@ -222,11 +225,16 @@ class Relay:
     def _tell_version(self, role: Role, pair: ProxyPair, version: str) -> None:
         pair.unserved[role] = version
         names = [f"“{name}”" for name in self._who(pair.line, role)]
-        who = "A program" if not names else names[0] if len(names) == 1 else f"One of {', '.join(names)}"
+        if not names:
+            words = _("A program on “{topic}” uses nep {version}, which no other version understands")
+        elif len(names) == 1:
+            words = _("{programs} on “{topic}” uses nep {version}, which no other version understands")
+        else:
+            words = _("One of {programs} on “{topic}” uses nep {version}, which no other version understands")
         self._alerts.tell(
             f"version:{pair.line.topic}:{role}",
-            f"{who} on “{pair.line.topic}” uses nep {version}, which no other version understands",
-            "Install nep 0.5.4.8 or 0.5.4.5 for that program.",
+            words.format(programs=", ".join(names), topic=pair.line.topic, version=version),
+            _("Install nep 0.5.4.8 or 0.5.4.5 for that program."),
         )
 
     def _serve_again(self, pair: ProxyPair, role: Role) -> None:

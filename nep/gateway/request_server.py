@@ -20,6 +20,7 @@ from nep.gateway.requests import (
     read_request,
     refuse,
 )
+from nep.i18n import _
 
 _logger = logging.getLogger("nep.gateway")
 _LARGEST_BYTES = 2**24
@@ -65,16 +66,21 @@ class RequestServer:
         """Bind what is not bound yet; whether anything was."""
         before = len(self._counters)
         for port, who in (
-            (self._ports.requests_a, "nep up to 0.5.4.5, nep-js and C#"),
+            (self._ports.requests_a, _("nep up to 0.5.4.5, nep-js and C#")),
             (self._ports.requests_b, "nep 0.5.4.8"),
         ):
             if port and port not in self._counters:
-                bound = self._bind(zmq.ROUTER, port, f"programs of {who} cannot join")
+                words = _("Port {port} is taken by another program; programs of {version} cannot join")
+                bound = self._bind(zmq.ROUTER, port, words.format(port=port, version=who))
                 if bound is not None:
                     self._counters[port] = bound
         if self._ports.broadcast and self._board is None:
             self._board = self._bind(
-                zmq.PUB, self._ports.broadcast, "tools of the original NEP show no topics"
+                zmq.PUB,
+                self._ports.broadcast,
+                _("Port {port} is taken by another program; tools of the original NEP show no topics").format(
+                    port=self._ports.broadcast
+                ),
             )
         return len(self._counters) != before
 
@@ -116,7 +122,7 @@ class RequestServer:
         self._counters.clear()
         self._board = None
 
-    def _bind(self, kind: int, port: int, consequence: str) -> zmq.Socket[bytes] | None:
+    def _bind(self, kind: int, port: int, taken: str) -> zmq.Socket[bytes] | None:
         socket = self._context.socket(kind)
         socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_BYTES)
         try:
@@ -125,8 +131,8 @@ class RequestServer:
             socket.close(0)
             self._alerts.tell(
                 f"port:{port}",
-                f"Port {port} is taken by another program; {consequence}",
-                "Close that program: another master, or on macOS the AirPlay Receiver.",
+                taken,
+                _("Close that program: another master, or on macOS the AirPlay Receiver."),
             )
             return None
         self._alerts.cure(f"port:{port}")

@@ -6,6 +6,7 @@ import logging
 from collections import OrderedDict
 from dataclasses import dataclass
 
+from nep.i18n import _, lazy, ngettext
 from nep.protocol.graph_view import Alert
 from nep.system.log_rarely import is_told
 from nep.text import escaped, shortened
@@ -25,7 +26,9 @@ _SAME_S = 1.0
 """Alerts change no sooner: everybody who looks hears of each change."""
 _LONGEST = 200
 """Letters of a reason: it may repeat what a stranger wrote."""
-_HINT = "It may be of another version of nep, or no nep program; see what connects to the master's port."
+_HINT = lazy(
+    "It may be of another version of nep, or no nep program; see what connects to the master's port."
+)
 
 
 @dataclass
@@ -72,10 +75,14 @@ class BadRequests:
             for sender, known in reversed(self._senders.items())
             if now - known.newest_at < _SHOWN_S
         ]
-        told = [Alert(f"request:{sender}", _sentence(known), _HINT) for sender, known in shown[:_SHOWN]]
+        told = [Alert(f"request:{sender}", _sentence(known), _(_HINT)) for sender, known in shown[:_SHOWN]]
         if len(shown) > _SHOWN:
-            sentence = f"{len(shown) - _SHOWN} more programs send what the master does not understand"
-            told.append(Alert("request:", sentence, _HINT))
+            sentence = ngettext(
+                "{count} more program sends what the master does not understand",
+                "{count} more programs send what the master does not understand",
+                len(shown) - _SHOWN,
+            ).format(count=len(shown) - _SHOWN)
+            told.append(Alert("request:", sentence, _(_HINT)))
         return tuple(sorted(told, key=lambda each: each.id))
 
 
@@ -87,9 +94,15 @@ def who_sends(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
     """
     if node_id:
         return node_id, f"“{node_name}”"
-    return peer, f"A program on {peer or 'a computer that is not known'}"
+    if not peer:
+        return peer, _("A program on a computer that is not known")
+    return peer, _("A program on {host}").format(host=peer)
 
 
 def _sentence(sender: _Sender) -> str:
-    times = "once" if sender.count == 1 else f"{sender.count} times so far"
-    return f"{sender.name} sends what the master does not understand ({times}): {sender.reason}"
+    words = ngettext(
+        "{program} sends what the master does not understand (once): {reason}",
+        "{program} sends what the master does not understand ({count} times so far): {reason}",
+        sender.count,
+    )
+    return words.format(program=sender.name, count=sender.count, reason=sender.reason)

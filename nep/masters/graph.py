@@ -17,6 +17,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from nep.errors import WireError
+from nep.i18n import _
 from nep.masters.leases import LEASE_S, Leases, RawRenewal
 from nep.masters.registry import (
     ALL_RECORDS_MAX,
@@ -147,7 +148,7 @@ class Graph:
                 self._admit(request, sender, out)
             if isinstance(request, AddPublisher | AddSubscriber) and now < self._learnt_at:
                 if len(self._waiting) >= _WAITING_MAX:
-                    raise WireError("too many programs register while the master is starting; ask again")
+                    raise WireError(_("too many programs register while the master is starting; ask again"))
                 self._waiting.append((request, call, sender, is_foreign))
                 return tuple(out)
             reply = self._carry_out(request, now, sender, out)
@@ -226,21 +227,23 @@ class Graph:
         node_id = node_of(request)
         member = None if node_id is None else self._registry.members.get(node_id)
         if member is not None and member.route != sender and not isinstance(request, Renew):
-            raise WireError("a node speaks for itself only")
+            raise WireError(_("a node speaks for itself only"))
 
     def _admit_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
         if node.key and not is_proven(node):
-            raise WireError(f"the node's id '{node.id}' does not come from its key")
+            raise WireError(_("the node's id '{id}' does not come from its key").format(id=node.id))
         if not node.key and sender != node.id:
-            raise WireError("a node needs a key that proves its id, or its id as its routing id; update nep")
+            raise WireError(
+                _("a node needs a key that proves its id, or its id as its routing id; update nep")
+            )
         other = self._registry.speaking.get(sender)
         if other is not None and other.node.id != node.id:
-            raise WireError(f"this connection speaks for the node '{other.node.id}' already")
+            raise WireError(_("this connection speaks for the node '{id}' already").format(id=other.node.id))
         known = self._registry.members.get(node.id)
         if known is None or known.route == sender:
             return
         if not node.key:
-            raise WireError(f"the node '{node.id}' is another program's")
+            raise WireError(_("the node '{id}' is another program's").format(id=node.id))
         if not is_proven(known.node):
             self._forget(known, out, is_closed=False)
 
@@ -249,7 +252,9 @@ class Graph:
     ) -> None:
         if record.number and not is_proven(node, record):
             raise WireError(
-                f"the id {record.id} does not come from the node's key and the number {record.number}"
+                _("the id {id} does not come from the node's key and the number {number}").format(
+                    id=record.id, number=record.number
+                )
             )
         is_publisher = isinstance(record, PublisherRecord)
         owners = self._registry.publisher_owners if is_publisher else self._registry.subscriber_owners
@@ -258,7 +263,9 @@ class Graph:
             return
         theirs = (owner.publishers if is_publisher else owner.subscribers)[record.id].record
         if not is_proven(node, record) or is_proven(owner.node, theirs):
-            raise WireError(f"the id {record.id} is that of another program's publisher or subscriber")
+            raise WireError(
+                _("the id {id} is that of another program's publisher or subscriber").format(id=record.id)
+            )
         if is_publisher:
             self._unlist_publisher(owner, record.id, out)
         else:
@@ -270,10 +277,18 @@ class Graph:
         own = 0 if member is None else len(member.publishers) + len(member.subscribers)
         mine = count if isinstance(request, Join) else own + 1
         if mine > max(own, RECORDS_MAX):
-            raise WireError(f"a node has {RECORDS_MAX} publishers and subscribers at most")
+            raise WireError(
+                _("a node has {RECORDS_MAX} publishers and subscribers at most").format(
+                    RECORDS_MAX=RECORDS_MAX
+                )
+            )
         all_ = len(registry.publisher_owners) + len(registry.subscriber_owners)
         if mine > max(own, ALWAYS_ROOM) and all_ + mine - own > ALL_RECORDS_MAX:
-            raise WireError(f"the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most")
+            raise WireError(
+                _("the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most").format(
+                    ALL_RECORDS_MAX=ALL_RECORDS_MAX
+                )
+            )
 
     # ---- requests
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 import zmq
 
 from nep.errors import AddressInUseError, NepError
+from nep.i18n import _
 from nep.protocol.graph_view import Alert
 from nep.system.addresses import ANY, OwnAddress, endpoint_of, own_addresses
 
@@ -26,10 +27,14 @@ def check_hosts(hosts: Iterable[str], here: Iterable[OwnAddress]) -> tuple[str, 
         try:
             address = ipaddress.IPv4Address(host)
         except ValueError:
-            raise NepError(f"'{host}' is no IPv4 address; write it as '192.168.1.20'") from None
+            raise NepError(
+                _("'{host}' is no IPv4 address; write it as '192.168.1.20'").format(host=host)
+            ) from None
         if host != ANY and host not in known and not address.is_loopback:
-            others = ", ".join(sorted(known)) or "none that others can reach; join a network first"
-            raise NepError(f"'{host}' is no address of this computer; it has {others}")
+            others = ", ".join(sorted(known)) or _("none that others can reach; join a network first")
+            raise NepError(
+                _("'{host}' is no address of this computer; it has {others}").format(host=host, others=others)
+            )
     return checked
 
 
@@ -101,8 +106,10 @@ class Listening:
         now = ", ".join(own.host for own in here)
         return Alert(
             f"listen:{host}",
-            f"This computer has the address {host} no more, so other computers do not reach its programs",
-            f"Let them connect at {now} instead." if now else "Join the network again.",
+            _(
+                "This computer has the address {host} no more, so other computers do not reach its programs"
+            ).format(host=host),
+            _("Let them connect at {now} instead.").format(now=now) if now else _("Join the network again."),
         )
 
     def _bind(self, host: str) -> None:

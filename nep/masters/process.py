@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import zmq
 
 from nep.errors import MasterUnreachable, RequestRefusedError, WireError
+from nep.i18n import _
 from nep.protocol.encoding import decode_answer, encode_request
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
@@ -71,7 +72,7 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
     chosen = master_address(address)
     reply = _ask(Look(), chosen, timeout_s)
     if not isinstance(reply, Seen):
-        raise RequestRefusedError(f"the master at '{chosen}' shows no graph")
+        raise RequestRefusedError(_("the master at '{chosen}' shows no graph").format(chosen=chosen))
     return reply.view
 
 
@@ -129,7 +130,9 @@ def _read(body: bytes) -> Reply | None:
     try:
         answer = decode_answer(body)[1]
     except WireError as error:
-        raise RequestRefusedError(f"the master's answer cannot be read: {error.reason}") from error
+        raise RequestRefusedError(
+            _("the master's answer cannot be read: {reason}").format(reason=error.reason)
+        ) from error
     if isinstance(answer, Refused):
         raise RequestRefusedError(answer.reason)
     return answer if isinstance(answer, Reply) else None

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nep.errors import NepError, WireError
+from nep.i18n import _
 from nep.masters.rates import Meter
 from nep.protocol.graph_view import Alert
 from nep.protocol.requests import (
@@ -408,7 +409,7 @@ def check_request(request: Request) -> None:
         return
     _check_node(request.node)
     if isinstance(request, Join) and request.managed:
-        raise WireError("only what is attached to the master manages nodes")
+        raise WireError(_("only what is attached to the master manages nodes"))
     for record in records_of(request):
         _check_foreign(record)
 
@@ -432,7 +433,9 @@ def check_record(record: PublisherRecord | SubscriberRecord) -> None:
 
 def _check_node(node: NodeRecord) -> None:
     if not _NODE_ID.fullmatch(node.id):
-        raise WireError(f"'{shortened(node.id, 40)}' is no id of a node; it has 16 hexadecimal digits")
+        raise WireError(
+            _("'{id}' is no id of a node; it has 16 hexadecimal digits").format(id=shortened(node.id, 40))
+        )
     try:
         check_node_name(node.name)
     except NepError as error:
@@ -442,30 +445,42 @@ def _check_node(node: NodeRecord) -> None:
     _check_word("generation", node.generation, 50)
     _check_word("key", node.key, 200)
     if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
-        raise WireError(f"{node.pid} is no number of a process")
+        raise WireError(_("{pid} is no number of a process").format(pid=node.pid))
     if not 0 <= node.since_ns <= COUNT_MAX:
-        raise WireError(f"{node.since_ns} is no time at which a node began")
+        raise WireError(_("{since_ns} is no time at which a node began").format(since_ns=node.since_ns))
 
 
 def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
     check_record(record)
     if not 1 <= record.id <= COUNT_MAX:
-        raise WireError(f"{record.id} is no id of a publisher or subscriber; it is from 1 to 2^63-1")
+        raise WireError(
+            _("{id} is no id of a publisher or subscriber; it is from 1 to 2^63-1").format(id=record.id)
+        )
     _check_word("type", record.msg_type, 200)
     if isinstance(record, PublisherRecord):
         _check_word("codec", record.codec, 50)
         if len(record.endpoints) > _ENDPOINTS_MAX:
             raise WireError(
-                f"a publisher has {len(record.endpoints)} endpoints; {_ENDPOINTS_MAX} are allowed"
+                _("a publisher has {count} endpoints; {most} are allowed").format(
+                    count=len(record.endpoints), most=_ENDPOINTS_MAX
+                )
             )
         for endpoint in record.endpoints:
             if not is_tcp_endpoint(endpoint):
                 said = escaped(shortened(endpoint, 80))
-                raise WireError(f"'{said}' is no endpoint of a publisher; it is written 'tcp://HOST:PORT'")
+                raise WireError(
+                    _("'{said}' is no endpoint of a publisher; it is written 'tcp://HOST:PORT'").format(
+                        said=said
+                    )
+                )
 
 
 def _check_word(what: str, word: str, most: int) -> None:
     control = control_in(word)
     if len(word) > most or control:
-        hint = f"the character '{control}' is not allowed in it" if control else f"use {most} letters at most"
+        hint = (
+            _("the character '{control}' is not allowed in it").format(control=control)
+            if control
+            else _("use {most} letters at most").format(most=most)
+        )
         raise WireError(f"'{escaped(shortened(word, 40))}' cannot be its {what}; {hint}")

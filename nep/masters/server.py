@@ -14,6 +14,7 @@ from dataclasses import replace
 import zmq
 
 from nep.errors import ClosedError, NepError, WaitTimeoutError
+from nep.i18n import _
 from nep.masters.bad_requests import BadRequests, who_sends
 from nep.masters.graph import Graph, Outgoing, with_hosts, without
 from nep.masters.leases import is_renewal, read_renewal, renewed_body
@@ -219,7 +220,7 @@ class MasterServer:
 
     def _serve_router(self) -> None:
         enough_at = time.monotonic() + _TICK_S
-        for _ in range(1000):  # then time for the rest of the loop
+        for _turn in range(1000):  # then time for the rest of the loop
             if time.monotonic() > enough_at:
                 return
             try:
@@ -268,7 +269,7 @@ class MasterServer:
     def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
-            asked = Asked(asked.call, "who may connect is decided on the master's own computer")
+            asked = Asked(asked.call, _("who may connect is decided on the master's own computer"))
         name = _name_of(sender)
         reason = self._apply(asked, name)
         if reason:
@@ -344,7 +345,7 @@ class MasterServer:
         member = self._graph.node_at(route)
         return () if member is None else (member.node.id,)
 
-    def _refused(self, reason: str = "the master could not carry this out; its log says why") -> Refused:
+    def _refused(self, reason: str = _("the master could not carry this out; its log says why")) -> Refused:
         return Refused(self._graph.epoch, self._graph.revision, reason)
 
     def _tell_listeners(self, now: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from nep.i18n import _, listed
 from nep.masters.registry import RegisteredNode, RegisteredPublisher, RegisteredSubscriber, Registry
 from nep.protocol.encoding import made
 from nep.protocol.graph_view import Alert, GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
@@ -160,8 +161,8 @@ def _name_alerts(registry: Registry) -> Iterator[Alert]:
         if count > 1:
             yield Alert(
                 f"name:{name}",
-                f"{count} programs call themselves “{name}”",
-                "Give each program a name of its own; all of them go on working.",
+                _("{count} programs call themselves “{name}”").format(count=count, name=name),
+                _("Give each program a name of its own; all of them go on working."),
             )
 
 
@@ -170,8 +171,10 @@ def _missing_alerts(registry: Registry) -> Iterator[Alert]:
         if member.hung:
             yield Alert(
                 f"missing:{member.node.id}",
-                f"“{member.node.name}” does not answer {_names(_names_of(registry, member.hung))}",
-                "It may be busy or stopped in a debugger. What is published meanwhile may not reach it.",
+                _("“{node}” does not answer {others}").format(
+                    node=member.node.name, others=_names(_names_of(registry, member.hung))
+                ),
+                _("It may be busy or stopped in a debugger. What is published meanwhile may not reach it."),
             )
 
 
@@ -185,37 +188,50 @@ def _topic_alerts(
         if member.node.generation != "gateway":
             types.setdefault(publisher.record.msg_type, []).append(member.node.name)
     if len(types) > 1:
-        said = " and ".join(f"{_names(names)} as “{kind}”" for kind, names in sorted(types.items()))
+        said = [
+            _("{nodes} as “{kind}”").format(nodes=_names(names), kind=kind)
+            for kind, names in sorted(types.items())
+        ]
         yield Alert(
             f"type:{topic}",
-            f"The topic “{topic}” has {len(types)} types: it is published by {said}",
-            "Use the same type in all programs, or give one of the topics another name.",
+            _("The topic “{topic}” has {count} types: it is published by {nodes}").format(
+                topic=topic, count=len(types), nodes=listed(said)
+            ),
+            _("Use the same type in all programs, or give one of the topics another name."),
         )
     for member, publisher in publishing:
         if publisher.problem:
             yield Alert(
                 f"encode:{topic}",
-                f"“{member.node.name}” cannot send on “{topic}”: {publisher.problem}",
-                "Look at the program: nobody gets these messages.",
+                _("“{node}” cannot send on “{topic}”: {problem}").format(
+                    node=member.node.name, topic=topic, problem=publisher.problem
+                ),
+                _("Look at the program: nobody gets these messages."),
             )
             break
     for member, subscriber in subscribing:
         if subscriber.problem:
             yield Alert(
                 f"message:{topic}",
-                f"“{member.node.name}” cannot read “{topic}”: {subscriber.problem}",
-                "Look at the program that publishes it.",
+                _("“{node}” cannot read “{topic}”: {problem}").format(
+                    node=member.node.name, topic=topic, problem=subscriber.problem
+                ),
+                _("Look at the program that publishes it."),
             )
             return
 
 
 def _names_of(registry: Registry, node_ids: Iterable[str]) -> set[str]:
     """The names of these nodes, as far as they are there."""
-    return {registry.members[each].node.name for each in node_ids if each in registry.members} or {"programs"}
+    return {registry.members[each].node.name for each in node_ids if each in registry.members} or {
+        _("programs")
+    }
 
 
-def _names(names: Iterable[str]) -> str:
+def _names(nodes: Iterable[str]) -> str:
     """Some names for a sentence: all of them, or how many more there are."""
-    said = sorted(set(names))
-    more = f" and {len(said) - _NAMES} more" if len(said) > _NAMES else ""
-    return ", ".join(f"“{name}”" for name in said[:_NAMES]) + more
+    said = sorted(set(nodes))
+    names = ", ".join(f"“{name}”" for name in said[:_NAMES])
+    if len(said) <= _NAMES:
+        return names
+    return _("{names} and {count} more").format(names=names, count=len(said) - _NAMES)

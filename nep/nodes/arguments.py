@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar, cast
 
 from nep.errors import WrongTypeError
+from nep.i18n import _, listed
 from nep.text import control_in, escaped, shortened
 
 __all__ = ["at_least", "flag", "function", "limit", "one_of", "seconds", "text"]
@@ -20,35 +21,51 @@ _LETTERS = 200
 def text(name: str, value: object) -> str:
     """`value` itself when it is a text that can be a type's name. Raises `ValueError`."""
     if not isinstance(value, str):
-        raise WrongTypeError(f"{name} is a '{_kind(value)}'; give a 'str'")
+        raise WrongTypeError(_("{name} is a '{kind}'; give a 'str'").format(name=name, kind=_kind(value)))
     if not value:
-        raise ValueError(f"{name} is empty; give a name such as 'json'")
+        raise ValueError(_("{name} is empty; give a name such as 'json'").format(name=name))
     if len(value) > _LETTERS or control_in(value):
         said = escaped(shortened(value, 40))
-        raise ValueError(f"{name} is '{said}'; use {_LETTERS} letters at most, and none that controls")
+        raise ValueError(
+            _("{name} is '{said}'; use {most} letters at most, and none that controls").format(
+                name=name, said=said, most=_LETTERS
+            )
+        )
     return value
 
 
 def flag(name: str, value: object) -> bool:
     """`value` itself when it is True or False. Raises `ValueError`."""
     if not isinstance(value, bool):
-        raise WrongTypeError(f"{name} is {value!r}; give True or False")
+        raise WrongTypeError(_("{name} is {value}; give True or False").format(name=name, value=repr(value)))
     return value
 
 
 def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
     """`value` itself when it is one of the allowed. Raises `ValueError`."""
     if value not in allowed:
-        raise ValueError(f"{name} is {value!r}; use {' or '.join(repr(each) for each in allowed)}")
+        raise ValueError(
+            _("{name} is {value}; use {choices}").format(
+                name=name, value=repr(value), choices=listed([repr(each) for each in allowed], "or")
+            )
+        )
     return value
 
 
 def at_least(name: str, value: object, least: int) -> int:
     """`value` itself when it is a whole number and not below `least`. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
-        raise WrongTypeError(f"{name} is {value!r}; give a whole number from {least} on")
+        raise WrongTypeError(
+            _("{name} is {value}; give a whole number from {least} on").format(
+                name=name, value=repr(value), least=least
+            )
+        )
     if value < least:
-        raise ValueError(f"{name} is {value}; give a whole number from {least} on")
+        raise ValueError(
+            _("{name} is {value}; give a whole number from {least} on").format(
+                name=name, value=value, least=least
+            )
+        )
     return value
 
 
@@ -57,16 +74,20 @@ def seconds(name: str, value: object) -> float | None:
     if value is None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise WrongTypeError(f"{name} is {value!r}; give seconds, 0 or more, or None")
+        raise WrongTypeError(
+            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=repr(value))
+        )
     if not value >= 0.0:  # also what is not a number
-        raise ValueError(f"{name} is {value}; give seconds, 0 or more, or None")
+        raise ValueError(
+            _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=value)
+        )
     return None if math.isinf(value) else value
 
 
 def limit(name: str, value: object) -> float:
     """`value` itself when it is a time that ends: 0 or more seconds. Raises `ValueError`."""
     if value is None:
-        raise WrongTypeError(f"{name} is None; give seconds, 0 or more")
+        raise WrongTypeError(_("{name} is None; give seconds, 0 or more").format(name=name))
     seconds(name, value)
     return cast("float", value)
 
@@ -74,7 +95,7 @@ def limit(name: str, value: object) -> float:
 def function(name: str, value: F) -> F:
     """`value` itself when it can be called. Raises `ValueError`."""
     if not callable(value):
-        raise WrongTypeError(f"{name} is a '{_kind(value)}'; give a function")
+        raise WrongTypeError(_("{name} is a '{kind}'; give a function").format(name=name, kind=_kind(value)))
     return value
 
 
