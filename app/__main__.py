@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from nep.errors import NepError
-from nep.i18n import begin
+from nep.i18n import _, begin
 from nep.system.addresses import MASTER_VARIABLE, master_address
 from nep.system.descriptors import allow_many
 from nep.system.streams import close_streams, prepare_streams, words_given
@@ -36,20 +36,20 @@ _log = logging.getLogger("studio")
 def window_parser() -> argparse.ArgumentParser:
     """The options of ``python -m app``."""
     made = argparse.ArgumentParser(
-        prog="nep-studio", description="NEP Studio. `nep-studio run FILE` runs a behaviour with no window."
+        prog="nep-studio", description=_("NEP Studio. `nep-studio run FILE` runs a behaviour with no window.")
     )
     made.add_argument("files", nargs="*", type=Path, metavar="FILE", help="behaviours to open")
     made.add_argument(
-        "--new-window", action="store_true", help="a window of its own, although Studio runs already"
+        "--new-window", action="store_true", help=_("a window of its own, although Studio runs already")
     )
     made.add_argument(
-        "--demo", action="store_true", help="begin with the virtual robot and the first example"
+        "--demo", action="store_true", help=_("begin with the virtual robot and the first example")
     )
     made.add_argument("--master", metavar="HOST:PORT", help="the master to join")
     made.add_argument("--version", action="version", version=f"NEP Studio {__version__}")
-    made.add_argument("--theme", choices=("light", "dark", "system"), help="its colours")
+    made.add_argument("--theme", choices=("light", "dark", "system"), help=_("its colours"))
     made.add_argument(
-        "--self-drive", metavar="DIR", type=Path, help="do the main job alone; screenshots go to DIR"
+        "--self-drive", metavar=_("DIR"), type=Path, help=_("do the main job alone; screenshots go to DIR")
     )
     return made
 
@@ -58,17 +58,21 @@ def run_parser() -> argparse.ArgumentParser:
     """The options of ``python -m app run``."""
     made = argparse.ArgumentParser(
         prog="nep-studio run",
-        description="Run a behaviour with no window. Exit codes: 0 ended well; 1 a block failed or a robot "
-        "did not stop; 2 the file can't be run; 3 a robot of it is not there; 4 a real robot would move and "
-        "may not; 130 stopped by Ctrl+C.",
+        description=_(
+            "Run a behaviour with no window. Exit codes: 0 ended well; 1 a block failed or a "
+            "robot did not stop; 2 the file can't be run; 3 a robot of it is not there; 4 a real "
+            "robot would move and may not; 130 stopped by Ctrl+C."
+        ),
     )
-    made.add_argument("file", type=Path, metavar="FILE", help="the behaviour")
+    made.add_argument("file", type=Path, metavar=_("FILE"), help=_("the behaviour"))
     made.add_argument(
-        "--robot-wait", type=float, metavar="S", default=10.0, help="wait for its robots, in seconds"
+        "--robot-wait", type=float, metavar="S", default=10.0, help=_("wait for its robots, in seconds")
     )
     made.add_argument("--master", metavar="HOST:PORT", help="the master to join")
     made.add_argument(
-        "--allow-moving", action="store_true", help="let robots move that are not virtual; Ctrl+C stops them"
+        "--allow-moving",
+        action="store_true",
+        help=_("let robots move that are not virtual; Ctrl+C stops them"),
     )
     return made
 

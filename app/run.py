@@ -32,7 +32,7 @@ from app.errors import AppError, DescriptionError
 from app.robots.description.description import Robot, parse
 from app.robots.identity import DESCRIPTION_TYPE
 from nep.errors import NepError
-from nep.i18n import listed
+from nep.i18n import _, listed, number
 from nep.system.streams import tell
 from nep.text import escaped
 
@@ -71,7 +71,7 @@ def run_file(
         with nep.node("behaviour runner", master=master) as node:
             found = _judged(_robots_for(workspace, node, robot_wait_s, known))
             for claim in found.claims:
-                say(f"warning: {claim}")
+                say(_("warning: {sentence}").format(sentence=claim))
             program = compile_behaviour(workspace, found.robots, absent=known, name=name)
             code = _refused(program, wanted, found.robots, say)
             if code is not None:
@@ -157,7 +157,11 @@ class _Lines:
     def tell_problem(self) -> None:
         """Say on the error stream why nothing was written any more; nothing when its reader has left."""
         if self._problem:
-            tell(f"the output cannot be written: {self._problem}; the behaviour was stopped.")
+            tell(
+                _("the output cannot be written: {reason}; the behaviour was stopped.").format(
+                    reason=self._problem
+                )
+            )
 
 
 def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
@@ -176,13 +180,14 @@ def _refused(
 ) -> int | None:
     """Tell the problems; the exit code if the program must not run with them."""
     for problem in program.problems:
-        say(f"{problem.severity}: {problem.sentence}")
+        words = _("error: {sentence}") if problem.severity == "error" else _("warning: {sentence}")
+        say(words.format(sentence=problem.sentence))
     missing = sorted(set(wanted) - {robot.name for robot in robots})
     if missing:
         say(f"{listed(missing)} not found. Switch it on, or start the virtual robot.")
         return ROBOT_MISSING
     if program.errors or not program.starts:
-        say(f"“{program.name}” can't run.")
+        say(_("“{name}” can't run.").format(name=program.name))
         return UNUSABLE
     return None
 
@@ -194,7 +199,11 @@ def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], 
     moves = {robot.name: risky(robot, asked) for robot, asked in wanted}
     for name, titles in moves.items():
         if titles:
-            say(f"{name} would move ({', '.join(titles)}). Add --allow-moving if it may.")
+            say(
+                _("{robot} would move ({actions}). Add --allow-moving if it may.").format(
+                    robot=name, actions=", ".join(titles)
+                )
+            )
     return any(moves.values())
 
 
@@ -211,7 +220,7 @@ def _run(program: Program, found: Found, reach: _Reach, say: _Lines, interrupted
     stopper = reach.stopper
     told = _Told(say)
     runner = Runner(told)
-    say(f"“{program.name}” runs")
+    say(_("“{name}” runs").format(name=program.name))
     if interrupted.is_set():
         return FAILED if say.is_lost else INTERRUPTED
     owners = {name: owner.node_id for name, owner in found.owners.items()}
@@ -278,13 +287,15 @@ class _Told:
         if event.kind == "ended":
             self.ok, self.silent = event.ok, event.silent
             if event.elapsed_s is not None:
-                self._say(f"ended after {event.elapsed_s:.1f} s")
+                self._say(_("ended after {seconds} s").format(seconds=number(event.elapsed_s, ".1f")))
 
 
 def stop_lines(report: StopReport) -> list[str]:
     """The stop in words: "all 2 robots stopped (41 ms)", and each robot that did not."""
     strange = [
-        f"“{program}” answered Stop in the name of {name}; that does not count."
+        _("“{program}” answered Stop in the name of {robot}; that does not count.").format(
+            program=program, robot=name
+        )
         for name, program in report.strangers
     ]
     if not report.robots:
@@ -293,5 +304,13 @@ def stop_lines(report: StopReport) -> list[str]:
     if others or strange:
         return [*(robot.sentence for robot in report.robots if robot.answered), *others, *strange]
     if len(report.robots) == 1:
-        return [f"{report.robots[0].name} stopped ({report.elapsed_ms:.0f} ms)"]
-    return [f"all {len(report.robots)} robots stopped ({report.elapsed_ms:.0f} ms)"]
+        return [
+            _("{robot} stopped ({elapsed} ms)").format(
+                robot=report.robots[0].name, elapsed=f"{report.elapsed_ms:.0f}"
+            )
+        ]
+    return [
+        _("all {count} robots stopped ({elapsed} ms)").format(
+            count=len(report.robots), elapsed=f"{report.elapsed_ms:.0f}"
+        )
+    ]

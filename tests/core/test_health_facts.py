@@ -24,7 +24,13 @@ class Case:
     """A robot that is well, with all its topics."""
 
     def __init__(self) -> None:
-        self.link = RobotLink("Pepper", PEPPER, answered_s=NOW - 3, last_stop="answered in 41 ms, at 8:40")
+        self.link = RobotLink(
+            "Pepper",
+            PEPPER,
+            answered_s=NOW - 3,
+            last_stop="answered in 41 ms, at 8:40",
+            last_stop_status="ok",
+        )
         self.link.values["battery"] = 84
         self.topics = {
             sensor.topic: Topic(sensor.topic, rate_hz=15.2, age_s=0.1) for sensor in PEPPER.sensors
@@ -124,7 +130,7 @@ def test_the_warmest_part_is_named(case: Case) -> None:
     ],
 )
 def test_the_last_stop(case: Case, last: str, status: str) -> None:
-    case.link.last_stop = last
+    case.link.last_stop, case.link.last_stop_status = last, status
     assert case.says("Stop") == (status, last)
 
 

@@ -151,6 +151,7 @@ def RobotLink(name: str, robot: Robot, *, virtual: bool = True, **more: object) 
     described = robot if robot.virtual == virtual else replace(robot, virtual=virtual)
     given: dict[str, object] = {
         "last_stop": "answered in 41 ms, at 8:40",
+        "last_stop_status": "ok",
         "publisher": Line(),
         "world": Line(),
     }

@@ -41,7 +41,10 @@ def test_each_fact_is_a_row_and_nothing_is_to_be_looked_at(panel, asked) -> None
     assert not panel.step.isVisible()
     assert panel.rows[0].accessibleName() == "Connection"
     assert panel.rows[0].accessibleDescription() == panel.rows[0].words.text()
-    asked.session.fleet.links[0].last_stop = "not answered, at 8:41"
+    asked.session.fleet.links[0].last_stop, asked.session.fleet.links[0].last_stop_status = (
+        "not answered, at 8:41",
+        "error",
+    )
     panel.refresh()
     assert said(panel)["Stop"] == "not answered, at 8:41"
 

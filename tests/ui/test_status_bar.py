@@ -48,7 +48,7 @@ def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:
     link = session.fleet.links[0]
     link.values["battery"] = 7
     assert facts(session).health() == ("triangle-alert", "Pepper: 1 to look at", "warn")
-    link.last_stop = "not answered, at 8:41"
+    link.last_stop, link.last_stop_status = "not answered, at 8:41", "error"
     assert facts(session).health() == ("circle-x", "Pepper: 2 to look at", "error")
 
 

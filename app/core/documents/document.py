@@ -33,8 +33,9 @@ from app.core.documents.workspace_json import LONG_CHARACTERS, WorkspaceJson
 from app.core.storage import deep_json
 from app.errors import DescriptionError, DocumentError
 from app.robots.description.description import Robot, parse
+from nep.i18n import _, lazy
 
-UNNAMED = "New behaviour"
+UNNAMED = lazy("New behaviour")
 
 _keys = itertools.count(1)
 
@@ -56,7 +57,7 @@ class Document:
         self._journal = journal()
         self.key = f"behaviour-{next(_keys)}"
         self.path: Path | None = None
-        self.name = UNNAMED
+        self.name = _(UNNAMED)
         self.others: Mapping[str, object] = {}
         self._json = WorkspaceJson.of({})
         self.robots: dict[str, Mapping[str, object]] = {}
@@ -103,9 +104,9 @@ class Document:
         self._keep_used_robots()
         self._write_journal()
 
-    def new(self, name: str = UNNAMED) -> None:
+    def new(self, name: str = "") -> None:
         """Begin an empty behaviour."""
-        self._replace(BehaviourFile(name, {}, {}), None)
+        self._replace(BehaviourFile(name or _(UNNAMED), {}, {}), None)
 
     def open(self, path: Path) -> None:
         """Open a file. Raises DocumentError; then what was open stays."""
@@ -135,7 +136,7 @@ class Document:
         """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError."""
         target = path if path is not None else self.path
         if target is None:
-            raise DocumentError(None, "this behaviour has no file yet; choose one")
+            raise DocumentError(None, _("this behaviour has no file yet; choose one"))
         name = target.stem if path is not None else self.name
         write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
         self.path, self.name = target, name
@@ -293,9 +294,11 @@ class Document:
         try:
             self._journal.write(self.name, self.path, self._json.text, self.robots, self.others)
         except OSError as error:
-            self.journal_error = f"unsaved work can't be kept ({error.strerror or error}); save the file now"
+            self.journal_error = _("unsaved work can't be kept ({reason}); save the file now").format(
+                reason=error.strerror or error
+            )
         except RecursionError:
-            self.journal_error = f"unsaved work can't be kept: {TOO_DEEP}"
+            self.journal_error = _("unsaved work can't be kept: {reason}").format(reason=_(TOO_DEEP))
         else:
             self.journal_error = None
 

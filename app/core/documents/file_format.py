@@ -13,11 +13,12 @@ from pathlib import Path
 from app.core.storage import deep_json
 from app.core.storage.atomic_file import LARGEST_BYTES, read_whole, write_atomically
 from app.errors import DocumentError
+from nep.i18n import _, lazy, number
 
 FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
-TOO_DEEP = "more than 4000 blocks hang in one stack; divide it into several scripts"
+TOO_DEEP = lazy("more than 4000 blocks hang in one stack; divide it into several scripts")
 FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """What systems say of a disk, a file or a share of a disk that takes nothing more."""
 OURS = frozenset({"format", "version", "name", "workspace", "robots"})
@@ -41,9 +42,11 @@ def read_file(path: Path) -> BehaviourFile:
     try:
         data = read_whole(path)
     except OSError as error:
-        raise DocumentError(path, f"can't be read ({error.strerror or error})") from error
+        raise DocumentError(
+            path, _("can't be read ({reason})").format(reason=error.strerror or error)
+        ) from error
     except ValueError as error:  # letters that no file's name has here
-        raise DocumentError(path, "can't be read (no file has such a name here)") from error
+        raise DocumentError(path, _("can't be read (no file has such a name here)")) from error
     return parse_file(data, path)
 
 
@@ -52,20 +55,24 @@ def parse_file(data: bytes, path: Path) -> BehaviourFile:
     try:
         content = deep_json.loads(data.decode("utf-8", "surrogatepass"))
     except (ValueError, RecursionError) as error:
-        raise DocumentError(path, "is damaged or no behaviour; open a copy from before") from error
+        raise DocumentError(path, _("is damaged or no behaviour; open a copy from before")) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DocumentError(path, f"is no behaviour; behaviours are files ending in {SUFFIX}")
+        raise DocumentError(
+            path, _("is no behaviour; behaviours are files ending in {suffix}").format(suffix=SUFFIX)
+        )
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise DocumentError(path, "does not say its version; open a copy from before")
+        raise DocumentError(path, _("does not say its version; open a copy from before"))
     if version > VERSION:
         raise DocumentError(
             path,
-            f"was made by a newer NEP Studio (version {version}) and is left as it is; update this one",
+            _(
+                "was made by a newer NEP Studio (version {version}) and is left as it is; update this one"
+            ).format(version=version),
         )
     workspace, robots = content.get("workspace"), content.get("robots", {})
     if not isinstance(workspace, dict) or not isinstance(robots, dict):
-        raise DocumentError(path, "has no blocks in it; open a copy from before")
+        raise DocumentError(path, _("has no blocks in it; open a copy from before"))
     described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
     others = {name: value for name, value in content.items() if name not in OURS}
     return BehaviourFile(str(content.get("name") or path.stem), workspace, described, others)
@@ -88,12 +95,18 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
         if len(data) > LARGEST_BYTES:
             size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
-            said = f"would have {size:.1f} MB; at most {most:.0f} MB are read, use smaller pictures"
+            said = _("would have {size} MB; at most {most} MB are read, use smaller pictures").format(
+                size=number(size, ".1f"), most=number(most, ".0f")
+            )
             raise DocumentError(path, said)
         write_atomically(path, data)
     except RecursionError as error:
-        raise DocumentError(path, f"can't be written: {TOO_DEEP}") from error
+        raise DocumentError(path, _("can't be written: {reason}").format(reason=_(TOO_DEEP))) from error
     except OSError as error:
         reason = error.strerror or str(error)
-        room = "make room there or " if error.errno in FULL else ""
-        raise DocumentError(path, f"can't be written ({reason}); {room}save it in another place") from error
+        words = (
+            _("can't be written ({reason}); make room there or save it in another place")
+            if error.errno in FULL
+            else _("can't be written ({reason}); save it in another place")
+        )
+        raise DocumentError(path, words.format(reason=reason)) from error

@@ -14,6 +14,7 @@ from app.core.documents.document import UNNAMED, Document
 from app.core.documents.journal import Unsaved
 from app.errors import DocumentError
 from app.robots.description.description import Robot
+from nep.i18n import _
 
 CLOSED_KEPT = 20
 
@@ -256,8 +257,8 @@ class Documents:
     def _free_name(self) -> str:
         names = {each.name for each in self._open}
         number = 2
-        name = UNNAMED
+        name = _(UNNAMED)
         while name in names:
-            name = f"{UNNAMED} {number}"
+            name = f"{_(UNNAMED)} {number}"
             number += 1
         return name

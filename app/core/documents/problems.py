@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from app.blocks import Problem
 from app.blocks.fixes.replace_robot import asked_of, can_do, types_of
 from app.robots.description.description import Robot
+from nep.i18n import _, ngettext
 
 CONNECT = "connect:"
 MOST_MENDS = 2  # a line has no room for more
@@ -80,12 +81,15 @@ def robot_mends(
 ) -> tuple[Mend, ...]:
     """What can be done about a missing robot, the best first; `able` can do what is asked of it."""
     if robot is None:
-        return (Mend(f"Connect {name}", f"{CONNECT}{name}"),)
+        return (Mend(_("Connect {robot}").format(robot=name), f"{CONNECT}{name}"),)
     alike = [other for other in able if other.model == robot.model] or able
-    mends = [Mend(f"Use {other.name}", f"robot.use:{name}:{other.name}") for other in alike[:MOST_MENDS]]
+    mends = [
+        Mend(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
+        for other in alike[:MOST_MENDS]
+    ]
     if robot.model in virtual_models and len(mends) < MOST_MENDS:
-        mends.append(Mend(f"Use the virtual {name}", f"robot.virtual:{name}"))
-    return tuple(mends) or (Mend(f"Connect {name}", f"{CONNECT}{name}"),)
+        mends.append(Mend(_("Use the virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
+    return tuple(mends) or (Mend(_("Connect {robot}").format(robot=name), f"{CONNECT}{name}"),)
 
 
 def _missing(problem: Problem) -> str | None:
@@ -98,6 +102,6 @@ def _counted(line: Listed) -> Listed:
     if line.blocks == 1:
         return line
     name = _missing(line.problem) or ""
-    subject = f"{line.blocks} blocks"
-    sentence = f"{name} is not connected, so {subject} will be skipped."
+    subject = ngettext("{count} block", "{count} blocks", line.blocks).format(count=line.blocks)
+    sentence = _("{robot} is not connected, so {block} will be skipped.").format(robot=name, block=subject)
     return replace(line, problem=replace(line.problem, subject=subject, sentence=sentence, icon="bot"))

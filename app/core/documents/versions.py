@@ -20,6 +20,7 @@ from app.core.documents.file_format import SUFFIX
 from app.core.storage.atomic_file import make_private, private_folder, read_whole, write_atomically
 from app.core.storage.settings import data_home, home
 from app.errors import DocumentError
+from nep.i18n import _
 
 NAME = "earlier"
 COPIES_KEPT = 300
@@ -50,7 +51,10 @@ class Earlier:
             write_atomically(self.path, read_whole(self.copy))
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise DocumentError(self.path, f"can't be put back ({reason}); open {self.copy}") from error
+            raise DocumentError(
+                self.path,
+                _("can't be put back ({reason}); open {copy}").format(reason=reason, copy=self.copy),
+            ) from error
 
 
 def keep_earlier(
@@ -74,7 +78,9 @@ def keep_earlier(
         os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
-        raise DocumentError(path, f"was not saved: what it said before can't be kept ({reason})") from error
+        raise DocumentError(
+            path, _("was not saved: what it said before can't be kept ({reason})").format(reason=reason)
+        ) from error
     with contextlib.suppress(OSError):  # another Studio was quicker
         _thin_out(where, _mark(path))
         _drop_oldest(where)

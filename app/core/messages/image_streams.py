@@ -15,6 +15,7 @@ from typing import Protocol
 
 from app.core.messages.picture import Picture, Size, decode
 from app.core.network.watches import Look
+from nep.i18n import _
 from nep.messages.message import Message
 
 RATE_WINDOW_S = 2.0
@@ -240,7 +241,12 @@ class Images:
                 try:
                     picture, error = decode(message, arrived_s, size)
                 except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
-                    picture, error = None, f"“{message.topic}” sends a picture that can't be shown: {problem}"
+                    picture, error = (
+                        None,
+                        _("“{topic}” sends a picture that can't be shown: {problem}").format(
+                            topic=message.topic, problem=problem
+                        ),
+                    )
                 with self.lock:
                     for stream in streams:
                         _give(stream, message, picture, error)

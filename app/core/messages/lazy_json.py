@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, overload
 
 import orjson
 
+from nep.i18n import _
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -57,10 +59,10 @@ class JsonIndex:
         opens, closes = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
         after = np.cumsum(opens.astype(np.int32) - closes)
         if not len(after) or after[-1] != 0 or after.min() < 0:
-            raise ValueError("its brackets do not match")
+            raise ValueError(_("its brackets do not match"))
         level = after + closes
         if level.max() > DEEPEST:
-            raise ValueError(f"it is nested deeper than {DEEPEST} levels")
+            raise ValueError(_("it is nested deeper than {most} levels").format(most=DEEPEST))
         order = np.argsort(level.astype(np.int16), kind="stable")
         bounds = np.searchsorted(np.take(level, order), np.arange(1, int(level.max()) + 2))
         self._levels = [  # `take` lets other threads run, an index in brackets does not
@@ -275,7 +277,7 @@ def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
         kinds.append(part[found])
         in_text = int(inside[-1])
     if in_text or not places:
-        raise ValueError("a text in it does not end")
+        raise ValueError(_("a text in it does not end"))
     return np.concatenate(places), np.concatenate(kinds)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from nep.errors import EncodeError, NepError
+from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.image_files import examine
 from nep.messages.message import Message
@@ -72,9 +73,13 @@ def decode(message: Message, received_s: float, fit: Size | None = None) -> tupl
     except NepError as error:
         return None, str(error)
     except (cv2.error, MemoryError) as error:
-        return None, f"“{message.topic}” sends a picture that can't be shown: {_short(error)}"
+        return None, _("“{topic}” sends a picture that can't be shown: {problem}").format(
+            topic=message.topic, problem=_short(error)
+        )
     if found is None:
-        return None, f"“{message.topic}” has pictures of {frame.shape} {frame.dtype}; they can't be shown"
+        return None, _("“{topic}” has pictures of {shape} {dtype}; they can't be shown").format(
+            topic=message.topic, shape=frame.shape, dtype=frame.dtype
+        )
     bgra, numbers = found
     if (bgra.shape[1], bgra.shape[0]) != size:
         numbers = None
@@ -99,10 +104,14 @@ def png_of(message: Message) -> bytes:
             return bytes(file.data)
     frame, _size = _frame(message, None)
     if frame.dtype not in PNG_NUMBERS:
-        raise EncodeError("png", f"picture of {frame.dtype}", "it has whole numbers of 8 or 16 bits alone")
+        raise EncodeError(
+            "png",
+            _("picture of {dtype}").format(dtype=frame.dtype),
+            _("it has whole numbers of 8 or 16 bits alone"),
+        )
     good, data = cv2.imencode(".png", frame)
     if not good:
-        raise OSError(f"a picture of {frame.shape} can't be written as PNG")
+        raise OSError(_("a picture of {shape} can't be written as PNG").format(shape=frame.shape))
     return bytes(data.tobytes())
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from app.core.messages.lazy_json import JsonIndex
 from nep.errors import NepError
 from nep.messages.message import Message
+from nep.i18n import 
 
 LARGE_BYTES = 1_000_000
 """JSON above this is looked into, not decoded; what is larger is never read in the window's thread."""

@@ -11,6 +11,7 @@ import platformdirs
 
 from app.core.messages.picture import png_of
 from app.core.storage.settings import Settings, home
+from nep.i18n import _
 from nep.messages.message import Message
 
 NAME = "NEP Studio"
@@ -52,7 +53,7 @@ def save(message: Message, into: Path | None = None) -> Path:
             path.unlink(missing_ok=True)  # half a picture is none
             raise
         return path
-    raise FileExistsError(f"there are a thousand pictures named “{stem}”")
+    raise FileExistsError(_("there are a thousand pictures named “{stem}”").format(stem=stem))
 
 
 def file_stem(message: Message) -> str:

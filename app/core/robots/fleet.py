@@ -214,17 +214,17 @@ class Fleet:
         """Those that were told to stop and have not answered yet."""
         return tuple(link.name for link in self._links.values() if link.stop_began_s is not None)
 
-    def stopped(self, words: Mapping[str, str], wrong: Mapping[str, str]) -> None:
-        """These robots were told to stop; the words say what each did, by its name.
+    def stopped(self, words: Mapping[str, tuple[str, str]], wrong: Mapping[str, str]) -> None:
+        """These robots were told to stop; the words say what each did, by its name, each with its status.
 
         ``wrong`` says of those that are not proven to stand still why not; what they were asked ends when
         they say so themselves.
         """
-        for name, said in words.items():
+        for name, (said, status) in words.items():
             link = self._links.get(name)
             if link is None:
                 continue
-            link.last_stop, link.not_stopped = said, wrong.get(name, "")
+            link.last_stop, link.last_stop_status, link.not_stopped = said, status, wrong.get(name, "")
             link.stop_began_s, link.stopping = None, False
             if not link.not_stopped:
                 link.left_busy = False

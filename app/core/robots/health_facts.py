@@ -141,8 +141,7 @@ def _stop(link: RobotLink) -> HealthFact:
     if link.stopping:
         return HealthFact(STOP, "off", _("told to stop; its answer is waited for"))
     if link.last_stop is not None:
-        kinds = {"answered": "ok", "sent": "off"}
-        return HealthFact(STOP, kinds.get(link.last_stop.partition(" ")[0], "error"), link.last_stop)
+        return HealthFact(STOP, link.last_stop_status, link.last_stop)
     said = _("not used yet") if link.can_confirm_stop else _("not used yet; this robot cannot confirm")
     return HealthFact(STOP, "off", said)
 

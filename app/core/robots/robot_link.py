@@ -103,6 +103,7 @@ class RobotLink:
     answered_s: float | None = None
     gone_s: float | None = None
     last_stop: str | None = None
+    last_stop_status: str = "error"
     not_stopped: str = ""
     goes_on: str = ""
     stop_began_s: float | None = None

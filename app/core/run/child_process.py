@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.errors import RunnerError
+from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
 from nep.system.lazy_import import later
 
@@ -56,7 +57,9 @@ class ChildProcess:
                 start_new_session=os.name == "posix",  # a group of its own, which can be ended at once
             )
         except OSError as error:
-            raise RunnerError(f"the program's process can't be started: {error}") from error
+            raise RunnerError(
+                _("the program's process can't be started: {error}").format(error=error)
+            ) from error
         self._process = _process(self.popen.pid)
 
     @property

@@ -22,11 +22,13 @@ from app.core.robots.stop import RobotStopper
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.run.view import (
+    STOP_AGAIN,
     RunState,
     RunView,
     clock_words,
     place_of,
     result_words,
+    stop_status,
     stop_words,
     stops_by_name,
     view_of,
@@ -34,9 +36,10 @@ from app.core.run.view import (
 from app.core.run.view import unanswered_words as unanswered_words_of
 from app.errors import AppError
 from app.robots.description.description import Robot
+from nep.i18n import _, lazy
 
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
-NO_NETWORK = "there is no connection to the network yet"
+NO_NETWORK = lazy("there is no connection to the network yet")
 
 _log = logging.getLogger("studio")
 
@@ -196,7 +199,7 @@ class Runs:
         if self._runner is None or not self.active or self._fleet.revision == self._robots_told:
             return
         self._robots_told, owners = self._fleet.revision, self._owners()
-        links = [self._fleet.link(robot.name) for robot, _ in self._wanted]
+        links = [self._fleet.link(robot.name) for robot, _asked in self._wanted]
         asked = {robot.name: actions for robot, actions in self._wanted}
         anew = [
             link
@@ -333,7 +336,7 @@ class Runs:
                 owners=owners,
             )
         except AppError as error:
-            self._alerts.put("program", "error", "The behaviour can't be started.", str(error))
+            self._alerts.put("program", "error", _("The behaviour can't be started."), str(error))
             return
         self._runner, self._used, self._labels = runner, program.robots, program.labels
         self._wanted, self._told_owners, self._robots_told = wanted, owners, self._fleet.revision
@@ -341,14 +344,14 @@ class Runs:
         self._console.leave_out(runner.pid)
         last = self._run.last_words
         self._run = RunState("running", document.name, started_s=self._clock(), last_words=last)
-        self._console.add("info", self._run.name, "started")
+        self._console.add("info", self._run.name, _("started"))
 
     def _on_error(self, event: RunnerEvent) -> None:
         self._console.add("error", self._run.name, event.text)
         if event.blocks:
             self._set_errors({event.blocks[0]: event.text})
         else:
-            self._alerts.put("program", "error", "The behaviour was stopped.", event.text)
+            self._alerts.put("program", "error", _("The behaviour was stopped."), event.text)
 
     def _on_end(self, event: RunnerEvent) -> None:
         self._runner = None
@@ -361,7 +364,7 @@ class Runs:
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run = replace(self._run, finished=finished)
         if not event.ok and not self.block_errors:
-            self._alerts.put("program", "error", "The behaviour ended by itself.", event.text)
+            self._alerts.put("program", "error", _("The behaviour ended by itself."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
         """Stop these robots, or all."""
@@ -431,23 +434,25 @@ class Runs:
 
     def _tell_person(self, report: StopReport, origin: str) -> None:
         for name, program in report.strangers:
-            said = f"“{program}” answered Stop in the name of {name}; that does not count"
+            said = _("“{program}” answered Stop in the name of {robot}; that does not count").format(
+                program=program, robot=name
+            )
             self._console.add("error", origin, said)
-            detail = "Find out what this program is and close it."
+            detail = _("Find out what this program is and close it.")
             self._alerts.put(f"stranger:{name}", "error", f"{said}.", detail)
         words, good = result_words(report)
         if good:
             self._console.add("info", origin, words)
             self._alerts.cure("stop")
         else:
-            title, detail, _, _ = unanswered_words_of(report)
+            title, detail, _compact, _confirm = unanswered_words_of(report)
             self._console.add("error", origin, f"{words}: {title}")
-            self._alerts.put("stop", "error", f"{title}.", detail, button="Stop again", action="run.stop")
+            self._alerts.put("stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop")
 
     def _tell_fleet(self, report: StopReport) -> None:
         clock, stops = clock_words(time.localtime()), stops_by_name(report)
         self._fleet.stopped(
-            {name: stop_words(robot, clock) for name, robot in stops.items()},
+            {name: (stop_words(robot, clock), stop_status(robot)) for name, robot in stops.items()},
             {name: robot.wrong for name, robot in stops.items()},
         )
 
@@ -470,7 +475,7 @@ def _asked(
     ends: str | None = None,
 ) -> StopReport:
     """Stop these robots. There is a report whatever happens: without one the run would stay "stopping"."""
-    why = NO_NETWORK
+    why = _(NO_NETWORK)
     if stopper is not None:
         try:
             return stopper.stop_all(names, on_answer=on_answer, ends=ends, on_late=on_late)

@@ -19,6 +19,7 @@ from app.core.run.child_process import MOST_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command
 from app.errors import RunnerError
 from app.robots.identity import program_of
+from nep.i18n import _, ngettext, number
 
 Kind = Literal["ready", "running", "paused", "error", "print", "ended"]
 
@@ -116,7 +117,7 @@ class Runner:
         is slow motion (`set_pace`). RunnerError if its process can't be started.
         """
         if self._child is not None:
-            raise RunnerError("this runner has run its program; make another one")
+            raise RunnerError(_("this runner has run its program; make another one"))
         self._child = child = ChildProcess(self._command, home(), most_bytes=self._most_bytes)
         self._began_s = self._clock()
         self.state = "paused" if paused else "running"
@@ -238,10 +239,16 @@ class Runner:
     def _left_out(self, events: int, strange_bytes: int) -> None:
         """Say how much was not shown."""
         if events:
-            text = f"{events} lines were left out: too many at once"
+            text = ngettext(
+                "{count} line was left out: too many at once",
+                "{count} lines were left out: too many at once",
+                events,
+            ).format(count=events)
             self._on_event(RunnerEvent("print", self.run, text=text))
         if strange_bytes >= WORTH_TELLING:
-            text = f"{strange_bytes / 1e6:.1f} MB that no block wrote were left out"
+            text = _("{size} MB that no block wrote were left out").format(
+                size=number(strange_bytes / 1e6, ".1f")
+            )
             self._on_event(RunnerEvent("print", self.run, text=text))
 
     def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
@@ -271,13 +278,18 @@ class Runner:
     def _why(self, child: ChildProcess, *, hung: bool) -> str:
         """Why a process ended that did not say so."""
         if child.too_large:
-            return f"The program used more than {self._most_bytes / 1e9:g} GB of memory and was ended."
+            return _("The program used more than {size} GB of memory and was ended.").format(
+                size=number(self._most_bytes / 1e9)
+            )
         if hung:
-            return "The program closed its line to Studio and was ended."
+            return _("The program closed its line to Studio and was ended.")
         code = child.popen.returncode
         words = next((line for line in reversed(self._errors) if line.strip()), "")
-        how = f"was killed (signal {-code})" if code < 0 else f"ended with code {code}"
-        return f"The program's process {how}{': ' + words.strip() if words else ''}."
+        if code < 0:
+            how = _("The program's process was killed (signal {signal})").format(signal=-code)
+        else:
+            how = _("The program's process ended with code {code}").format(code=code)
+        return f"{how}: {words.strip()}." if words else f"{how}."
 
     def _read_errors(self, child: ChildProcess) -> None:
         """Keep the last lines of what went wrong; a line without an end is cut."""

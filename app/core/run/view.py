@@ -7,12 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport
-from nep.i18n import listed
+from nep.i18n import _, lazy, listed, ngettext, number
 
 MOST_NAMED = 4
 WIDEST_NAMES = 24
 """Longer names of robots are not repeated on the button beside the sentence that has them."""
-NOTHING = "Take “when started” from Events and hang blocks below it"
+NOTHING = lazy("Take “when started” from Events and hang blocks below it")
+RUN, GO_ON = lazy("Run"), lazy("Go on")
+STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +70,8 @@ class RunView:
     can_run: bool = False
     can_pause: bool = False
     can_step: bool = False
-    run_word: str = "Run"
-    stop_word: str = "Stop"
+    run_word: str = RUN
+    stop_word: str = STOP
     result: str | None = None
     result_ok: bool | None = None
     last_stop: str | None = None
@@ -93,20 +95,27 @@ def view_of(
     ``elsewhere``: the run belongs to a behaviour whose tab does not show, so the title names it.
     """
     view = replace(_view(run, connected, now), slow=slow)
-    return _named(view, run) if elsewhere and run.name and run.state != "ready" else view
+    return _named(view, run, now) if elsewhere and run.name and run.state != "ready" else view
 
 
-def _named(view: RunView, run: RunState) -> RunView:
+def _named(view: RunView, run: RunState, now: float) -> RunView:
     """The same with the behaviour's name, for when another one's blocks are to be seen."""
     if view.state == "running":
-        return replace(view, title=f"{run.name} runs{view.title.removeprefix('Running')}")
+        # just pressed: the words of before stay, and what ran has its time
+        if run.state == "stopping" and run.elapsed_s is None:
+            return replace(view, title=_("{name} is ready").format(name=run.name))
+        elapsed = run.elapsed_s if run.state == "stopping" and run.elapsed_s is not None else run.elapsed(now)
+        return replace(view, title=_("{name} runs, {time}").format(name=run.name, time=seconds(elapsed)))
     if view.state == "paused":
-        return replace(view, title=f"{run.name} is {view.title[:1].lower()}{view.title[1:]}")
+        if run.paused_at:
+            words = _("{name} is paused at “{block}”")
+            return replace(view, title=words.format(name=run.name, block=run.paused_at))
+        return replace(view, title=_("{name} is paused").format(name=run.name))
     if view.state == "stopping":
-        return replace(view, title=f"Stopping {run.name}")
+        return replace(view, title=_("Stopping {name}").format(name=run.name))
     if view.state == "proven":
         detail = "" if run.dashed and not run.errors else view.detail
-        return replace(view, title=f"{run.name} {view.title[:1].lower()}{view.title[1:]}", detail=detail)
+        return replace(view, title=_ended_title(run, run.name), detail=detail)
     return view
 
 
@@ -121,11 +130,11 @@ def _view(run: RunState, connected: Sequence[str], now: float) -> RunView:
     }
     if run.state in views:
         return views[run.state](run, now)
-    title = "Nothing to run yet" if run.nothing_in else "Ready"
+    title = _("Nothing to run yet") if run.nothing_in else _("Ready")
     return RunView(
         "ready",
         title,
-        NOTHING if run.nothing_in else connected_words(connected),
+        _(NOTHING) if run.nothing_in else connected_words(connected),
         title,
         can_run=True,
         can_step=True,
@@ -137,9 +146,9 @@ def _running(run: RunState, now: float) -> RunView:
     time_words = seconds(run.elapsed(now))
     return RunView(
         "running",
-        f"Running, {time_words}",
+        _("Running, {time}").format(time=time_words),
         run.says,
-        f"{run.name} runs, {time_words}",
+        _("{name} runs, {time}").format(name=run.name, time=time_words),
         can_pause=True,
         can_step=True,
         last_stop=run.last_words or None,
@@ -149,21 +158,23 @@ def _running(run: RunState, now: float) -> RunView:
 def _paused(run: RunState, _now: float) -> RunView:
     return RunView(
         "paused",
-        f"Paused at “{run.paused_at}”" if run.paused_at else "Paused",
-        run.warning or "Robots hold still; the clock stands",
-        f"{run.name} is paused",
+        _("Paused at “{block}”").format(block=run.paused_at) if run.paused_at else _("Paused"),
+        run.warning or _("Robots hold still; the clock stands"),
+        _("{name} is paused").format(name=run.name),
         can_run=True,
         can_step=True,
-        run_word="Go on",
+        run_word=GO_ON,
         last_stop=run.last_words or None,
     )
 
 
 def _stopping_early(run: RunState, now: float) -> RunView:
     # an answer within 100 ms is no state of its own: the words of before stay, only Run can't be pressed
-    title = f"Running, {seconds(run.elapsed_s)}" if run.elapsed_s is not None else "Ready"
+    title = _("Ready")
+    if run.elapsed_s is not None:
+        title = _("Running, {time}").format(time=seconds(run.elapsed_s))
     return replace(
-        _stopping(run, now), state="running", title=title, detail=run.says, stop_word="Stop", result=None
+        _stopping(run, now), state="running", title=title, detail=run.says, stop_word=STOP, result=None
     )
 
 
@@ -173,35 +184,64 @@ def _stopping(run: RunState, now: float) -> RunView:
     done = {robot.name for robot in run.answered if robot.answered and not newest[robot.name].waits}
     done -= {robot.name for robot in run.answered if robot.wrong}
     waiting = [name for name in run.asked if name not in done]
-    detail = f"Waiting for {listed(waiting)}, {now - run.pressed_s:.1f} s" if waiting else ""
-    result = f"{len(done)} of {len(run.asked)} robots stopped" if run.asked else None
-    return RunView("stopping", "Stopping", detail, "Stopping", stop_word="Stopping", result=result)
+    detail = result = ""
+    if waiting:
+        detail = _("Waiting for {robots}, {seconds} s").format(
+            robots=listed(waiting), seconds=number(now - run.pressed_s, ".1f")
+        )
+    if run.asked:
+        result = _some_stopped(len(done), len(run.asked))
+    title = _(STOPPING)
+    return RunView("stopping", title, detail, title, stop_word=STOPPING, result=result or None)
+
+
+_ENDED = {
+    ("stopped", False, True): lazy("Stopped after {time}"),
+    ("stopped", False, False): lazy("Stopped"),
+    ("stopped", True, True): lazy("{name} stopped after {time}"),
+    ("stopped", True, False): lazy("{name} stopped"),
+    ("problem", False, True): lazy("Stopped by a problem after {time}"),
+    ("problem", False, False): lazy("Stopped by a problem"),
+    ("problem", True, True): lazy("{name} stopped by a problem after {time}"),
+    ("problem", True, False): lazy("{name} stopped by a problem"),
+    ("finished", False, True): lazy("Finished after {time}"),
+    ("finished", False, False): lazy("Finished"),
+    ("finished", True, True): lazy("{name} finished after {time}"),
+    ("finished", True, False): lazy("{name} finished"),
+}
+"""By (how it ended, whether the behaviour is named, whether it ran)."""
 
 
 def _proven(run: RunState, _now: float) -> RunView:
     words, good = result_words(run.report) if run.report is not None and run.report.robots else ("", True)
-    after = f" after {seconds(run.elapsed_s)}" if run.elapsed_s is not None else ""
-    title, detail = f"Stopped{after}", "The dashed outline shows where" if run.dashed else ""
+    title, detail = _ended_title(run), _("The dashed outline shows where") if run.dashed else ""
     if run.errors:
-        title, detail = f"Stopped by a problem{after}", next(iter(run.errors.values()))
+        detail = next(iter(run.errors.values()))
     elif run.finished:
-        title, detail = f"Finished{after}", "Every script came to its end"
+        detail = _("Every script came to its end")
     return RunView(
         "proven", title, detail, words or title, True, False, True, result=words or None, result_ok=good
     )
+
+
+def _ended_title(run: RunState, name: str = "") -> str:
+    """How it ended, and after how long; with the behaviour's name when another one's blocks are seen."""
+    kind = "problem" if run.errors else "finished" if run.finished else "stopped"
+    words = _ENDED[kind, bool(name), run.elapsed_s is not None]
+    return _(words).format(name=name, time=seconds(run.elapsed_s or 0.0))
 
 
 def _unanswered(run: RunState, now: float) -> RunView:
     if run.report is None:
         return _proven(run, now)
     title, detail, compact, confirm = unanswered_words(run.report)
-    words, _ = result_words(run.report)
+    words, _good = result_words(run.report)
     return RunView(
         "unanswered",
         title,
         detail,
         compact,
-        stop_word="Stop again",
+        stop_word=STOP_AGAIN,
         result=words,
         result_ok=False,
         confirm=confirm,
@@ -217,8 +257,9 @@ def seconds(value: float) -> str:
 def connected_words(names: Sequence[str]) -> str:
     """The line under Ready."""
     if not names:
-        return "No robot is connected"
-    return f"{listed(names)} {'is' if len(names) == 1 else 'are'} connected"
+        return _("No robot is connected")
+    words = ngettext("{robots} is connected", "{robots} are connected", len(names))
+    return words.format(robots=listed(names))
 
 
 def result_words(report: StopReport) -> tuple[str, bool]:
@@ -226,20 +267,22 @@ def result_words(report: StopReport) -> tuple[str, bool]:
     names, still = report.names, report.still
     unsure = [robot.who for robot in report.robots if not robot.can_confirm]
     if report.unproven:
-        return f"{len(still)} of {len(names)} robots stopped", False
+        return _some_stopped(len(still), len(names)), False
     if not names:
-        return "no robot to stop", True
+        return _("no robot to stop"), True
     if not still:
-        return f"stop sent; {_cannot_confirm(unsure)}", True
+        return _("stop sent; {robots} cannot confirm").format(robots=listed(unsure)), True
     time_ms = max(1, round(report.elapsed_ms))
-    everyone = f"{still[0]} stopped" if len(names) == 1 else f"all {len(names)} robots stopped"
     if unsure:
-        return f"{listed(still)} stopped ({time_ms} ms); {_cannot_confirm(unsure)}", True
-    return f"{everyone} ({time_ms} ms)", True
+        words = _("{robots} stopped ({elapsed} ms); {others} cannot confirm")
+        return words.format(robots=listed(still), elapsed=time_ms, others=listed(unsure)), True
+    if len(names) == 1:
+        return _("{robot} stopped ({elapsed} ms)").format(robot=still[0], elapsed=time_ms), True
+    return _("all {count} robots stopped ({elapsed} ms)").format(count=len(names), elapsed=time_ms), True
 
 
-def _cannot_confirm(names: Sequence[str]) -> str:
-    return f"{listed(names)} cannot confirm"
+def _some_stopped(stopped: int, count: int) -> str:
+    return _("{stopped} of {count} robots stopped").format(stopped=stopped, count=count)
 
 
 def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
@@ -249,21 +292,19 @@ def unanswered_words(report: StopReport) -> tuple[str, str, str, str]:
     """
     still = report.still
     names = listed(report.silent)
-    stopped = ""
+    them = listed(report.silent) if len(report.silent) <= 2 else _("them")
+    detail = _("Switch {robots} off by hand.").format(robots=them)
     if still:
         slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in still)
-        stopped = f"{listed(still)} stopped ({max(1, round(slowest))} ms). "
-    them = names if len(report.silent) <= 2 else "them"
-    is_one = len(report.silent) == 1
+        detail = _("{robots} stopped ({elapsed} ms). {next_step}").format(
+            robots=listed(still), elapsed=max(1, round(slowest)), next_step=detail
+        )
+    count, title = len(report.silent), _wrong_words(report)
+    switch = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
+    still_words = ngettext("{robots} is still", "{robots} are still", count).format(robots=names)
     if len(names) > WIDEST_NAMES:  # the sentence beside the button must have room
-        names = "It" if is_one else "They"
-    title = _wrong_words(report)
-    return (
-        title,
-        f"{stopped}Switch {them} off by hand.",
-        f"{title}; switch {'it' if is_one else 'them'} off by hand",
-        f"{names} {'is' if is_one else 'are'} still",
-    )
+        still_words = ngettext("It is still", "They are still", count)
+    return title, detail, switch.format(wrong=title), still_words
 
 
 def _wrong_words(report: StopReport) -> str:
@@ -272,23 +313,35 @@ def _wrong_words(report: StopReport) -> str:
     untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
     silent = [robot.who for robot in report.unproven if not robot.error]
     if len(silent) > MOST_NAMED:
-        silent = [*silent[:MOST_NAMED], f"{len(silent) - MOST_NAMED} more"]
-    wrong = [*told, *untold, *([f"{listed(silent)} did not answer"] if silent else [])]
-    more = [f"{len(wrong) - MOST_NAMED} more may still move"] if len(wrong) > MOST_NAMED else []
-    return "; ".join([*wrong[:MOST_NAMED], *more])
+        silent = [*silent[:MOST_NAMED], _("{count} more").format(count=len(silent) - MOST_NAMED)]
+    wrong = [*told, *untold]
+    if silent:
+        words = ngettext("{robots} did not answer", "{robots} did not answer", len(silent))
+        wrong.append(words.format(robots=listed(silent)))
+    left = len(wrong) - MOST_NAMED
+    if left > 0:
+        words = ngettext("{count} more may still move", "{count} more may still move", left)
+        wrong = [*wrong[:MOST_NAMED], words.format(count=left)]
+    return "; ".join(wrong)
 
 
 def stop_words(robot: RobotStop, clock: str) -> str:
     """What one robot did with a stop, for its health: ``answered in 41 ms, at 8:40``."""
     if not robot.can_confirm:
-        return f"sent at {clock}; this robot cannot confirm"
+        return _("sent at {time}; this robot cannot confirm").format(time=clock)
     if robot.answered:
-        return f"answered in {max(1, round(robot.elapsed_ms or 0))} ms, at {clock}"
+        elapsed = max(1, round(robot.elapsed_ms or 0))
+        return _("answered in {elapsed} ms, at {time}").format(elapsed=elapsed, time=clock)
     if robot.error:
-        return f"{robot.wrong}, at {clock}"
+        return _("{wrong}, at {time}").format(wrong=robot.wrong, time=clock)
     if robot.program:
-        return f"“{robot.program}” has not answered, at {clock}"
-    return f"not answered, at {clock}"
+        return _("“{program}” has not answered, at {time}").format(program=robot.program, time=clock)
+    return _("not answered, at {time}").format(time=clock)
+
+
+def stop_status(robot: RobotStop) -> str:
+    """The status of these words: ``ok`` when it answered, ``off`` when it can't confirm, else ``error``."""
+    return "off" if not robot.can_confirm else "ok" if robot.answered else "error"
 
 
 def stops_by_name(report: StopReport) -> Mapping[str, RobotStop]:

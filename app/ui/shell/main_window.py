@@ -35,7 +35,7 @@ from app.ui.startup.interpreter import GcFreezeTimer
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
 from app.ui.widgets.file_dialogs import Asks, SystemDialogs
-from nep.i18n import lazy
+from nep.i18n import _, lazy
 
 TICK_MS = 33
 SMALLEST = QSize(1100, 700)
@@ -324,7 +324,9 @@ class MainWindow(QMainWindow):
         words, status = robots_chip(self.session)
         self.bar.show_robots(words, status)
         if self.showing == START:
-            self.bar.stop.show_state(view.stop_word, ring=view.state == "stopping", filled=self._may_move())
+            self.bar.stop.show_state(
+                _(view.stop_word), ring=view.state == "stopping", filled=self._may_move()
+            )
             there = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
             self.start.show_robot(words if there else "", status)
         elif self.showing == "behaviour":

@@ -13,6 +13,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Line, RunButton, StopButton, label, paint
 from app.ui.widgets.menus import Menu, drop_below
+from nep.i18n import _
 
 PACES = ("run.full_speed", "run.slow", "run.very_slow")
 ROOM_PX = 960  # what the bar needs at 100 % text
@@ -295,7 +296,7 @@ class RunBar(Bar):
 
     def show_view(self, view: RunView) -> None:
         """Show one of the six states."""
-        self.run.set_word(view.run_word)
+        self.run.set_word(_(view.run_word))
         self.run.set_filled(view.can_run)
         self.run.setEnabled(view.can_run)
         self.pause.setEnabled(view.can_pause)
@@ -306,7 +307,7 @@ class RunBar(Bar):
         self.result.show_view(view)
         self.confirm.set_word(view.confirm or "")
         paint.show_when(self.confirm, view.confirm is not None)
-        self.stop.show_state(view.stop_word, ring=view.state == "stopping")
+        self.stop.show_state(_(view.stop_word), ring=view.state == "stopping")
 
 
 class ToolBar(Bar):
@@ -361,13 +362,13 @@ class ToolBar(Bar):
         self.mark.setVisible(not spoken)
         self.words.setText(view.compact)
         self.words.setVisible(not spoken)
-        self.run.set_word(view.run_word)
+        self.run.set_word(_(view.run_word))
         self.run.setVisible(view.can_run)
         self.pause.setVisible(view.can_pause)
         self.step.setVisible(view.can_step and view.state in {"running", "paused"})
         self.confirm.set_word(view.confirm or "")
         paint.show_when(self.confirm, view.confirm is not None)
-        self.stop.show_state(view.stop_word, ring=view.state == "stopping")
+        self.stop.show_state(_(view.stop_word), ring=view.state == "stopping")
 
 
 def bind(bar: RunBar | ToolBar, actions: Actions) -> None:
