@@ -38,18 +38,18 @@ def window_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="nep-studio", description=_("NEP Studio. `nep-studio run FILE` runs a behaviour with no window.")
     )
-    made.add_argument("files", nargs="*", type=Path, metavar="FILE", help="behaviours to open")
+    made.add_argument("files", nargs="*", type=Path, metavar="FILE", help=_("behaviours to open"))
     made.add_argument(
         "--new-window", action="store_true", help=_("a window of its own, although Studio runs already")
     )
     made.add_argument(
         "--demo", action="store_true", help=_("begin with the virtual robot and the first example")
     )
-    made.add_argument("--master", metavar="HOST:PORT", help="the master to join")
+    made.add_argument("--master", metavar="HOST:PORT", help=_("the master to join"))
     made.add_argument("--version", action="version", version=f"NEP Studio {__version__}")
     made.add_argument("--theme", choices=("light", "dark", "system"), help=_("its colours"))
     made.add_argument(
-        "--self-drive", metavar=_("DIR"), type=Path, help=_("do the main job alone; screenshots go to DIR")
+        "--self-drive", metavar="DIR", type=Path, help=_("do the main job alone; screenshots go to DIR")
     )
     return made
 
@@ -64,11 +64,11 @@ def run_parser() -> argparse.ArgumentParser:
             "robot would move and may not; 130 stopped by Ctrl+C."
         ),
     )
-    made.add_argument("file", type=Path, metavar=_("FILE"), help=_("the behaviour"))
+    made.add_argument("file", type=Path, metavar="FILE", help=_("the behaviour"))
     made.add_argument(
         "--robot-wait", type=float, metavar="S", default=10.0, help=_("wait for its robots, in seconds")
     )
-    made.add_argument("--master", metavar="HOST:PORT", help="the master to join")
+    made.add_argument("--master", metavar="HOST:PORT", help=_("the master to join"))
     made.add_argument(
         "--allow-moving",
         action="store_true",
@@ -131,7 +131,10 @@ def run_behaviour(arguments: Sequence[str]) -> int:
 def hand_over(module: str, arguments: Sequence[str]) -> int:
     """Become the process of one of our modules; 2 when it is none of them."""
     if module not in PROCESSES:
-        sys.stderr.write(f"no process '{module}'; there are {', '.join(PROCESSES)}\n")
+        sys.stderr.write(
+            _("no process '{module}'; there are {names}").format(module=module, names=", ".join(PROCESSES))
+            + "\n"
+        )
         return 2
     sys.argv = [module, *arguments]
     runpy.run_module(module, run_name="__main__", alter_sys=True)

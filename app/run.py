@@ -184,7 +184,7 @@ def _refused(
         say(words.format(sentence=problem.sentence))
     missing = sorted(set(wanted) - {robot.name for robot in robots})
     if missing:
-        say(f"{listed(missing)} not found. Switch it on, or start the virtual robot.")
+        say(_("{robots} not found. Switch it on, or start the virtual robot.").format(robots=listed(missing)))
         return ROBOT_MISSING
     if program.errors or not program.starts:
         say(_("“{name}” can't run.").format(name=program.name))

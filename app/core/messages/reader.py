@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from app.core.messages.lazy_json import JsonIndex
 from nep.errors import NepError
+from nep.i18n import _
 from nep.messages.message import Message
-from nep.i18n import 
 
 LARGE_BYTES = 1_000_000
 """JSON above this is looked into, not decoded; what is larger is never read in the window's thread."""
@@ -38,7 +38,7 @@ def read(message: Message) -> Reading:
     except (NepError, ValueError) as error:
         return Reading(message, error=str(error))
     except MemoryError:
-        return Reading(message, error="there is not enough memory for it")
+        return Reading(message, error=_("there is not enough memory for it"))
 
 
 class Reader:
