@@ -1,0 +1,285 @@
+"""What the core, robots and nep say to people is translated: nothing is plain in the pseudo-language."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from app import errors as app_errors
+from app.core.alerts import Alerts
+from app.core.documents.file_format import parse_file
+from app.core.network import graph_changes
+from app.core.network.decode_checks import Checked
+from app.core.network.remote_access import Reach, ReachChanged
+from app.core.network.topics import Topic, Topics
+from app.core.robots.fleet import Fleet
+from app.core.robots.health import AWAY_S, Health
+from app.core.robots.health_facts import facts_of
+from app.core.robots.motion_permission import MayNotMoveError, Question
+from app.core.robots.robot_link import RobotLink
+from app.core.robots.stop_report import RobotStop, StopReport, not_reached
+from app.core.run.view import RunState, clock_words, stop_words, view_of
+from app.errors import DocumentError
+from app.robots import simulated
+from app.robots.description.description import parse, td_for
+from app.robots.description.inputs import Parameter, check_input, wrong_value
+from app.robots.description.validate import validate
+from app.robots.driver.tasks import still_moving
+from app.robots.identity import may_move, said_of_stop
+from app.run import stop_lines
+from nep import errors as nep_errors
+from nep.doctor import Facts, findings
+from nep.doctor.facts import ClockFact, FileFact, FolderFact, PackageFact, PortFact, ProcessFact, ProgramFact
+from nep.i18n import _
+from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
+from tests.pseudo import untranslated
+
+PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
+DONE = RobotStop("Pepper", True, 38.2)
+SILENT = RobotStop("Turtle", False, None)
+REFUSED = RobotStop("Turtle", False, 3.0, error="Xx", refused=True, program="zz")
+RIZE = RobotStop("Nao", False, None, can_confirm=False)
+LISTENS = RobotStop("Turtle", False, None, can_confirm=False, program="zz")
+DATA = ("Turtle", "Nao", "Xx", "zz", "Greeting")
+
+pytestmark = pytest.mark.usefixtures("pseudo")
+
+
+def said(*texts: object, data: tuple[str, ...] = ()) -> None:
+    """Fails when one of them has English words that are no data."""
+    forgotten = {text: words for text in map(str, texts) if (words := untranslated(text, *DATA, *data))}
+    assert forgotten == {}
+
+
+def reports() -> list[StopReport]:
+    one = [DONE, SILENT, REFUSED, RIZE, LISTENS, not_reached("Turtle"), not_reached("Turtle", "Xx")]
+    many = [tuple(RobotStop(f"Turtle{number}", False, None) for number in range(9))]
+    mixed = [(DONE, SILENT), (DONE, RIZE), (DONE, REFUSED), (DONE, replace(DONE, name="Turtle")), ()]
+    return [
+        StopReport(robots, 41.0, (("Pepper", "zz"),))
+        for robots in (*((each,) for each in one), *many, *mixed)
+    ]
+
+
+def test_the_run_bar_in_all_states() -> None:
+    states = [
+        RunState(),
+        RunState(nothing_in=object()),
+        RunState("running", "Greeting"),
+        RunState("paused", "Greeting"),
+        RunState("paused", "Greeting", paused_at="Xx"),
+        RunState("stopping", "Greeting", elapsed_s=3.0, asked=("Turtle", "Pepper"), answered=(DONE,)),
+        RunState("proven", "Greeting", elapsed_s=3.0, errors={"a": "Xx"}),
+        RunState("proven", "Greeting", finished=True),
+        RunState("proven", "Greeting", dashed=True, elapsed_s=100.0),
+        *(
+            RunState("unanswered" if each.unproven else "proven", "Greeting", report=each)
+            for each in reports()
+        ),
+    ]
+    for state in states:
+        for now in (0.01, 9.0):
+            for elsewhere in (False, True):
+                view = view_of(state, ["Pepper", "Turtle"], now, elsewhere=elsewhere)
+                said(view.title, view.detail, view.compact, view.result or "", view.confirm or "")
+                said(_(view.run_word), _(view.stop_word))
+    said(view_of(RunState(), [], 0).detail)
+
+
+def test_what_became_of_a_stop() -> None:
+    for report in reports():
+        said(*stop_lines(report), *(robot.sentence for robot in report.robots))
+        said(*(stop_words(robot, clock_words(time.localtime(0))) for robot in report.robots))
+
+
+def test_a_robot_that_may_still_move_is_known_in_our_language_and_in_english() -> None:
+    ours = still_moving("Turtle", ["Xx"])
+    said(ours, said_of_stop("Turtle", None))
+    assert said_of_stop("Turtle", ours) == ours
+    assert may_move("Turtle", ours)
+    assert said_of_stop("Turtle", "Turtle may still move: Xx") == "Turtle may still move: Xx"
+
+
+def test_the_facts_of_a_robot() -> None:
+    topics = {sensor.topic: Topic(sensor.topic) for sensor in PEPPER.sensors}
+    link = RobotLink("Pepper", PEPPER)
+    sensors = tuple(sensor.title for sensor in PEPPER.sensors)
+    links = [
+        link,
+        replace(link, connected=False),
+        replace(link, connected=False, gone_s=3.0),
+        replace(link, mute=True),
+        replace(link, mute=True, answered_s=3.0),
+        replace(link, answered_s=3.0, stopping=True, values={"battery": 4}),
+        replace(link, values={"battery": 80}),
+    ]
+    for each in links:
+        for silent_s in (None, 99.0):
+            for topic in topics.values():
+                topic.silent_s, topic.age_s, topic.rate_hz = silent_s, silent_s, 3.0
+            each.silent = "" if silent_s else None
+            facts = facts_of(each, cast("Topics", topics), 9.0, lambda age_s: f"{age_s:g} s")
+            said(*(_(fact.title) for fact in facts), *(fact.words for fact in facts), data=sensors)
+        said(each.state_words)
+
+
+def test_alerts_of_health() -> None:
+    alerts, now = Alerts(), [0.0]
+    real = replace(PEPPER, virtual=False)
+    links = [
+        SimpleNamespace(name=name, robot=robot, virtual=robot.virtual, connected=on, goes_on="", silent=None)
+        for name, robot, on in (("Nao", real, False), ("Turtle", PEPPER, False), ("Pepper", real, False))
+    ]
+    fleet = cast("Fleet", SimpleNamespace(links=links, claims={}))
+    health = Health(Topics(), fleet, alerts, lambda: now[0])
+    health.check({"Pepper"}, {"Turtle"})
+    now[0] = AWAY_S + 1
+    health.check({"Pepper"}, {"Turtle"})
+    for unchecked in (0, 7):
+        health.look({f"/{unchecked}": Checked(3, 2, unchecked, "Xx", last_good=False)})
+    health.journal("Xx")
+    health.gives_up("Greeting", "Xx")
+    health.settings("Xx")
+    health.unreachable({"Nao": "Xx"})
+    assert len(alerts.active) >= 8
+    for alert in alerts.active:
+        said(alert.title, alert.detail, alert.button or "")
+
+
+def test_who_comes_and_goes() -> None:
+    def node(name: str, generation: str = "native") -> NodeInfo:
+        return NodeInfo(name, name, "lab", 1, "Python", generation, 0)
+
+    def view(*nodes: NodeInfo, topics: int = 0) -> GraphView:
+        by = (PublisherInfo(1, nodes[0].id, (), False, 0, 0, 0, None, None, None),) if nodes else ()
+        here = {f"/{place}": TopicInfo(f"/{place}", "json", "json", by) for place in range(topics)}
+        return GraphView(1, 1, {each.id: each for each in nodes}, here, ())
+
+    many = [node(f"Nao{number}") for number in range(20)]
+    for before, after in (
+        (view(), view(node("Nao"))),
+        (view(), view(node("Nao", "A"))),
+        (view(), view(node("Nao"), topics=9)),
+        (view(node("Nao")), view(node("Nao"), topics=1)),
+        (view(node("Nao")), view(node("Nao"), topics=20)),
+        (view(node("Nao")), view()),
+        (view(), view(*many)),
+        (view(*many), view()),
+    ):
+        lines = graph_changes.arrivals(before, after)
+        assert lines
+        said(*lines)
+
+
+def test_questions_and_errors() -> None:
+    question = Question({"Nao": ("Xx",), "Turtle": ("Xx", "zz")}, lambda: None)
+    said(question.title, question.sentence, MayNotMoveError(["Nao", "Turtle"]))
+    said(
+        app_errors.SettingsError(Path("/Xx"), "Xx"),
+        app_errors.DescriptionError("Xx", ("zz", "zz")),
+        app_errors.DescriptionError("Xx", ()),
+        app_errors.RobotUnknownError("Nao"),
+        nep_errors.WaitTimeoutError("Xx", 1.5),
+        nep_errors.ClosedError("Xx"),
+        nep_errors.ClosedError("Xx", is_forked=True),
+        nep_errors.UnknownBackendError("Xx", ["zz"]),
+        nep_errors.TooManyFilesError("Xx", 1, 2),
+        nep_errors.TooManyFilesError("Xx", None, None),
+        nep_errors.AddressInUseError("zz:*"),
+        nep_errors.AddressInUseError("zz:1", is_own=False),
+        data=("ulimit",),
+    )
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{}", b'{"format": "nep-behaviour"}', b'{"format": "nep-behaviour", "version": 99}']
+)
+def test_files_that_are_no_behaviours(content: bytes) -> None:
+    with pytest.raises(DocumentError) as caught:
+        parse_file(content, Path("/Xx"))
+    said(caught.value, data=("nepb",))
+
+
+def test_values_that_a_robot_would_refuse() -> None:
+    number = Parameter("zz", "Xx", "number", minimum=1.0, maximum=9.0)
+    text = Parameter("zz", "Xx", "text", min_length=2, max_length=3)
+    items = Parameter("zz", "Xx", "list", min_length=2, max_length=3, each=number)
+    for parameter, values in (
+        (number, (0, "a", None)),
+        (replace(number, maximum=None, unit="m"), (0,)),
+        (replace(number, minimum=None), (99,)),
+        (replace(number, kind="integer"), (1.5, "a")),
+        (replace(number, kind="boolean"), (1,)),
+        (replace(number, kind="colour"), (1,)),
+        (text, ("", "abcd", 1)),
+        (replace(text, min_length=1), ("",)),
+        (items, ((), (1, 2, 3, 4), 1, (1, "a"))),
+        (replace(items, max_length=2), ((1,),)),
+        (Parameter("zz", "Xx", "object", fields=(number,)), (1, {"z": 3})),
+    ):
+        for value in values:
+            wrong = wrong_value(parameter, value)
+            assert wrong is not None
+            said(wrong)
+    said(*check_input("Xx", (replace(number, required=True),), {"zy": 1}), data=("zy",))
+    said(*check_input("Xx", (), 3))
+
+
+def test_descriptions_that_cannot_be_used() -> None:
+    good = simulated.ROBOT.thing_model
+    for wrong in (
+        3,
+        {},
+        {**good, "title": ""},
+        {**good, "title": "a\u202eb"},
+        {**good, "actions": 3},
+        {**good, "x": {"$ref": "y"}},
+        {**good, "x": float("nan")},
+        {**good, "rb:safeStop": {"action": "zz"}},
+    ):
+        problems = validate(wrong)
+        assert problems
+        told = [re.sub(r"'[^']*'", "", problem) for problem in problems]  # names stand in quotes
+        said(*told, data=("title", "actions", "ref", "rb:safeStop", "rb:profile", "safeStop"))
+
+
+def test_findings_of_the_doctor() -> None:
+    now = 1_800_000_000.0
+    master = ProcessFact(41, "zz", is_master=True, since_s=now - 7200)
+    other = ProcessFact(77, "zz", since_s=now - 5)
+    people = GraphView(1, 1, {"a": NodeInfo("a", "Nao", "zz", 1, "Python", "0.5.4.6", 0)}, {}, ())
+    well = Facts(
+        now, "127.0.0.1:7780", "linux", {}, "/zz", people, 0.004, PortFact(7780, "", True, master),
+        (PortFact(7000, "", True, master), PortFact(7777, "", True, other), PortFact(12345, "", True, other)),
+        ((master, 7780),),
+    )  # fmt: skip
+    for facts in (
+        well,
+        replace(well, answered_s=9.0, folders=(FolderFact("/zz", "Xx"), FolderFact("/zz", "Xx", "Xx"))),
+        replace(well, view=None),
+        replace(well, view=None, is_known=False),
+        replace(well, view=None, master_port=PortFact(7780, "", True, other)),
+        replace(well, view=None, master_port=None),
+        replace(well, masters=((master, 7780), (other, None)), loopback="Xx", now_s=1.0),
+        replace(well, packages=(PackageFact("nep", "0.1", "/zz"),), joins_originals=False),
+        replace(well, strange_files=("zz.py",), shadow="zz.py", clocks=(ClockFact("zz", 3.0),)),
+        replace(well, files=FileFact(100, 100, 90, 100), programs=(ProgramFact(1, "zz", 99, 100),)),
+    ):
+        for finding in findings(facts):
+            if finding.id != "versions":
+                said(finding.sentence, finding.mend, data=("ip link", "py", "AirDrop", "Handoff"))
+
+
+def test_who_may_connect() -> None:
+    alerts = Alerts()
+    settings = SimpleNamespace(get=lambda _key, default: default, set=lambda _key, _value: None)
+    reach = Reach("127.0.0.1:7780", settings, alerts, lambda _event: None)
+    reach.changed(ReachChanged(("127.0.0.1",), "Xx"))
+    for alert in alerts.active:
+        said(alert.title, alert.detail, alert.button or "")
