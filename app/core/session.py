@@ -168,7 +168,7 @@ class Session:
                 self.runs.stop_again(name)
         with self.surviving(lazy("follow what was started here")):
             self.companions.follow()
-        with self.surviving("show the run"):
+        with self.surviving(lazy("show the run")):
             self.runs.tick()
         if now >= self._next_check:
             self._next_check = now + CHECK_S

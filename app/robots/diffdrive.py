@@ -163,7 +163,7 @@ class DiffDrive:
             if self.wheels.still():
                 return
             waited.wait(0.005)
-        raise Failed("its wheels go on turning")
+        raise Failed(_("its wheels go on turning"))
 
     # ---- steering ---------------------------------------------------------------------------------
 

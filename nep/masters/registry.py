@@ -483,4 +483,8 @@ def _check_word(what: str, word: str, most: int) -> None:
             if control
             else _("use {most} letters at most").format(most=most)
         )
-        raise WireError(f"'{escaped(shortened(word, 40))}' cannot be its {what}; {hint}")
+        raise WireError(
+            _("'{word}' cannot be its {what}; {hint}").format(
+                word=escaped(shortened(word, 40)), what=what, hint=hint
+            )
+        )

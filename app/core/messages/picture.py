@@ -88,7 +88,9 @@ def decode(message: Message, received_s: float, fit: Size | None = None) -> tupl
 
 def _short(error: BaseException) -> str:
     """The last part of OpenCV's long message."""
-    return str(error).strip().splitlines()[-1].rpartition("error: ")[2][:200] if str(error) else "no memory"
+    return (
+        str(error).strip().splitlines()[-1].rpartition("error: ")[2][:200] if str(error) else _("no memory")
+    )
 
 
 def png_of(message: Message) -> bytes:
