@@ -34,6 +34,7 @@ from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
+from nep.i18n import _
 
 LOG_EVERY_MS = 500
 SOON = (
@@ -77,7 +78,8 @@ def make_application() -> QApplication:
     application.setDesktopFileName("nep-studio")
     refused = fonts.load()
     if refused:
-        sys.stderr.write(f"Qt can't use the fonts {', '.join(refused)}; others stand in\n")
+        words = _("Qt can't use the fonts {fonts}; others stand in").format(fonts=", ".join(refused))
+        sys.stderr.write(f"{words}\n")
     return application
 
 
@@ -154,12 +156,12 @@ def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
     if not platform.startswith("linux"):
         return ""
     if not any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")):
-        return (
+        return _(
             "there is no screen here (DISPLAY and WAYLAND_DISPLAY are not set); start it where you see a "
             "desktop, or run a behaviour with no window: nep-studio run FILE"
         )
     if user == 0 and not environ.get("QTWEBENGINE_DISABLE_SANDBOX"):
-        return (
+        return _(
             "the block editor's browser refuses to run as root with its sandbox; start Studio as another "
             "user, or, where nothing else can be done, set QTWEBENGINE_DISABLE_SANDBOX=1"
         )

@@ -142,7 +142,7 @@ def test_a_damaged_layout_is_as_at_first_and_said_in_the_console(
     window.commands.run("layout.developer")
     assert {"topics", "inspector", "image", "console"} <= opened(window)
     said = [record.text for record in session.console.records]
-    assert "The layout “developer” could not be put back; it is as at first." in said
+    assert "The layout “Developer” could not be put back; it is as at first." in said
     assert window.saved_layouts.all() == ()
     window.close()
 

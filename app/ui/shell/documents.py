@@ -19,6 +19,7 @@ from app.core.storage import deep_json
 from app.core.storage.settings import home
 from app.errors import AppError, DocumentError, SettingsError
 from app.ui.widgets.file_dialogs import Asks
+from nep.i18n import _, ngettext
 
 LONGEST_FLUSH_MS = 500
 
@@ -87,7 +88,7 @@ class DocumentController:
             if path not in strange:
                 self.open(path)
         if strange:
-            self._complain(strange_words(strange), "file.open", "Open another file", alert="strange")
+            self._complain(strange_words(strange), "file.open", _("Open another file"), alert="strange")
 
     def example(self, path: Path) -> None:
         """Open an example as a new behaviour."""
@@ -98,7 +99,7 @@ class DocumentController:
 
         def opened() -> None:
             self._documents.copy(path, name)
-            self._say(f"Opened {name} as a copy")
+            self._say(_("Opened {name} as a copy").format(name=name))
 
         self.with_newest(lambda: self._show(opened))
 
@@ -138,7 +139,7 @@ class DocumentController:
 
         def reopened() -> None:
             if self._documents.reopen() is None:
-                self._say("No tab was closed")
+                self._say(_("No tab was closed"))
 
         self.with_newest(lambda: self._show(reopened))
 
@@ -200,27 +201,31 @@ class DocumentController:
         if document.path is not None:
             self._remember(document.path)
         if earlier is None:
-            self._say(f"Saved {document.name}")
+            self._say(_("Saved {name}").format(name=document.name))
             return
-        then = f"{document.name}, before"
-        self._say(f"Saved {document.name}. {words}", "Open that", lambda: self.copy(earlier.copy, then))
+        then = _("{name}, before").format(name=document.name)
+        said = words.format(name=document.name)
+        self._say(said, _("Open that"), lambda: self.copy(earlier.copy, then))
 
     def _kept_before(self, document: Document, path: Path | None) -> tuple[Earlier | None, str]:
-        """What of others the file says that is written over, and the words for it.
+        """What of others the file says that is written over, and the words for it, with the hole ``name``.
 
         Raises DocumentError when that can't be kept. What Studio itself wrote there before is kept too, if it
         can be, without words.
         """
         own = document.path
         if path is not None and (own is None or path.resolve() != own.resolve()):
-            return keep_earlier(path), "The file that was there is kept."
+            return keep_earlier(path), _("Saved {name}. The file that was there is kept.")
         if own is not None and document.changed_outside:
-            return keep_earlier(own), "Another program had changed the file; what it wrote is kept."
+            return keep_earlier(own), _(
+                "Saved {name}. Another program had changed the file; what it wrote is kept."
+            )
         if own is not None and document.dirty:
             try:
                 keep_earlier(own)
             except DocumentError as error:
-                self._session.console.add("warn", "studio", f"No earlier version: {sentence_of(error)}")
+                words = _("No earlier version: {error}").format(error=sentence_of(error))
+                self._session.console.add("warn", "studio", words)
         return None, ""
 
     def _show(self, act: Callable[[], object]) -> None:
@@ -228,7 +233,7 @@ class DocumentController:
         try:
             act()
         except AppError as error:
-            self._complain(sentence_of(error), "file.open", "Open another file")
+            self._complain(sentence_of(error), "file.open", _("Open another file"))
             return
         self._session.tabs.keep()
         self._session.alerts.cure("file")
@@ -251,16 +256,20 @@ class DocumentController:
             return None
         if document.path is not None:
             self._remember(document.path, name)
-        return Closed(document, f"Saved {name}" if path is not None else f"Kept {name} in Recent", earlier)
+        words = _("Saved {name}") if path is not None else _("Kept {name} in Recent")
+        return Closed(document, words.format(name=name), earlier)
 
     def _tell_closed(self, closed: Sequence[Closed]) -> None:
         """Say which unsaved work was saved, and offer to take it back."""
         if not closed:
             return
-        words = closed[0].words if len(closed) == 1 else f"Saved {len(closed)} behaviours"
+        words = closed[0].words
+        if len(closed) > 1:
+            words = ngettext("Saved {count} behaviour", "Saved {count} behaviours", len(closed))
+            words = words.format(count=len(closed))
         back = [each for each in closed if each.earlier is not None]
         if back:
-            self._say(words, "Undo", lambda: self._show(lambda: self._take_back(back)))
+            self._say(words, _("Undo"), lambda: self._show(lambda: self._take_back(back)))
         else:
             self._say(words)
 
@@ -270,7 +279,7 @@ class DocumentController:
             if each.earlier is None:
                 continue
             if stamp_of(each.earlier.path) != each.stamp:
-                name = f"{each.earlier.path.stem}, before"
+                name = _("{name}, before").format(name=each.earlier.path.stem)
                 self._documents.copy(each.earlier.copy, name)  # somebody wrote the file meanwhile: it stays
                 continue
             there = self._documents.with_path(each.earlier.path)  # opened again before "Undo" was pressed
@@ -287,10 +296,10 @@ class DocumentController:
             self._session.console.add("warn", "studio", str(error))
 
     def _cant_save(self, error: Exception) -> None:
-        self._complain(sentence_of(error), "file.save_as", "Save somewhere else")
+        self._complain(sentence_of(error), "file.save_as", _("Save somewhere else"))
 
     def _complain(self, sentence: str, action: str, button: str, alert: str = "file") -> None:
-        what, _, then = sentence.partition("; ")
+        what, _semicolon, then = sentence.partition("; ")
         detail = f"{then[:1].upper()}{then[1:]}." if then else ""
         self._session.alerts.put(alert, "error", f"{what}.", detail, button=button, action=action)
 
@@ -306,9 +315,14 @@ def sentence_of(error: Exception) -> str:
 def strange_words(paths: Sequence[Path]) -> str:
     """What is wrong with files that are no behaviours."""
     names = [path.name or str(path) for path in paths]
-    shown = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
-    are = "is no behaviour" if len(names) == 1 else "are no behaviours"
-    return f"{shown} {are}; behaviours are files ending in {SUFFIX}"
+    words, others = _("{file} is no behaviour; behaviours are files ending in {suffix}"), len(names) - 1
+    if others:
+        words = ngettext(
+            "{file} and {count} more are no behaviours; behaviours are files ending in {suffix}",
+            "{file} and {count} more are no behaviours; behaviours are files ending in {suffix}",
+            others,
+        )
+    return words.format(file=names[0], count=others, suffix=SUFFIX)
 
 
 class FlushBeforeClose(QObject):

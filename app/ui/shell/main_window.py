@@ -41,8 +41,8 @@ TICK_MS = 33
 SMALLEST = QSize(1100, 700)
 FIRST_SIZE = QSize(1440, 900)
 FACTS_EVERY = 8  # ticks
-SOON_WORDS = {"behaviour": "Getting the blocks ready."}
-OTHER_SOON_WORDS = "Getting the panels ready."
+SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
+OTHER_SOON_WORDS = lazy("Getting the panels ready.")
 
 
 class MainWindow(QMainWindow):
@@ -98,7 +98,7 @@ class MainWindow(QMainWindow):
         self.bar = AppBar(theme, LAYOUTS)
         self.setMenuWidget(self.bar)
         self.run_bar, self.tool_bar = RunBar(theme), ToolBar(theme)
-        self.use_robot = Button(theme, "Use the virtual robot", "bot", size="small")
+        self.use_robot = Button(theme, _("Use the virtual robot"), "bot", size="small")
         self.use_robot.let_shrink()
         self.tool_bar.add_tool(self.use_robot)
         self.banner = AlertBanner(theme)
@@ -303,17 +303,17 @@ class MainWindow(QMainWindow):
         began = time.perf_counter()
         self._ticks += 1
         surviving = self.session.surviving
-        with surviving("take over what is new"):
+        with surviving(lazy("take over what is new")):
             self.session.tick()
-        with surviving("show how it is"):
+        with surviving(lazy("show how it is")):
             self._show_session()
-        with surviving("ask a question"):
+        with surviving(lazy("ask a question")):
             self.question.refresh()
-        with surviving("make room for what is said"):
+        with surviving(lazy("make room for what is said")):
             self.room.follow()
-        with surviving("let panels rest"):
+        with surviving(lazy("let panels rest")):
             self._follow_panels()
-        with surviving("show the panels"):
+        with surviving(lazy("show the panels")):
             if self.bench is not None:
                 self.bench.refresh()
         spent = (time.perf_counter() - began) * 1000
@@ -411,7 +411,7 @@ class MainWindow(QMainWindow):
             return True
         self.show_layout("behaviour")
         self.session.documents.show(unkept[0])
-        self.toast.say("Studio stays open: unsaved work would be lost")
+        self.toast.say(_("Studio stays open: unsaved work would be lost"))
         return False
 
     def _keep(self) -> None:
@@ -426,7 +426,7 @@ class Placeholder(QWidget):
 
     def __init__(self, layout: str) -> None:
         super().__init__()
-        words = SOON_WORDS.get(layout, OTHER_SOON_WORDS)
+        words = _(SOON_WORDS.get(layout, OTHER_SOON_WORDS))
         self.setAccessibleName(words)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setProperty("ownFocus", True)  # it only keeps the keyboard; there is nothing to ring

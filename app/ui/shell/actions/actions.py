@@ -14,6 +14,7 @@ from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.theme.theme import Theme
 from app.ui.widgets import name_command
 from app.ui.widgets.menus import Menu
+from nep.i18n import _
 
 STOP = "run.stop"
 ROLES = {
@@ -40,7 +41,7 @@ class Actions:
             self._why_not[command.id] = partial(command.why_not, do)
 
     def _make(self, command: Command[Any], window: QWidget) -> QAction:
-        action = QAction(command.text, window)
+        action = QAction(command.words, window)
         action.setObjectName(command.id)
         if command.icon is not None and not command.group:
             action.setIcon(self._theme.icon(command.icon))
@@ -105,8 +106,8 @@ class Actions:
         self[name].setChecked(True)
 
     def fill(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
-        """Make these menus in a menu bar; they are returned by name."""
-        made: dict[str, Menu] = {name: Menu(self._theme, bar, name) for name in menus}
+        """Make these menus in a menu bar; they are returned by name, and say it in the language of now."""
+        made: dict[str, Menu] = {name: Menu(self._theme, bar, _(name)) for name in menus}
         for menu in made.values():
             bar.addMenu(menu)
         for command in self._commands:

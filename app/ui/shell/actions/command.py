@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from nep.i18n import _
+
 T = TypeVar("T")
 
 
@@ -26,11 +28,12 @@ def _always(_do: object) -> str:
 class Command(Generic[T]):
     """One command. ``run`` does it; ``why_not`` says in a short sentence why it can't be done now, else "".
 
-    ``tip`` is what a button of it says under the mouse. ``group`` makes it one of several choices; ``above``
-    puts a line over it in its ``menu``; without a menu it is only in the palette and among the shortcuts, if
-    it is there. ``check`` makes it something that is on or off, ``everywhere`` a key that works in all
-    windows. ``mac`` are the keys of a Mac in place of ``keys``: Ctrl is written there for Cmd, Meta for the
-    key that says Ctrl.
+    ``text``, ``menu`` and ``tip`` are marked with `lazy`; people read `words`, in which ``number`` fills the
+    hole of that name, and ``menu`` and ``tip`` by `_`. ``tip`` is what a button of it says under the mouse.
+    ``group`` makes it one of several choices; ``above`` puts a line over it in its ``menu``; without a menu
+    it is only in the palette and among the shortcuts, if it is there. ``check`` makes it something that is on
+    or off, ``everywhere`` a key that works in all windows. ``mac`` are the keys of a Mac in place of
+    ``keys``: Ctrl is written there for Cmd, Meta for the key that says Ctrl.
     """
 
     id: str
@@ -48,6 +51,12 @@ class Command(Generic[T]):
     in_palette: bool = True
     in_shortcuts: bool = True
     why_not: Callable[[T], str] = _always
+    number: int | None = None
+
+    @property
+    def words(self) -> str:
+        """What people read of it: its text, in their language."""
+        return _(self.text).format(number=self.number)
 
     def keys_at_first(self, platform: str = sys.platform) -> tuple[str, ...]:
         """The keys at first, the one that stands in menus before the others."""

@@ -22,9 +22,10 @@ from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.text import plain
 from app.ui.text.numbers import spoken_key
 from app.ui.widgets import IconButton
+from nep.i18n import _, lazy
 
 STOP_KEY = "F12"
-NEEDS_WITH = "A key alone is for typing. Hold Ctrl or Alt with it, or use a function key."
+NEEDS_WITH = lazy("A key alone is for typing. Hold Ctrl or Alt with it, or use a function key.")
 ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
 HOLDS = (
     Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
@@ -33,7 +34,7 @@ HOLDS = (
 
 @dataclass(frozen=True, slots=True)
 class Fixed:
-    """A key that can't be changed: where it works, what it does, the key as it is spelled on keys."""
+    """A key that can't be changed: where it works, what it does (both `lazy`), the key as it is spelled."""
 
     place: str
     words: str
@@ -41,27 +42,27 @@ class Fixed:
 
 
 FIXED: tuple[Fixed, ...] = (
-    Fixed("Everywhere", "Close the palette or a sheet, leave a field", "Esc"),
-    Fixed("Everywhere", "Next control in the panel", "Tab"),
-    Fixed("Everywhere", "Control before it", "Shift+Tab"),
-    Fixed("Everywhere", "Press the button that has the ring", "Space"),
-    Fixed("Tables and trees", "Go to the filter", "/"),
-    Fixed("Tables and trees", "Row above or below", "Up, Down"),
-    Fixed("Tables and trees", "Open the row", "Enter"),
-    Fixed("Tables and trees", "Open or close what is inside", "Right, Left"),
-    Fixed("Inspector", "Find a key or value", "Ctrl+F"),
-    Fixed("Inspector", "Copy the value", "Ctrl+C"),
-    Fixed("Inspector", "Copy the path", "Ctrl+Shift+C"),
-    Fixed("Sliders", "One step", "Left, Right"),
-    Fixed("Sliders", "Ten steps", "PgUp, PgDown"),
-    Fixed("Sliders", "Lowest and highest", "Home, End"),
-    Fixed("Block editor", "Copy, cut, paste blocks", "Ctrl+C, Ctrl+X, Ctrl+V"),
-    Fixed("Block editor", "Delete the block", "Delete"),
-    Fixed("Block editor", "Move through blocks and gaps", "Up, Down, Left, Right"),
-    Fixed("Block editor", "Open the field or the menu of the block", "Enter"),
-    Fixed("Palette", "Choose", "Up, Down"),
-    Fixed("Palette", "Do it", "Enter"),
-    Fixed("Palette", "Change the shortcut", "Ctrl+Enter"),
+    Fixed(lazy("Everywhere"), lazy("Close the palette or a sheet, leave a field"), "Esc"),
+    Fixed(lazy("Everywhere"), lazy("Next control in the panel"), "Tab"),
+    Fixed(lazy("Everywhere"), lazy("Control before it"), "Shift+Tab"),
+    Fixed(lazy("Everywhere"), lazy("Press the button that has the ring"), "Space"),
+    Fixed(lazy("Tables and trees"), lazy("Go to the filter"), "/"),
+    Fixed(lazy("Tables and trees"), lazy("Row above or below"), "Up, Down"),
+    Fixed(lazy("Tables and trees"), lazy("Open the row"), "Enter"),
+    Fixed(lazy("Tables and trees"), lazy("Open or close what is inside"), "Right, Left"),
+    Fixed(lazy("Inspector"), lazy("Find a key or value"), "Ctrl+F"),
+    Fixed(lazy("Inspector"), lazy("Copy the value"), "Ctrl+C"),
+    Fixed(lazy("Inspector"), lazy("Copy the path"), "Ctrl+Shift+C"),
+    Fixed(lazy("Sliders"), lazy("One step"), "Left, Right"),
+    Fixed(lazy("Sliders"), lazy("Ten steps"), "PgUp, PgDown"),
+    Fixed(lazy("Sliders"), lazy("Lowest and highest"), "Home, End"),
+    Fixed(lazy("Block editor"), lazy("Copy, cut, paste blocks"), "Ctrl+C, Ctrl+X, Ctrl+V"),
+    Fixed(lazy("Block editor"), lazy("Delete the block"), "Delete"),
+    Fixed(lazy("Block editor"), lazy("Move through blocks and gaps"), "Up, Down, Left, Right"),
+    Fixed(lazy("Block editor"), lazy("Open the field or the menu of the block"), "Enter"),
+    Fixed(lazy("Palette"), lazy("Choose"), "Up, Down"),
+    Fixed(lazy("Palette"), lazy("Do it"), "Enter"),
+    Fixed(lazy("Palette"), lazy("Change the shortcut"), "Ctrl+Enter"),
 )
 
 
@@ -137,14 +138,16 @@ class Shortcuts(QObject):
         """Why a key can't be a command's, in a sentence; "" when it can."""
         key = key_of(pressed)
         if key == STOP_KEY:
-            return "" if name == STOP else "F12 is Stop in every program state, and stays so."
+            return "" if name == STOP else _("F12 is Stop in every program state, and stays so.")
         held = pressed.keyboardModifiers() & HOLDS
         if not held and pressed.key() not in ALONE:
-            return NEEDS_WITH
+            return _(NEEDS_WITH)
         for fixed in FIXED:
             own = key in self.default(name)  # Ctrl+F finds in the Inspector there, else in the blocks
             if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:
-                return f"{spoken_key(key)} stays “{fixed.words}” ({fixed.place})."
+                return _("{key} stays “{command}” ({place}).").format(
+                    key=spoken_key(key), command=_(fixed.words), place=_(fixed.place)
+                )
         return ""
 
     # -- changing ---------------------------------------------------------------------------------
@@ -199,7 +202,7 @@ class Shortcuts(QObject):
         for widget in QApplication.allWidgets():
             command = widget.property("command")
             if isinstance(command, str):
-                said = self.commands[command].tip
+                said = _(self.commands[command].tip)
                 if not said or isinstance(widget, IconButton):  # nothing else says what it is
                     said = widget.accessibleName()
                 key = ", ".join(spoken_key(each) for each in self.of(command))

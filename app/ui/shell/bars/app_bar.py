@@ -9,6 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QMenuBar, QSizePolicy, QWidget
 
+from app.core.robots.robot_link import RobotLink
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.logo import Logo
@@ -18,11 +19,18 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, Segments, StopButton, paint
 from app.ui.widgets.buttons import PaintedButton
+from nep.i18n import _, lazy, ngettext
 
-FIELD_WORDS = "Find a command or panel"
 WIDE, HIGH, LEFT, ICON, GAP = 248, 28, 10, 14, 9
 LEAST_ROOM = 44  # px of the field: less than that for the words, and only icon and key are shown
-CHIP_WORDS = {"ready": "ready", "busy": "moving", "away": "away"}
+CHIP_WORDS = {
+    "ready": lazy("{robot} ready"),
+    "busy": lazy("{robot} moving"),
+    "away": lazy("{robot} away"),
+    "paused": lazy("{robot} holds still"),
+    "running": lazy("{robot} running"),
+}
+"""What the only robot does, for a person or for its program."""
 
 
 class AppBar(QWidget):
@@ -36,13 +44,13 @@ class AppBar(QWidget):
         self._theme = theme
         self.setMinimumHeight(theme.size("appBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Menus and layouts")
+        self.setAccessibleName(_("Menus and layouts"))
         self.menus = QMenuBar()
         self.native = platform == "darwin"  # a Mac shows the menus at the top of its screen
         self.menus.setNativeMenuBar(self.native)
         self.menus.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
         self.switch = Segments(
-            theme, [(layout.name, layout.title, layout.icon) for layout in layouts], name="Layout"
+            theme, [(layout.name, _(layout.title), layout.icon) for layout in layouts], name=_("Layout")
         )
         self.switch.changed.connect(self.layout_chosen)
         self.search = PaletteField(theme)
@@ -113,7 +121,7 @@ class PaletteField(PaintedButton):
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(theme, FIELD_WORDS, radius="control", parent=parent)
+        super().__init__(theme, _("Find a command or panel"), radius="control", parent=parent)
         self._key = ""
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
@@ -160,27 +168,37 @@ def robots_chip(session: Session) -> tuple[str, str]:
     """The chip's words and status: "Pepper ready", "2 robots", "Camera silent", "No robot"."""
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
-        return "No robot", "off"
+        return _("No robot"), "off"
     moving = [link for link in links if link.state == "not stopped"]
     if moving:
-        others = f" and {len(moving) - 1} more" if len(moving) > 1 else ""
-        return f"{moving[0].name}{others}: {moving[0].state_words}", "error"
+        first, others = moving[0], len(moving) - 1
+        words = _("{robot}: {state}")
+        if others:
+            words = ngettext("{robot} and {count} more: {state}", "{robot} and {count} more: {state}", others)
+        return words.format(robot=first.name, count=others, state=first.state_words), "error"
     stopping = [link for link in links if link.state == "stopping"]
     if stopping:
-        return f"{stopping[0].name if len(stopping) == 1 else f'{len(stopping)} robots'} stopping", "running"
+        if len(stopping) == 1:
+            return _("{robot} stopping").format(robot=stopping[0].name), "running"
+        words = ngettext("{count} robot stopping", "{count} robots stopping", len(stopping))
+        return words.format(count=len(stopping)), "running"
     silent = [link for link in links if link.state == "silent"]
     if silent:
-        words = silent[0].silent or "silent"
+        words = silent[0].silent or _("silent")
         if len(silent) > 1:
-            return f"{len(silent)} robots silent", "error"
-        return (f"{silent[0].name}: {words}" if len(links) > 1 else words[:1].upper() + words[1:]), "error"
+            words = ngettext("{count} robot silent", "{count} robots silent", len(silent))
+            return words.format(count=len(silent)), "error"
+        if len(links) > 1:
+            return _("{robot}: {state}").format(robot=silent[0].name, state=words), "error"
+        return words[:1].upper() + words[1:], "error"
     if len(links) > 1:
-        return f"{len(links)} robots", "ok"
-    return f"{links[0].name} {_doing(session, links[0].state)}", "ok"
+        return ngettext("{count} robot", "{count} robots", len(links)).format(count=len(links)), "ok"
+    return _doing(session, links[0]), "ok"
 
 
-def _doing(session: Session, state: str) -> str:
+def _doing(session: Session, link: RobotLink) -> str:
     """What the only robot does, for its program or for a person."""
-    if not session.runs.active:
-        return CHIP_WORDS[state]
-    return "holds still" if session.runs.view().state == "paused" else "running"
+    state: str = link.state
+    if session.runs.active:
+        state = "paused" if session.runs.view().state == "paused" else "running"
+    return _(CHIP_WORDS[state]).format(robot=link.name)

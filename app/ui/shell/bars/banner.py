@@ -22,6 +22,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.alert_box import AlertBox
 from app.ui.widgets.buttons import Button, IconButton
 from app.ui.widgets.labels import label
+from nep.i18n import _, ngettext
 
 FIGURES = re.compile(r"\d+")
 LEAST_HEIGHT = 52
@@ -82,7 +83,7 @@ class Banner(AlertBox):
         self.more = Button(theme, "", kind="ghost", size="small")
         self.button = Button(theme, "", size="form")
         self.second = Button(theme, "", size="form")
-        self.close_button = IconButton(theme, "x", "Close this message", size=32)
+        self.close_button = IconButton(theme, "x", _("Close this message"), size=32)
         self.text_column.addWidget(self.words)
         for widget in (self.more, self.second, self.button, self.close_button):
             self.button_row.addWidget(widget)
@@ -116,7 +117,8 @@ class Banner(AlertBox):
         for widget, text in ((self.button, button), (self.second, second)):
             widget.set_word(text or "")
             paint.show_when(widget, bool(text))
-        self.more.set_word(f"and {others} more" if others else "")
+        more = ngettext("and {count} more", "and {count} more", others).format(count=others)
+        self.more.set_word(more if others else "")
         paint.show_when(self.more, others > 0)
 
     def leaveEvent(self, event: QEvent) -> None:

@@ -12,6 +12,7 @@ from app.ui.shell.commands.shell import Shell
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Line, paint
+from nep.i18n import _
 
 FREEZE = "view.freeze"
 EVERY = 8  # half ticks
@@ -60,10 +61,10 @@ class DeveloperTools(QObject):
         self._shell, self._bar, self._actions = shell, bar, commands.actions
         self._ticks = 0
         theme, menus = shell.theme, commands.menus
-        self.freeze = ToggleButton(theme, "Freeze", "snowflake")
-        self.layout = MenuButton(theme, "Developer", "panel-left", size="small")
-        self.panels = MenuButton(theme, "Panels", size="small")
-        self.panels.setToolTip("Opens and closes panels")
+        self.freeze = ToggleButton(theme, _("Freeze"), "snowflake")
+        self.layout = MenuButton(theme, _("Developer"), "panel-left", size="small")
+        self.panels = MenuButton(theme, _("Panels"), size="small")
+        self.panels.setToolTip(_("Opens and closes panels"))
         self._actions.bind(self.freeze, FREEZE)
         self._actions[FREEZE].triggered.connect(self.refresh)
         self.layout.clicked.connect(lambda: menus.drop_layouts(self.layout))
@@ -84,9 +85,9 @@ class DeveloperTools(QObject):
         self.freeze.setChecked(frozen)
         self.freeze.setEnabled(bool(freezable(shell.bench)))
         own = shell.saved_layouts.own("developer")
-        name = own or "Developer"
+        name = own or _("Developer")
         self.layout.set_word(name)
-        self.layout.setAccessibleName(f"Layout {name}")
+        self.layout.setAccessibleName(_("Layout {name}").format(name=name))
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize:

@@ -205,7 +205,7 @@ class Result(QWidget):
         high = paint.height_of(theme.font("body"))
         upper = QRectF(rect.left(), rect.center().y() - high - 1, rect.width(), high)
         paint.words(
-            painter, upper, "Last stop", theme.font("body"), theme.colour("textSecondary"), paint.RIGHT
+            painter, upper, _("Last stop"), theme.font("body"), theme.colour("textSecondary"), paint.RIGHT
         )
         self._paint_line(painter, QRectF(rect.left(), rect.center().y() + 1, rect.width(), high), "ok")
 
@@ -243,12 +243,12 @@ class RunBar(Bar):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
-        self.setAccessibleName("Run and stop")
-        self.run = RunButton(theme, "Run", "play", widest="Go on")
-        self.pause = RunButton(theme, "Pause", "pause")
-        self.step = RunButton(theme, "Step", "step-forward")
-        self.pace = IconButton(theme, "gauge", "Speed", checkable=True, size=36)
-        self._paces = Menu(theme, self, "Speed")
+        self.setAccessibleName(_("Run and stop"))
+        self.run = RunButton(theme, _("Run"), "play", widest=_("Go on"))
+        self.pause = RunButton(theme, _("Pause"), "pause")
+        self.step = RunButton(theme, _("Step"), "step-forward")
+        self.pace = IconButton(theme, "gauge", _("Speed"), checkable=True, size=36)
+        self._paces = Menu(theme, self, _("Speed"))
         self.mark = Mark(theme)
         self.sentence = Sentence(theme)
         self.result = Result(theme)
@@ -315,17 +315,17 @@ class ToolBar(Bar):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("toolBar"))
-        self.setAccessibleName("Tools, run and stop")
+        self.setAccessibleName(_("Tools, run and stop"))
         self.mark = Mark(theme)
         self.words = label("", "body", role="textSecondary")
         self.result = Result(theme, compact=True)
         self.confirm = Button(theme, "", size="small")
         self.confirm.hide()
         self.confirm.let_shrink(96)
-        self.run = Button(theme, "Run", "play", kind="run", size="small")
+        self.run = Button(theme, _("Run"), "play", kind="run", size="small")
         self.run.fill_icon = True
-        self.pause = IconButton(theme, "pause", "Pause")
-        self.step = IconButton(theme, "step-forward", "Step")
+        self.pause = IconButton(theme, "pause", _("Pause"))
+        self.step = IconButton(theme, "step-forward", _("Step"))
         self.stop = StopButton(theme, "toolBar")
         self.tools = QHBoxLayout()
         self._build()

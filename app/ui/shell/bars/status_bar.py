@@ -16,15 +16,11 @@ from app.core.session import Session
 from app.ui.text.numbers import age_words, grouped
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Line, StatusItem, paint
+from nep.i18n import _, ngettext
 
 Fact = tuple[str, str, str | None]  # icon, words, status
 NOTHING: Fact = ("", "", None)
 TICK_MS = 33
-
-
-def counted(number: int, one: str, many: str) -> str:
-    """Say "1 node" or "7 nodes"."""
-    return f"{number} {one if number == 1 else many}"
 
 
 def _worst(found: Iterable[str]) -> tuple[str, str]:
@@ -48,41 +44,51 @@ class Facts:
         alerts = [alert for alert in self._session.alerts.active if alert.severity != "info"]
         if alerts:
             icon, status = _worst(alert.severity for alert in alerts)
-            return icon, counted(len(alerts), "alert", "alerts"), status
+            words = ngettext("{count} alert", "{count} alerts", len(alerts))
+            return icon, words.format(count=len(alerts)), status
         known = self._session.fleet.links
         links = [
             link for link in known if link.state != "away"
         ] or known  # Health shows one that has gone, too
         if not links:
-            return "circle-dashed", "No robot", "off"
+            return "circle-dashed", _("No robot"), "off"
         topics, now = self._session.topics, time.monotonic()
         found = [(link, facts_of(link, topics, now, age_words)) for link in links]
-        wrong = [fact.status for _, facts in found for fact in facts if fact.to_look_at]
+        wrong = [fact.status for _link, facts in found for fact in facts if fact.to_look_at]
         if wrong:
             icon, status = _worst(wrong)
-            whose = links[0].name if len(links) == 1 else f"{len(links)} robots"
-            return icon, f"{whose}: {len(wrong)} to look at", status
+            words = _("{robot}: {count} to look at")
+            if len(links) > 1:
+                words = ngettext(
+                    "{robots} robot: {count} to look at", "{robots} robots: {count} to look at", len(links)
+                )
+            return icon, words.format(robot=links[0].name, robots=len(links), count=len(wrong)), status
         if any(link.state == STOPPING for link in links):
-            return "circle-dashed", "Waiting for the answer to Stop", "off"
-        who = f"{links[0].name} is" if len(links) == 1 else f"{len(links)} robots are"
+            return "circle-dashed", _("Waiting for the answer to Stop"), "off"
+        name, count = links[0].name, len(links)
         if all(has_told(link, facts) for link, facts in found):
-            return "circle-check", f"{who} well", "ok"
-        return "circle-dashed", f"{who} connected", "off"
+            words = ngettext("{count} robot is well", "{count} robots are well", count)
+            words = words if count > 1 else _("{robot} is well")
+            return "circle-check", words.format(robot=name, count=count), "ok"
+        words = ngettext("{count} robot is connected", "{count} robots are connected", count)
+        words = words if count > 1 else _("{robot} is connected")
+        return "circle-dashed", words.format(robot=name, count=count), "off"
 
     def saved(self) -> Fact:
         """When the behaviour was saved, or that it is not saved yet."""
         document = self._session.document
         if document.dirty:
-            return "save", "Not saved, kept safe" if document.path is None else "Changes kept safe", None
+            words = _("Not saved, kept safe") if document.path is None else _("Changes kept safe")
+            return "save", words, None
         if document.saved_at is None:
             return NOTHING
         then = self._clock(document.saved_at)
-        return "save", f"Saved {then.tm_hour}:{then.tm_min:02d}", None
+        return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
 
     def topics(self) -> Fact:
         """How many topics are live."""
         live = sum(1 for topic in self._session.topics if topic.gone_s is None)
-        return "", f"{counted(live, 'topic', 'topics')} live", None
+        return "", ngettext("{count} topic live", "{count} topics live", live).format(count=live), None
 
     def reach(self) -> Fact:
         """Who can reach this master."""
@@ -97,10 +103,11 @@ class Facts:
         """Whether a master is there, and where."""
         master = self._session.master
         if master.kind == "connected":
-            return "circle-check", f"Master {master.address}", "ok"
+            return "circle-check", _("Master {address}").format(address=master.address), "ok"
         if master.kind == "searching":
-            return "circle-dashed", f"Looking for the master {master.address}", "off"
-        return "circle-dashed", "No master", "off"
+            words = _("Looking for the master {address}").format(address=master.address)
+            return "circle-dashed", words, "off"
+        return "circle-dashed", _("No master"), "off"
 
     def traffic(self) -> Fact:
         """Nodes, topics and messages per second."""
@@ -108,26 +115,34 @@ class Facts:
         if graph is None:
             return NOTHING
         live = sum(1 for topic in self._session.topics if topic.gone_s is None)
-        words = f"{counted(len(graph.nodes), 'node', 'nodes')}, {counted(live, 'topic', 'topics')}"
-        if self._session.traffic.messages_per_s is not None:
-            words += f", {grouped(round(self._session.traffic.messages_per_s))} messages/s"
-        return "", words, None
+        nodes, rate = len(graph.nodes), self._session.traffic.messages_per_s
+        facts = [
+            ngettext("{count} node", "{count} nodes", nodes).format(count=nodes),
+            ngettext("{count} topic", "{count} topics", live).format(count=live),
+        ]
+        if rate is not None:
+            facts.append(_("{count} messages/s").format(count=grouped(round(rate))))
+        return "", ", ".join(facts), None
 
     def lost(self) -> Fact:
         """How many messages were lost lately; nothing when none were."""
         lost = self._session.traffic.lost_30s
-        return ("triangle-alert", f"{grouped(lost)} lost in 30 s", "warn") if lost else NOTHING
+        if not lost:
+            return NOTHING
+        words = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
+        return "triangle-alert", words.format(count=grouped(lost)), "warn"
 
     def shown(self) -> Fact:
         """How many messages of the topics that are looked at were shown; nothing when all were."""
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
             return NOTHING
-        return "", f"Shown {grouped(traffic.shown_30s)} of {grouped(traffic.sent_30s)} in 30 s", None
+        words = _("Shown {shown} of {sent} in 30 s")
+        return "", words.format(shown=grouped(traffic.shown_30s), sent=grouped(traffic.sent_30s)), None
 
     def window(self) -> Fact:
         """How long the last refresh of the window took."""
-        return "", f"Window {round(self.window_ms)} ms of {TICK_MS} ms", None
+        return "", _("Window {spent} ms of {most} ms").format(spent=round(self.window_ms), most=TICK_MS), None
 
 
 class StatusBar(QWidget):
@@ -141,7 +156,7 @@ class StatusBar(QWidget):
         self._theme = theme
         self.setMinimumHeight(theme.size("statusBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Status")
+        self.setAccessibleName(_("Status"))
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(16, 0, 16, 0)
         self._row.setSpacing(0)
@@ -183,7 +198,7 @@ class StatusBar(QWidget):
 
     def words(self) -> list[str]:
         """All facts shown now, from left to right."""
-        return [item.text for item, _ in (*self._left, *self._right) if item.text]
+        return [item.text for item, _line in (*self._left, *self._right) if item.text]
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)

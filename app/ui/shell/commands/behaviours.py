@@ -11,8 +11,9 @@ from app.core.documents.journal import Unsaved
 from app.core.session import Session
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
-from app.ui.shell.commands.shell import UNTIL_END, Shell
+from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
+from nep.i18n import _, ngettext
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class TabPlace:
     @classmethod
     def parse(cls, text: str) -> TabPlace:
         """Of ``KEY:2``; ValueError for a place that is no number."""
-        key, _, place = text.rpartition(":")
+        key, _colon, place = text.rpartition(":")
         return cls(key, int(place))
 
 
@@ -194,10 +195,10 @@ class BehaviourCommands:
     def forget_recent(self) -> None:
         """Clear the list of recent files; it can be taken back."""
         before: list[RecentFile] = self._session.settings.recent_known
-        words = "Cleared the list of recent files"
+        words = _("Cleared the list of recent files")
         if not self._set_recent([]):
-            words = f"The list of recent files is empty {UNTIL_END}"
-        self._shell.say(words, "Undo", lambda: self._set_recent(before))
+            words = _("The list of recent files is empty until Studio ends")
+        self._shell.say(words, _("Undo"), lambda: self._set_recent(before))
 
     def _set_recent(self, files: list[RecentFile]) -> bool:
         kept = True
@@ -220,17 +221,23 @@ class BehaviourCommands:
                 unsaved.journal.unlink(missing_ok=True)
 
         offer(
-            "Put back the unsaved work?",
+            _("Put back the unsaved work?"),
             unsaved_words(rest),
-            ("Put it back", lambda: self._files.recover(rest)),
-            ("Throw it away", throw_away),
+            (_("Put it back"), lambda: self._files.recover(rest)),
+            (_("Throw it away"), throw_away),
         )
 
 
 def unsaved_words(left: Sequence[Unsaved]) -> str:
     """Which behaviours were not saved."""
-    first = f"“{left[0].name}”"
     if len(left) == 1:
-        return f"{first} was not saved when Studio ended last time."
-    others = f"“{left[1].name}”" if len(left) == 2 else f"{len(left) - 1} others"
-    return f"{first} and {others} were not saved when Studio ended last time."
+        return _("“{name}” was not saved when Studio ended last time.").format(name=left[0].name)
+    if len(left) == 2:
+        return _("“{name}” and “{other}” were not saved when Studio ended last time.").format(
+            name=left[0].name, other=left[1].name
+        )
+    return ngettext(
+        "“{name}” and {count} other were not saved when Studio ended last time.",
+        "“{name}” and {count} others were not saved when Studio ended last time.",
+        len(left) - 1,
+    ).format(name=left[0].name, count=len(left) - 1)

@@ -14,6 +14,7 @@ from app.ui.shell.commands.view import ViewCommands
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.text import plain
 from app.ui.widgets.menus import Menu, drop_below
+from nep.i18n import _
 
 ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.reset")
 
@@ -34,16 +35,16 @@ class MenuLists:
         self._shell, self._session, self.actions = shell, session, actions
         self._view, self._open_file = view, open_file
         theme, surface = shell.theme, shell.surface
-        self._recent = Menu(theme, surface, "Recent")
+        self._recent = Menu(theme, surface, _("Recent"))
         menus["File"].insertMenu(actions["file.save"], self._recent)
-        self._panels = Menu(theme, surface, "Panels")
-        self._layouts = Menu(theme, surface, "Layouts")
+        self._panels = Menu(theme, surface, _("Panels"))
+        self._layouts = Menu(theme, surface, _("Layouts"))
         menus["View"].insertMenu(actions["layout.keep"], self._panels)
         menus["View"].insertMenu(actions["layout.keep"], self._layouts)
         for name, menu in menus.items():
             menu.aboutToShow.connect(lambda name=name: self._refresh(name))
             menu.aboutToHide.connect(actions.enable_all)
-        self._arranging = Menu(theme, surface, "Layouts")
+        self._arranging = Menu(theme, surface, _("Layouts"))
         self._arranging.aboutToHide.connect(actions.enable_all)
 
     def drop_layouts(self, anchor: QWidget) -> None:
@@ -73,7 +74,9 @@ class MenuLists:
         recent = self._session.settings.recent_known
         self._recent.menuAction().setVisible(bool(recent))
         for file in recent:
-            words = file.name if file.there else f"{file.name} (not there any more)"
+            words = file.name
+            if not file.there:
+                words = _("{file} (not there any more)").format(file=file.name)
             entry = self._recent.addAction(plain.entry(words))
             entry.setToolTip(plain.tip(str(file.path)))
             entry.setEnabled(file.there)
@@ -85,7 +88,7 @@ class MenuLists:
         menu.clear()
         arrangements, shown = self._shell.saved_layouts, self._shell.showing
         for layout in LAYOUTS:
-            entry = menu.addAction(self._shell.theme.icon(layout.icon), layout.title)
+            entry = menu.addAction(self._shell.theme.icon(layout.icon), _(layout.title))
             entry.setCheckable(True)
             entry.setChecked(shown == layout.name and not arrangements.own(layout.name))
             entry.triggered.connect(lambda _on=False, name=layout.name: self._view.show_built_in_layout(name))
@@ -106,10 +109,10 @@ class MenuLists:
             return
         self.actions.choose(f"layout.{shell.showing}")
         opened = shell.bench.open_names()
-        for panel in sorted(shell.panels.values(), key=lambda panel: panel.title):
+        for panel in sorted(shell.panels.values(), key=lambda panel: _(panel.title)):
             if panel.name == "behaviour" and shell.showing != "behaviour":
                 continue
-            entry = self._panels.addAction(shell.theme.icon(panel.icon), panel.title)
+            entry = self._panels.addAction(shell.theme.icon(panel.icon), _(panel.title))
             entry.setCheckable(True)
             entry.setChecked(panel.name in opened)
             entry.triggered.connect(lambda on=False, name=panel.name: self._toggle(name, on))

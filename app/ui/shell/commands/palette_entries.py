@@ -10,8 +10,10 @@ from app.core.session import Session
 from app.ui.shell.actions.command import Command
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.shell import Shell
+from app.ui.shell.docking.layouts import layout_named
 from app.ui.text.dates import day_words
 from app.ui.widgets.lists.fuzzy import Entry
+from nep.i18n import _
 
 TOPIC_ICONS = {"json": "braces", "string": "type", "bytes": "binary", "image": "image"}
 
@@ -51,17 +53,17 @@ class PaletteEntries:
         for each in self._shown:
             key, reason = self._shortcuts.first(each.id), self._why_not(each.id)
             icon = each.icon or "chevrons-right"
-            made.append(Entry(f"command:{each.id}", each.text, icon, each.menu, key, reason))
+            made.append(Entry(f"command:{each.id}", each.words, icon, _(each.menu), key, reason))
         return made
 
     def _panels(self) -> list[Entry]:
         bench = self._shell.bench
         opened: Sequence[str] = bench.open_names() if bench is not None else ()
         made = []
-        for panel in sorted(self._shell.panels.values(), key=lambda panel: panel.title):
+        for panel in sorted(self._shell.panels.values(), key=lambda panel: _(panel.title)):
             place = opened.index(panel.name) + 1 if panel.name in opened else 0
             key = self._shortcuts.first(f"panel.{place}") if 0 < place < 10 else ""
-            made.append(Entry(f"panel:{panel.name}", panel.title, panel.icon, "", key))
+            made.append(Entry(f"panel:{panel.name}", _(panel.title), panel.icon, "", key))
         return made
 
     def _robots(self) -> list[Entry]:
@@ -70,14 +72,19 @@ class PaletteEntries:
 
     def _layouts(self) -> list[Entry]:
         own = self._shell.saved_layouts.all()
-        return [Entry(f"layout:{each.name}", each.name, "panel-left", each.base.title()) for each in own]
+        return [
+            Entry(f"layout:{each.name}", each.name, "panel-left", _(layout_named(each.base).title))
+            for each in own
+        ]
 
     def _files(self) -> list[Entry]:
         now = dt.datetime.now().astimezone()
         made = []
         for file in self._session.settings.recent_known:
             when = day_words(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
-            reason = "" if file.there else f"Not in {file.path.parent.name} any more"
+            reason = ""
+            if not file.there:
+                reason = _("Not in {folder} any more").format(folder=file.path.parent.name)
             made.append(Entry(f"file:{file.path}", file.name, "file", when, reason=reason))
         return made
 

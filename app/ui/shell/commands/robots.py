@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from app.core.robots.virtual_processes import VIRTUAL_ROBOTS
 from app.core.session import Session
 from app.errors import SettingsError
-from app.ui.shell.commands.shell import UNTIL_END, Shell
+from app.ui.shell.commands.shell import Shell
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.shell.documents import DocumentController
+from nep.i18n import _
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class RobotSwap:
     @classmethod
     def parse(cls, text: str) -> RobotSwap:
         """Of ``MISSING:OTHER``."""
-        missing, _, other = text.partition(":")
+        missing, _colon, other = text.partition(":")
         return cls(missing, other)
 
 
@@ -53,7 +54,7 @@ class RobotCommands:
         self._session.companions.start_virtual_robot("Turtle", "diffdrive")
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
-        self._shell.say("The virtual Turtle is coming")
+        self._shell.say(_("The virtual Turtle is coming"))
 
     # -- robots that are missing ------------------------------------------------------------------
 
@@ -76,7 +77,9 @@ class RobotCommands:
         companions = self._session.companions
         companions.restart_virtual_robot(missing, model)
         self._shell.say(
-            f"The virtual {missing} is coming", "Undo", lambda: companions.stop_virtual_robot(missing)
+            _("The virtual {robot} is coming").format(robot=missing),
+            _("Undo"),
+            lambda: companions.stop_virtual_robot(missing),
         )
         return True
 
@@ -92,7 +95,9 @@ class RobotCommands:
 
         def change() -> None:
             if document.use_robot(swap.missing, robot):
-                self._shell.say(f"{swap.other} does what {swap.missing} was asked to do", "Undo", self._undo)
+                words = _("{robot} does what {other} was asked to do")
+                words = words.format(robot=swap.other, other=swap.missing)
+                self._shell.say(words, _("Undo"), self._undo)
 
         self._files.with_newest(change)
         return True
@@ -101,12 +106,12 @@ class RobotCommands:
 
     def ask_before_moving(self) -> None:
         """Ask again before a real robot moves."""
-        words = "Studio asks again before a real robot moves"
+        words = _("Studio asks again before a real robot moves")
         try:
             self._session.fleet.moving.forget()
         except SettingsError as error:
             self._shell.complain(str(error))
-            words += f", {UNTIL_END}"
+            words = _("Studio asks again before a real robot moves, until Studio ends")
         self._shell.say(words)
 
     def ask_about_others(self) -> None:

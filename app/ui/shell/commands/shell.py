@@ -17,7 +17,6 @@ from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
 
 START = "start"  # what `Shell.showing` says of the start page
-UNTIL_END = "until Studio ends"  # what could not be written
 
 
 class Shell(Protocol):

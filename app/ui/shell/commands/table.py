@@ -19,15 +19,16 @@ from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.view import TEXT_STEP, ViewCommands
 from app.ui.shell.documents import DocumentController
 from app.ui.theme.theme import TEXT_PERCENT
+from nep.i18n import _, lazy
 
 A = TypeVar("A")
-MENUS = ("File", "Edit", "View", "Run", "Robots", "Help")
+MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 WHY_NO_RUN = {
-    "running": "A program runs already",
-    "stopping": "Robots are being stopped",
-    "unanswered": "A robot has not confirmed Stop",
+    "running": lazy("A program runs already"),
+    "stopping": lazy("Robots are being stopped"),
+    "unanswered": lazy("A robot has not confirmed Stop"),
 }
-NO_PANELS = "The start page has no panels"
+NOTHING_TO_RUN = lazy("There is nothing to run")
 
 
 @dataclass(frozen=True)
@@ -47,49 +48,49 @@ class Handlers:
 
 def _no_run(do: Handlers) -> str:
     view = do.session.runs.view()
-    return "" if view.can_run else WHY_NO_RUN.get(view.state, "There is nothing to run")
+    return "" if view.can_run else _(WHY_NO_RUN.get(view.state, NOTHING_TO_RUN))
 
 
 def _no_pause(do: Handlers) -> str:
     view = do.session.runs.view()
     if view.can_pause:
         return ""
-    return "It is paused already" if view.state == "paused" else "Nothing runs"
+    return _("It is paused already") if view.state == "paused" else _("Nothing runs")
 
 
 def _no_step(do: Handlers) -> str:
     view = do.session.runs.view()
-    return "" if view.can_step else WHY_NO_RUN.get(view.state, "There is nothing to run")
+    return "" if view.can_step else _(WHY_NO_RUN.get(view.state, NOTHING_TO_RUN))
 
 
 def _no_editor(do: Handlers) -> str:
-    return "" if do.shell.showing == "behaviour" else "Only in the Behaviour layout"
+    return "" if do.shell.showing == "behaviour" else _("Only in the Behaviour layout")
 
 
 def _no_panels(do: Handlers) -> str:
-    return NO_PANELS if do.shell.bench is None else ""
+    return _("The start page has no panels") if do.shell.bench is None else ""
 
 
 def _no_own_layout(do: Handlers) -> str:
     if do.shell.saved_layouts.own(do.shell.showing):
         return ""
-    return _no_panels(do) or "This layout came with Studio"
+    return _no_panels(do) or _("This layout came with Studio")
 
 
 def _nothing_to_freeze(do: Handlers) -> str:
-    return "" if freezable(do.shell.bench) else "Nothing here can be frozen"
+    return "" if freezable(do.shell.bench) else _("Nothing here can be frozen")
 
 
 def _no_recent(do: Handlers) -> str:
-    return "" if do.session.settings.recent_known else "The list is empty"
+    return "" if do.session.settings.recent_known else _("The list is empty")
 
 
 def _largest_text(do: Handlers) -> str:
-    return "Text is as large as it gets" if do.shell.theme.text_percent >= TEXT_PERCENT[1] else ""
+    return _("Text is as large as it gets") if do.shell.theme.text_percent >= TEXT_PERCENT[1] else ""
 
 
 def _smallest_text(do: Handlers) -> str:
-    return "Text is as small as it gets" if do.shell.theme.text_percent <= TEXT_PERCENT[0] else ""
+    return _("Text is as small as it gets") if do.shell.theme.text_percent <= TEXT_PERCENT[0] else ""
 
 
 # ---- the tables -------------------------------------------------------------------------------------
@@ -100,106 +101,114 @@ C = Command[Handlers]
 def _go_to_panel(number: int) -> C:
     return C(
         f"panel.{number}",
-        f"Go to panel {number}",
+        lazy("Go to panel {number}"),
         lambda do: do.shell.panel_focus.number(number),
         keys=(f"Ctrl+{number}",),
         in_palette=False,
+        number=number,
     )
 
 
 COMMANDS: tuple[C, ...] = (
-    C("file.new", "New behaviour", lambda do: do.files.new(), "File", ("Ctrl+N",), "file-plus"),
-    C("file.open", "Open a file", lambda do: do.files.ask_open(), "File", ("Ctrl+O",), "folder-open"),
-    C("file.save", "Save", lambda do: do.files.save(), "File", ("Ctrl+S",), "save", above=True),
-    C("file.save_as", "Save as", lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",)),
-    C("file.earlier", "Earlier versions", lambda do: do.behaviours.earlier_versions(), "File"),
-    C("tab.close", "Close the behaviour", lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
-    C("tab.reopen", "Open the closed one again", lambda do: do.files.reopen(), "File", ("Ctrl+Shift+T",),
-      "history"),
-    C("file.forget_recent", "Clear the list of recent files", lambda do: do.behaviours.forget_recent(),
+    C("file.new", lazy("New behaviour"), lambda do: do.files.new(), "File", ("Ctrl+N",), "file-plus"),
+    C("file.open", lazy("Open a file"), lambda do: do.files.ask_open(), "File", ("Ctrl+O",), "folder-open"),
+    C("file.save", lazy("Save"), lambda do: do.files.save(), "File", ("Ctrl+S",), "save", above=True),
+    C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",)),
+    C("file.earlier", lazy("Earlier versions"), lambda do: do.behaviours.earlier_versions(), "File"),
+    C("tab.close", lazy("Close the behaviour"), lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
+    C("tab.reopen", lazy("Open the closed one again"), lambda do: do.files.reopen(), "File",
+      ("Ctrl+Shift+T",), "history"),
+    C("file.forget_recent", lazy("Clear the list of recent files"), lambda do: do.behaviours.forget_recent(),
       why_not=_no_recent),
-    C("file.start_page", "Start page", lambda do: do.view.start_page(), "File", icon="house", above=True),
-    C("settings.open", "Settings", lambda do: do.view.open_settings(), "File", ("Ctrl+,",), "settings"),
-    C("file.quit", "Quit", lambda do: do.shell.close(), "File", ("Ctrl+Q",), above=True),
-    C("edit.undo", "Undo", lambda do: do.behaviours.undo(), "Edit", ("Ctrl+Z",), "rotate-ccw",
+    C("file.start_page", lazy("Start page"), lambda do: do.view.start_page(), "File", icon="house",
+      above=True),
+    C("settings.open", lazy("Settings"), lambda do: do.view.open_settings(), "File", ("Ctrl+,",), "settings"),
+    C("file.quit", lazy("Quit"), lambda do: do.shell.close(), "File", ("Ctrl+Q",), above=True),
+    C("edit.undo", lazy("Undo"), lambda do: do.behaviours.undo(), "Edit", ("Ctrl+Z",), "rotate-ccw",
       why_not=_no_editor),
-    C("edit.redo", "Redo", lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"), "rotate-cw",
-      why_not=_no_editor),
-    C("blocks.find", "Find in the blocks", lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
+    C("edit.redo", lazy("Redo"), lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
+      "rotate-cw", why_not=_no_editor),
+    C("blocks.find", lazy("Find in the blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
       ("Ctrl+F",), "search", above=True),
-    C("blocks.search", "Find a block to add", lambda do: do.behaviours.find_blocks(to_add=True), "Edit"),
-    C("palette.open", "Find a command or panel", lambda do: do.view.open_palette(), "View", ("Ctrl+K",),
+    C("blocks.search", lazy("Find a block to add"), lambda do: do.behaviours.find_blocks(to_add=True),
+      "Edit"),
+    C("palette.open", lazy("Find a command or panel"), lambda do: do.view.open_palette(), "View", ("Ctrl+K",),
       "search", in_palette=False),
     # with Option (Alt) a Mac types signs, and Cmd+Tab is the system's
-    C("layout.behaviour", "Behaviour layout", lambda do: do.view.show_layout("behaviour"), "View", ("Alt+1",),
-      "blocks", group="layout", above=True, mac=("Ctrl+Alt+1",)),
-    C("layout.developer", "Developer layout", lambda do: do.view.show_layout("developer"), "View", ("Alt+2",),
-      "activity", group="layout", mac=("Ctrl+Alt+2",)),
-    C("layout.keep", "Keep this layout as", lambda do: do.view.keep_layout(), "View", why_not=_no_panels),
-    C("layout.rename", "Rename this layout", lambda do: do.view.rename_layout(), "View",
-      why_not=_no_own_layout),
-    C("layout.delete", "Delete this layout", lambda do: do.view.delete_layout(), "View", icon="trash-2",
-      why_not=_no_own_layout),
-    C("layout.reset", "Put the panels back", lambda do: do.view.reset_layout(), "View", why_not=_no_panels),
-    C("panel.next", "Next panel", lambda do: do.shell.panel_focus.next(1), "View", ("F6",),
+    C("layout.behaviour", lazy("Behaviour layout"), lambda do: do.view.show_layout("behaviour"), "View",
+      ("Alt+1",), "blocks", group="layout", above=True, mac=("Ctrl+Alt+1",)),
+    C("layout.developer", lazy("Developer layout"), lambda do: do.view.show_layout("developer"), "View",
+      ("Alt+2",), "activity", group="layout", mac=("Ctrl+Alt+2",)),
+    C("layout.keep", lazy("Keep this layout as"), lambda do: do.view.keep_layout(), "View",
       why_not=_no_panels),
-    C("panel.previous", "Previous panel", lambda do: do.shell.panel_focus.next(-1), "View", ("Shift+F6",),
+    C("layout.rename", lazy("Rename this layout"), lambda do: do.view.rename_layout(), "View",
+      why_not=_no_own_layout),
+    C("layout.delete", lazy("Delete this layout"), lambda do: do.view.delete_layout(), "View", icon="trash-2",
+      why_not=_no_own_layout),
+    C("layout.reset", lazy("Put the panels back"), lambda do: do.view.reset_layout(), "View",
       why_not=_no_panels),
+    C("panel.next", lazy("Next panel"), lambda do: do.shell.panel_focus.next(1), "View", ("F6",),
+      why_not=_no_panels),
+    C("panel.previous", lazy("Previous panel"), lambda do: do.shell.panel_focus.next(-1), "View",
+      ("Shift+F6",), why_not=_no_panels),
     *map(_go_to_panel, range(1, 10)),
-    C("tab.next", "Next behaviour", lambda do: do.behaviours.next_tab(1), "View", ("Ctrl+Tab",), above=True,
-      mac=("Meta+Tab", "Ctrl+Shift+]")),
-    C("tab.previous", "Previous behaviour", lambda do: do.behaviours.next_tab(-1), "View",
+    C("tab.next", lazy("Next behaviour"), lambda do: do.behaviours.next_tab(1), "View", ("Ctrl+Tab",),
+      above=True, mac=("Meta+Tab", "Ctrl+Shift+]")),
+    C("tab.previous", lazy("Previous behaviour"), lambda do: do.behaviours.next_tab(-1), "View",
       ("Ctrl+Shift+Tab",), mac=("Meta+Shift+Tab", "Ctrl+Shift+[")),
-    C("view.freeze", "Freeze what shows", lambda do: do.view.freeze(), "View", icon="snowflake",
-      tip="Holds the Inspector and the pictures as they are", check=True, above=True,
+    C("view.freeze", lazy("Freeze what shows"), lambda do: do.view.freeze(), "View", icon="snowflake",
+      tip=lazy("Holds the Inspector and the pictures as they are"), check=True, above=True,
       why_not=_nothing_to_freeze),
-    C("theme.light", "Light", lambda do: do.view.set_theme("light"), "View", icon="sun", group="theme",
+    C("theme.light", lazy("Light"), lambda do: do.view.set_theme("light"), "View", icon="sun", group="theme",
       above=True),
-    C("theme.dark", "Dark", lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme"),
-    C("theme.system", "As the system", lambda do: do.view.set_theme("system"), "View", icon="monitor",
+    C("theme.dark", lazy("Dark"), lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme"),
+    C("theme.system", lazy("As the system"), lambda do: do.view.set_theme("system"), "View", icon="monitor",
       group="theme"),
-    C("text.larger", "Larger text", lambda do: do.view.set_text(do.shell.theme.text_percent + TEXT_STEP),
-      "View", ("Ctrl++",), "zoom-in", above=True, why_not=_largest_text),
-    C("text.smaller", "Smaller text", lambda do: do.view.set_text(do.shell.theme.text_percent - TEXT_STEP),
-      "View", ("Ctrl+-",), "zoom-out", why_not=_smallest_text),
-    C("text.normal", "Normal text", lambda do: do.view.set_text(100), "View", ("Ctrl+0",)),
-    C("theme.contrast", "High contrast", lambda do: do.view.choose_contrast(), "View", check=True,
+    C("text.larger", lazy("Larger text"),
+      lambda do: do.view.set_text(do.shell.theme.text_percent + TEXT_STEP), "View", ("Ctrl++",), "zoom-in",
+      above=True, why_not=_largest_text),
+    C("text.smaller", lazy("Smaller text"),
+      lambda do: do.view.set_text(do.shell.theme.text_percent - TEXT_STEP), "View", ("Ctrl+-",), "zoom-out",
+      why_not=_smallest_text),
+    C("text.normal", lazy("Normal text"), lambda do: do.view.set_text(100), "View", ("Ctrl+0",)),
+    C("theme.contrast", lazy("High contrast"), lambda do: do.view.choose_contrast(), "View", check=True,
       above=True),
-    C("theme.motion", "Less motion", lambda do: do.view.choose_motion(), "View", check=True),
-    C("run.run", "Run", lambda do: do.behaviours.run_or_go_on(), "Run", ("F5",), "play", "Runs the behaviour",
-      why_not=_no_run),
-    C("run.pause", "Pause", lambda do: do.session.runs.pause(), "Run", ("F8",), "pause",
-      "Holds the program; robots hold still", why_not=_no_pause),
-    C("run.step", "Step", lambda do: do.behaviours.run_step(), "Run", ("F10",), "step-forward",
-      "Runs one block", why_not=_no_step),
-    C("run.full_speed", "Full speed", lambda do: do.session.runs.set_pace(0.0), "Run", group="pace",
+    C("theme.motion", lazy("Less motion"), lambda do: do.view.choose_motion(), "View", check=True),
+    C("run.run", lazy("Run"), lambda do: do.behaviours.run_or_go_on(), "Run", ("F5",), "play",
+      lazy("Runs the behaviour"), why_not=_no_run),
+    C("run.pause", lazy("Pause"), lambda do: do.session.runs.pause(), "Run", ("F8",), "pause",
+      lazy("Holds the program; robots hold still"), why_not=_no_pause),
+    C("run.step", lazy("Step"), lambda do: do.behaviours.run_step(), "Run", ("F10",), "step-forward",
+      lazy("Runs one block"), why_not=_no_step),
+    C("run.full_speed", lazy("Full speed"), lambda do: do.session.runs.set_pace(0.0), "Run", group="pace",
       above=True),
-    C("run.slow", "Slow motion: 0.5 s a block", lambda do: do.session.runs.set_pace(0.5), "Run",
+    C("run.slow", lazy("Slow motion: 0.5 s a block"), lambda do: do.session.runs.set_pace(0.5), "Run",
       group="pace"),
-    C("run.very_slow", "Very slow: 1.5 s a block", lambda do: do.session.runs.set_pace(1.5), "Run",
+    C("run.very_slow", lazy("Very slow: 1.5 s a block"), lambda do: do.session.runs.set_pace(1.5), "Run",
       group="pace"),
     # two keys: F12 is one for sound on Macs and many laptops
-    C("run.stop", "Stop the program and all robots", lambda do: do.session.runs.stop(), "Run",
-      ("F12", "Ctrl+."), "square", "Stops the program and every robot", above=True, everywhere=True),
-    C("run.confirm", "It stands still", lambda do: do.session.runs.confirm_still(), in_palette=False,
+    C("run.stop", lazy("Stop the program and all robots"), lambda do: do.session.runs.stop(), "Run",
+      ("F12", "Ctrl+."), "square", lazy("Stops the program and every robot"), above=True, everywhere=True),
+    C("run.confirm", lazy("It stands still"), lambda do: do.session.runs.confirm_still(), in_palette=False,
       in_shortcuts=False),
-    C("robots.virtual", "Use the virtual Pepper", lambda do: do.robots.virtual_pepper(), "Robots",
+    C("robots.virtual", lazy("Use the virtual Pepper"), lambda do: do.robots.virtual_pepper(), "Robots",
       icon="bot"),
-    C("robots.turtle", "Use the virtual Turtle", lambda do: do.robots.virtual_turtle(), "Robots", icon="bot"),
+    C("robots.turtle", lazy("Use the virtual Turtle"), lambda do: do.robots.virtual_turtle(), "Robots",
+      icon="bot"),
     # unlike "robots.virtual" it stays in the layout that shows
-    C("robots.start", "Start the virtual Pepper", lambda do: do.robots.start_pepper(), in_palette=False,
+    C("robots.start", lazy("Start the virtual Pepper"), lambda do: do.robots.start_pepper(), in_palette=False,
       in_shortcuts=False),
-    C("robots.show", "Try what a robot can do", lambda do: do.shell.open_panel("robots"), "Robots",
+    C("robots.show", lazy("Try what a robot can do"), lambda do: do.shell.open_panel("robots"), "Robots",
       icon="eye", above=True),
-    C("robots.ask", "Ask again before real robots move", lambda do: do.robots.ask_before_moving(), "Robots",
-      icon="footprints"),
-    C("network.others", "Let other computers connect", lambda do: do.robots.ask_about_others(), "Robots",
-      icon="wifi", above=True),
-    C("help.shortcuts", "Keyboard shortcuts", lambda do: do.view.open_shortcuts(), "Help", ("F1",),
+    C("robots.ask", lazy("Ask again before real robots move"), lambda do: do.robots.ask_before_moving(),
+      "Robots", icon="footprints"),
+    C("network.others", lazy("Let other computers connect"), lambda do: do.robots.ask_about_others(),
+      "Robots", icon="wifi", above=True),
+    C("help.shortcuts", lazy("Keyboard shortcuts"), lambda do: do.view.open_shortcuts(), "Help", ("F1",),
       "keyboard"),
-    C("help.doctor", "Connection doctor", lambda do: do.view.open_doctor(), "Help", icon="stethoscope"),
-    C("help.log", "Show the log", lambda do: do.view.show_log(), "Help", icon="folder-open"),
-    C("help.about", "About NEP Studio", lambda do: do.view.about(), "Help", icon="info"),
+    C("help.doctor", lazy("Connection doctor"), lambda do: do.view.open_doctor(), "Help", icon="stethoscope"),
+    C("help.log", lazy("Show the log"), lambda do: do.view.show_log(), "Help", icon="folder-open"),
+    C("help.about", lazy("About NEP Studio"), lambda do: do.view.about(), "Help", icon="info"),
 )  # fmt: skip
 
 

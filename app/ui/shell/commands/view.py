@@ -17,12 +17,13 @@ from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.freeze import freeze_or_go_on
 from app.ui.shell.commands.palette_entries import PaletteEntries
-from app.ui.shell.commands.shell import START, UNTIL_END, Shell
+from app.ui.shell.commands.shell import START, Shell
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.documents import DocumentController
 from app.ui.theme.system import Wish
 from app.ui.theme.theme import Mode
 from app.ui.widgets.lists.fuzzy import Entry
+from nep.i18n import _
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ else:
     )
 
 TEXT_STEP = 25
-NEXT_LAYOUT = "Keep this layout as"
 
 
 @runtime_checkable
@@ -199,9 +199,10 @@ class ViewCommands:
 
         def keep(name: str) -> None:
             kept = arrangements.keep_as(bench, base, name)
-            shell.say(f"Kept the layout “{name}”" if kept else f"“{name}” is there {UNTIL_END}")
+            words = _("Kept the layout “{name}”") if kept else _("“{name}” is there until Studio ends")
+            shell.say(words.format(name=name))
 
-        self._ask_name().ask(NEXT_LAYOUT, "Keep it", arrangements.refusal, keep)
+        self._ask_name().ask(_("Keep this layout as"), _("Keep it"), arrangements.refusal, keep)
 
     def rename_layout(self) -> None:
         """Give the own layout that shows another name."""
@@ -209,8 +210,8 @@ class ViewCommands:
         old = arrangements.own(self._shell.showing)
         if old:
             self._ask_name().ask(
-                f"Another name for “{old}”",
-                "Rename it",
+                _("Another name for “{name}”").format(name=old),
+                _("Rename it"),
                 lambda name: arrangements.refusal(name, old),
                 lambda name: arrangements.rename(old, name),
                 old,
@@ -222,8 +223,8 @@ class ViewCommands:
         name = arrangements.own(shell.showing)
         if name:
             kept, undo = arrangements.delete(shell.bench, name)
-            words = f"Deleted the layout “{name}”" if kept else f"“{name}” is gone {UNTIL_END}"
-            shell.say(words, "Undo", undo)
+            words = _("Deleted the layout “{name}”") if kept else _("“{name}” is gone until Studio ends")
+            shell.say(words.format(name=name), _("Undo"), undo)
 
     def freeze(self) -> None:
         """Hold what shows, or let it go on."""
@@ -273,10 +274,11 @@ class ViewCommands:
         try:
             folder.mkdir(0o700, parents=True, exist_ok=True)
         except OSError as error:
-            self._shell.say(f"{folder} can't be made: {(error.strerror or str(error)).lower()}")
+            reason = (error.strerror or str(error)).lower()
+            self._shell.say(_("{folder} can't be made: {reason}").format(folder=folder, reason=reason))
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self._shell.say(f"The log files are in {folder}")
+            self._shell.say(_("The log files are in {folder}").format(folder=folder))
 
     def about(self) -> None:
         """Say what this program is."""

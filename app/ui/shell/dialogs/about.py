@@ -8,12 +8,13 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, label
+from nep.i18n import _, lazy
 
 TITLE = "NEP Studio"
 LINES = (
-    "See what robots say, and tell them what to do.",
-    "NEP Studio is free software (MIT licence).",
-    "Inter and JetBrains Mono: SIL Open Font License 1.1. Icons: Lucide, ISC licence.",
+    lazy("See what robots say, and tell them what to do."),
+    lazy("NEP Studio is free software (MIT licence)."),
+    lazy("Inter and JetBrains Mono: SIL Open Font License 1.1. Icons: Lucide, ISC licence."),
 )
 WIDE = 420
 
@@ -30,14 +31,14 @@ class AboutSheet(Overlay):
         column.setSpacing(10)
         head = QHBoxLayout()
         head.addWidget(label(TITLE, "heading", wrap=True), 1)
-        self._close = IconButton(theme, "x", "Close", "Esc")
+        self._close = IconButton(theme, "x", _("Close"), "Esc")
         self._close.clicked.connect(self.shut)
         head.addWidget(self._close)
         column.addLayout(head)
         lines = QVBoxLayout()
         lines.setSpacing(6)
         for words in LINES:
-            lines.addWidget(label(words, "body", role="textSecondary", wrap=True))
+            lines.addWidget(label(_(words), "body", role="textSecondary", wrap=True))
         column.addLayout(lines)
         self.closed.connect(self.deleteLater)
         self.closed.connect(self._scrim.deleteLater)

@@ -15,11 +15,11 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Found
+from nep.i18n import _, lazy, ngettext
 
 WIDE, TOP, FIELD, FOOT = 640, 128, 56, 36
 ROWS_SHOWN = 9.5
 MOST, MOST_EMPTY, LAST_SHOWN, LAST_KEPT = 40, 8, 5, 12
-NAME = "Find a command, panel, topic, robot or file"
 
 
 class _Field(QLineEdit):
@@ -28,8 +28,9 @@ class _Field(QLineEdit):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.setPlaceholderText(NAME)
-        self.setAccessibleName(NAME)
+        name = _("Find a command, panel, topic, robot or file")
+        self.setPlaceholderText(name)
+        self.setAccessibleName(name)
         self.setProperty("bare", "true")
         self.setProperty("ownFocus", True)
         self.setFrame(False)
@@ -58,7 +59,11 @@ class _Field(QLineEdit):
 class _Foot(QWidget):
     """Which keys do what, and how many fit."""
 
-    KEYS = ((("↑", "↓"), "choose"), (("Enter",), "run"), (("Ctrl Enter",), "change the shortcut"))
+    KEYS = (
+        (("↑", "↓"), lazy("choose")),
+        (("Enter",), lazy("run")),
+        (("Ctrl Enter",), lazy("change the shortcut")),
+    )
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -75,7 +80,8 @@ class _Foot(QWidget):
         middle, left = self.height() / 2, 18.0
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, theme.colour("border"))
         count = paint.width_of(font, self.counted)
-        for keys, said in self.KEYS:
+        for keys, words in self.KEYS:
+            said = _(words)
             wide = sum(paint.key_width(theme, key) + 5 for key in keys) + paint.width_of(font, said)
             if left + wide > self.width() - count - 40:
                 break
@@ -104,13 +110,13 @@ class Palette(Overlay):
         rebind: Callable[[str], object],
     ) -> None:
         """``offers`` is asked at each opening."""
-        super().__init__(theme, window, "Command palette")
+        super().__init__(theme, window, _("Command palette"))
         self._offers, self._run, self._rebind = offers, run, rebind
         self._finder = Finder(())
         self.last: list[str] = []
         self.on_last: Callable[[Sequence[str]], object] = lambda _ids: None
         self.field = _Field(theme)
-        self.rows = EntryList(theme, "What fits")
+        self.rows = EntryList(theme, _("What fits"))
         self.nothing = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setContentsMargins(20, 14, 20, 16)
         self.foot = _Foot(theme)
@@ -164,13 +170,13 @@ class Palette(Overlay):
         lines = self._for_nothing_typed() if not query else []
         if query:
             found, count = self._finder.find(query, MOST)
-            self.foot.counted = f"{count} of {len(self._finder.entries)}"
+            self.foot.counted = _("{shown} of {count}").format(shown=count, count=len(self._finder.entries))
             for each in found:
-                heading = Heading(TITLES[each.entry.kind])
+                heading = Heading(_(TITLES[each.entry.kind]))
                 if heading not in lines:
                     lines.append(heading)
                 lines.append(each)
-        self.nothing.setText(f"Nothing is called “{query}”.")
+        self.nothing.setText(_("Nothing is called “{words}”.").format(words=query))
         paint.show_when(self.nothing, not lines)
         paint.show_when(self.rows, bool(lines))
         self.rows.show_lines(lines)
@@ -182,7 +188,7 @@ class Palette(Overlay):
         entries = self._finder.entries
         known = {entry.id: entry for entry in entries if entry.id in self.last}
         last = [known[id] for id in self.last if id in known][:LAST_SHOWN]
-        lines: list[Line] = [Heading(TITLES["recent"]), *map(Found, last)] if last else []
+        lines: list[Line] = [Heading(_(TITLES["recent"])), *map(Found, last)] if last else []
         kinds: dict[str, list[Found]] = {}
         for entry in entries:
             of_kind = kinds.setdefault(entry.kind, [])
@@ -190,8 +196,10 @@ class Palette(Overlay):
                 of_kind.append(Found(entry))
         for kind, of_kind in kinds.items():
             if of_kind:
-                lines += [Heading(TITLES[kind]), *of_kind]
-        self.foot.counted = f"{len(entries)} things"
+                lines += [Heading(_(TITLES[kind])), *of_kind]
+        self.foot.counted = ngettext("{count} thing", "{count} things", len(entries)).format(
+            count=len(entries)
+        )
         return lines
 
     def _say(self) -> None:
@@ -238,12 +246,12 @@ class Palette(Overlay):
 
 
 TITLES = {
-    "recent": "Recently used",
-    "command": "Commands",
-    "panel": "Panels",
-    "topic": "Topics",
-    "robot": "Robots",
-    "layout": "Layouts",
-    "file": "Recent files",
-    "example": "Examples",
+    "recent": lazy("Recently used"),
+    "command": lazy("Commands"),
+    "panel": lazy("Panels"),
+    "topic": lazy("Topics"),
+    "robot": lazy("Robots"),
+    "layout": lazy("Layouts"),
+    "file": lazy("Recent files"),
+    "example": lazy("Examples"),
 }

@@ -15,6 +15,7 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Switch, label, paint
+from nep.i18n import _
 
 WIDE = 480
 TOP_SHARE = 0.42  # below every Stop: the run bar's and the robots' own
@@ -57,8 +58,8 @@ class MotionQuestion(QWidget):
         self.title = label("", "heading", wrap=True)
         self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.always = Switch(theme, "")
-        self.let = Button(theme, "Let it move", "footprints", kind="primary", size="form")
-        self.not_now = Button(theme, "Not now", size="form")
+        self.let = Button(theme, _("Let it move"), "footprints", kind="primary", size="form")
+        self.not_now = Button(theme, _("Not now"), size="form")
         self.let.clicked.connect(lambda: self._answer(let=True))
         self.not_now.clicked.connect(lambda: self._answer(let=False))
         self._lay_out(theme)
@@ -104,10 +105,12 @@ class MotionQuestion(QWidget):
         names = list(question.moves)
         self.title.setText(plain.breakable(question.title))
         self.sentence.setText(plain.breakable(question.sentence))
-        self._always_for = f"Always for {names[0]}" if len(names) == 1 else "Always for these"
+        self._always_for = _("Always for these")
+        if len(names) == 1:
+            self._always_for = _("Always for {robot}").format(robot=names[0])
         self.always.setAccessibleName(self._always_for)
         self.always.setChecked(False)
-        self.let.set_word("Let it move" if len(names) == 1 else "Let them move")
+        self.let.set_word(_("Let it move") if len(names) == 1 else _("Let them move"))
         self.setAccessibleName(question.title)
         self.setAccessibleDescription(question.sentence)
         if not self.isVisible():
@@ -153,7 +156,7 @@ class MotionQuestion(QWidget):
         self.always.setText(self._always_for)
         buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()
         if self.always.sizeHint().width() > wide - 2 * EDGE - 2 * BETWEEN - buttons:
-            self.always.setText("Always")
+            self.always.setText(_("Always"))
         self.always.updateGeometry()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:

@@ -12,6 +12,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.menus import EditMenu
+from nep.i18n import _
 
 WIDE = 420
 
@@ -22,7 +23,7 @@ class NameSheet(Overlay):
     top = 128
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
-        super().__init__(theme, window, "Name")
+        super().__init__(theme, window, _("Name"))
         self._refusal: Callable[[str], str] = lambda _name: ""
         self._take: Callable[[str], object] = lambda _name: None
         self.heading = label("", "heading")
@@ -31,7 +32,7 @@ class NameSheet(Overlay):
         EditMenu(theme, self.field)
         self.wrong = label("", "body", role="error", wrap=True)
         self.button = Button(theme, "", kind="primary", size="form")
-        cancel = Button(theme, "Leave it", size="form")
+        cancel = Button(theme, _("Leave it"), size="form")
         cancel.clicked.connect(self.shut)
         row = QHBoxLayout()
         row.addStretch(1)

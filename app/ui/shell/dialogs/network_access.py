@@ -10,9 +10,10 @@ from app.core.network.remote_access import Reach
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Choice, IconButton, label, paint
+from nep.i18n import _, lazy
 
 WIDE = 520
-WARNING = (
+WARNING = lazy(
     "Everybody in that network can then read what the robots say and command them. There is no password: do"
     " this only in a network that you trust, and never in a public one."
 )
@@ -24,21 +25,21 @@ class NetworkAccessSheet(Overlay):
     top = 128
 
     def __init__(self, theme: Theme, window: QWidget, reach: Reach) -> None:
-        super().__init__(theme, window, "Other computers")
+        super().__init__(theme, window, _("Other computers"))
         self._reach = reach
         self.heading = label("", "heading", wrap=True)
         self.warning = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.where = QHBoxLayout()
-        self.where_word = label("At the address", "bodyLarge", role="textSecondary")
+        self.where_word = label(_("At the address"), "bodyLarge", role="textSecondary")
         self.choice: Choice | None = None
-        self.typed_word = label("Programs there need this setting:", "body", role="textSecondary")
+        self.typed_word = label(_("Programs there need this setting:"), "body", role="textSecondary")
         self.typed = label("", "code")
         self.typed.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.copy = IconButton(theme, "copy", "Copy the setting")
+        self.copy = IconButton(theme, "copy", _("Copy the setting"))
         self.copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.typed.text()))
-        self.yes = Button(theme, "Let them connect", "wifi", kind="primary", size="form")
-        self.no = Button(theme, "Not now", size="form")
-        self.end = Button(theme, "This computer only", "lock", size="form")
+        self.yes = Button(theme, _("Let them connect"), "wifi", kind="primary", size="form")
+        self.no = Button(theme, _("Not now"), size="form")
+        self.end = Button(theme, _("This computer only"), "lock", size="form")
         self.yes.clicked.connect(self._let_in)
         self.no.clicked.connect(self.shut)
         self.end.clicked.connect(self._let_nobody_in)
@@ -94,7 +95,7 @@ class NetworkAccessSheet(Overlay):
             self.choice = None
         if can_open and not is_open:
             options = [(own.host, f"{own.host} ({own.interface})") for own in addresses]
-            self.choice = Choice(self.theme, options, name="Address")
+            self.choice = Choice(self.theme, options, name=_("Address"))
             self.choice.currentIndexChanged.connect(lambda _index: self._say_chosen())
             self.where.insertWidget(1, self.choice)
         paint.show_when(self.where_word, self.choice is not None)
@@ -103,22 +104,23 @@ class NetworkAccessSheet(Overlay):
             paint.show_when(shown, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
         paint.show_when(self.end, is_open and reach.is_near)
-        self.no.set_word("Leave it so" if is_open or not can_open else "Not now")
+        self.no.set_word(_("Leave it so") if is_open or not can_open else _("Not now"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:
         if not self._reach.is_near:
-            return f"The master is on another computer, {self._reach.master_host}"
+            return _("The master is on another computer, {host}").format(host=self._reach.master_host)
         if is_open:
-            return f"Other computers can connect at {', '.join(self._reach.hosts)}"
-        return "Let other computers connect?" if can_open else "This computer is in no network"
+            addresses = ", ".join(self._reach.hosts)
+            return _("Other computers can connect at {addresses}").format(addresses=addresses)
+        return _("Let other computers connect?") if can_open else _("This computer is in no network")
 
     def _words(self, *, is_open: bool, can_open: bool) -> str:
         if not self._reach.is_near:
-            return "Who may connect is decided there."
+            return _("Who may connect is decided there.")
         if is_open or can_open:
-            return WARNING
-        return "Join a Wi-Fi or plug in a cable, then open this again."
+            return _(WARNING)
+        return _("Join a Wi-Fi or plug in a cable, then open this again.")
 
     def _say_typed(self, host: str) -> None:
         self.typed.setText(self._reach.typed_by_others(host))

@@ -16,11 +16,15 @@ from app.ui.theme.theme import MODES, Theme
 from app.ui.widgets import Button, Elided, IconButton, Segments, label
 from app.ui.widgets.file_dialogs import show_free
 from nep import i18n
-from nep.i18n import _
+from nep.i18n import _, lazy, pgettext
 
 WIDE = 620
-MODE_WORDS = {"light": ("Light", "sun"), "dark": ("Dark", "moon"), "system": ("As the system", "monitor")}
-WISH_WORDS = {"system": "As the system", "on": "On", "off": "Off"}
+MODE_WORDS = {
+    "light": (lazy("Light"), "sun"),
+    "dark": (lazy("Dark"), "moon"),
+    "system": (lazy("As the system"), "monitor"),
+}
+WISH_WORDS = {"system": lazy("As the system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
 
 
@@ -30,23 +34,23 @@ class SettingsSheet(Overlay):
     top = 72
 
     def __init__(self, theme: Theme, window: QWidget, state: WindowState, settings: Settings) -> None:
-        super().__init__(theme, window, "Settings")
+        super().__init__(theme, window, _("Settings"))
         self._state, self._settings = state, settings
         languages = [(code, name, None) for code, name in i18n.offered()]
         self.language = Segments(theme, languages, check=True, size="form", name=_("Language"))
         self.from_next_start = label(_("From the next start of Studio"), "body", role="textSecondary")
-        self.mode = Segments(
-            theme, [(mode, *MODE_WORDS[mode]) for mode in MODES], check=True, size="form", name="Look"
-        )
+        modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
+        look = pgettext("colours of the window", "Look")
+        self.mode = Segments(theme, modes, check=True, size="form", name=look)
         self.text = Segments(
-            theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name="Text size"
+            theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
         )
-        wishes = [(wish, WISH_WORDS[wish], None) for wish in WISHES]
-        self.contrast = Segments(theme, wishes, check=True, size="form", name="High contrast")
-        self.motion = Segments(theme, wishes, check=True, size="form", name="Less motion")
-        self.shortcuts = Button(theme, "Change the shortcuts", "keyboard", size="form")
+        wishes = [(wish, _(WISH_WORDS[wish]), None) for wish in WISHES]
+        self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
+        self.motion = Segments(theme, wishes, check=True, size="form", name=_("Less motion"))
+        self.shortcuts = Button(theme, _("Change the shortcuts"), "keyboard", size="form")
         self.folder = Elided("bodyLarge", "textSecondary")
-        self.choose = Button(theme, "Choose a folder", "folder-open", size="form")
+        self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
         self.language.changed.connect(self._language)
         self.mode.changed.connect(self._mode)
         self.text.changed.connect(lambda percent: self._changed(lambda: theme.set_text_percent(int(percent))))
@@ -57,11 +61,11 @@ class SettingsSheet(Overlay):
         theme.changed.connect(self._show)
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", "Close", "Esc")
+        close = IconButton(self.theme, "x", _("Close"), "Esc")
         close.clicked.connect(self.shut)
         head = QHBoxLayout()
         head.setContentsMargins(19, 0, 19, 0)
-        head.addWidget(label("Settings", "heading"))
+        head.addWidget(label(_("Settings"), "heading"))
         head.addStretch(1)
         head.addWidget(close)
         self._inside = QWidget()
@@ -80,12 +84,12 @@ class SettingsSheet(Overlay):
         spoken.addStretch(1)
         rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
             (_("Language"), spoken),
-            ("Look", self.mode),
-            ("Text size", self.text),
-            ("High contrast", self.contrast),
-            ("Less motion", self.motion),
-            ("Keyboard", self.shortcuts),
-            ("Pictures", pictures),
+            (pgettext("colours of the window", "Look"), self.mode),
+            (_("Text size"), self.text),
+            (_("High contrast"), self.contrast),
+            (_("Less motion"), self.motion),
+            (_("Keyboard"), self.shortcuts),
+            (_("Pictures"), pictures),
         )
         for row, (words, control) in enumerate(rows):
             said = label(words, "bodyLarge", role="textSecondary")
@@ -160,7 +164,7 @@ class SettingsSheet(Overlay):
     def _choose(self) -> None:
         """Ask for a folder, while everything else goes on."""
         before = str(snapshots.folder(self._settings))
-        dialog = QFileDialog(self.window_below(), "Folder for pictures", before)
+        dialog = QFileDialog(self.window_below(), _("Folder for pictures"), before)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.fileSelected.connect(self.keep_folder)
         show_free(dialog)

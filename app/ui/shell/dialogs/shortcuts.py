@@ -16,6 +16,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, SearchField, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Found, match
+from nep.i18n import _, lazy
 
 WIDE, HIGH = 680, 640
 ONLY_MODIFIERS = frozenset(
@@ -28,9 +29,8 @@ ONLY_MODIFIERS = frozenset(
         Qt.Key.Key_unknown,
     }
 )
-PLACES = {"file": "File", "panel": "Panels", "edit": "Edit"}
-HINT = "Enter or a click gives a command another key. Delete takes its key away."
-WAITING = "Press the new key for “{0}”. Esc leaves it as it is."
+PLACES = {"file": lazy("File"), "panel": lazy("Panels"), "edit": lazy("Edit")}
+HINT = lazy("Enter or a click gives a command another key. Delete takes its key away.")
 
 
 class ShortcutSheet(Overlay):
@@ -39,16 +39,16 @@ class ShortcutSheet(Overlay):
     top = 72
 
     def __init__(self, theme: Theme, window: QWidget, shortcuts: Shortcuts) -> None:
-        super().__init__(theme, window, "Keyboard shortcuts")
+        super().__init__(theme, window, _("Keyboard shortcuts"))
         self._shortcuts = shortcuts
         self._waiting = ""
         self._offer: tuple[str, str] | None = None  # a command and the key that another one has
-        self.field = SearchField(theme, "Find a command or a key")
-        self.rows = EntryList(theme, "Keyboard shortcuts")
-        self.said = label(HINT, "body", role="textSecondary", wrap=True)
-        self.swap = Button(theme, "Swap the two", size="small")
-        self.reset = Button(theme, "Reset this one", size="small")
-        self.reset_all = Button(theme, "Reset all", size="small")
+        self.field = SearchField(theme, _("Find a command or a key"))
+        self.rows = EntryList(theme, _("Keyboard shortcuts"))
+        self.said = label(_(HINT), "body", role="textSecondary", wrap=True)
+        self.swap = Button(theme, _("Swap the two"), size="small")
+        self.reset = Button(theme, _("Reset this one"), size="small")
+        self.reset_all = Button(theme, _("Reset all"), size="small")
         self._lay_out()
         self.field.installEventFilter(self)
         self.field.textChanged.connect(self._show)
@@ -60,10 +60,10 @@ class ShortcutSheet(Overlay):
         shortcuts.changed.connect(self._show)
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", "Close", "Esc")
+        close = IconButton(self.theme, "x", _("Close"), "Esc")
         close.clicked.connect(self.shut)
         head = QHBoxLayout()
-        head.addWidget(label("Keyboard shortcuts", "heading"))
+        head.addWidget(label(_("Keyboard shortcuts"), "heading"))
         head.addStretch(1)
         head.addWidget(close)
         foot = QHBoxLayout()
@@ -130,13 +130,14 @@ class ShortcutSheet(Overlay):
             if not row.in_shortcuts:
                 continue
             keys = "\n".join(self._shortcuts.of(row.id))
-            note = "yours" if self._shortcuts.own(row.id) else ""
-            group = groups.setdefault(row.menu or PLACES.get(row.id.partition(".")[0], "View"), [])
-            group.append(Entry(f"command:{row.id}", row.text, "", note, keys))
+            note = _("yours") if self._shortcuts.own(row.id) else ""
+            place = row.menu or PLACES.get(row.id.partition(".")[0], "View")
+            group = groups.setdefault(_(place), [])
+            group.append(Entry(f"command:{row.id}", row.words, "", note, keys))
         for number, fixed in enumerate(FIXED):
             keys = "\n".join(fixed.key.split(", "))
-            groups.setdefault(fixed.place, []).append(
-                Entry(f"fixed:{number}", fixed.words, "", "stays", keys)
+            groups.setdefault(_(fixed.place), []).append(
+                Entry(f"fixed:{number}", _(fixed.words), "", _("stays"), keys)
             )
         return [(heading, entry) for heading, entries in groups.items() for entry in entries]
 
@@ -156,25 +157,26 @@ class ShortcutSheet(Overlay):
         if entry is None:
             return
         if entry.kind != "command":
-            self._tell(f"“{entry.words}” keeps its key.")
+            self._tell(_("“{command}” keeps its key.").format(command=entry.words))
             return
         self._waiting, self._offer = entry.name, None
         self.rows.look.waiting = entry.id
         paint.show_when(self.swap, False)
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
-        self._tell(WAITING.format(entry.words))
+        words = _("Press the new key for “{command}”. Esc leaves it as it is.")
+        self._tell(words.format(command=entry.words))
         self.rows.viewport().update()
 
-    def _stop_waiting(self, said: str = HINT) -> None:
+    def _stop_waiting(self, said: str = "") -> None:
         self._waiting = self.rows.look.waiting = ""
         self._offer = None
         paint.show_when(self.swap, False)
-        self._tell(said)
+        self._tell(said or _(HINT))
         self.rows.viewport().update()
 
     def _tell(self, said: str) -> None:
         self.said.setText(said)
-        if said != HINT and self.isVisible():
+        if said != _(HINT) and self.isVisible():
             paint.announce(self.said, said)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -213,21 +215,23 @@ class ShortcutSheet(Overlay):
         if refusal:
             self._tell(refusal)
             return
-        words = self._shortcuts.commands[name].text
+        words = self._shortcuts.commands[name].words
         holder = self._shortcuts.holder(key)
         if holder and holder != name:
-            other = self._shortcuts.commands[holder].text
-            self._stop_waiting(f"{spoken_key(key)} is “{other}” now. Swap the two, or press Enter again.")
+            other = self._shortcuts.commands[holder].words
+            said = _("{key} is “{command}” now. Swap the two, or press Enter again.")
+            self._stop_waiting(said.format(key=spoken_key(key), command=other))
             self._offer = (name, key)
             paint.show_when(self.swap, True)
             return
-        self._stop_waiting(f"“{words}” has {spoken_key(key)} now.")
+        self._stop_waiting(_("“{command}” has {key} now.").format(command=words, key=spoken_key(key)))
         self._shortcuts.give(name, key)
 
     def _swap(self) -> None:
         if self._offer is not None:
             name, key = self._offer
-            self._stop_waiting(f"“{self._shortcuts.commands[name].text}” has {spoken_key(key)} now.")
+            words = self._shortcuts.commands[name].words
+            self._stop_waiting(_("“{command}” has {key} now.").format(command=words, key=spoken_key(key)))
             self._shortcuts.swap(name, key)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -236,15 +240,15 @@ class ShortcutSheet(Overlay):
         if entry is None or entry.kind != "command" or not self._shortcuts.of(entry.name):
             return
         if entry.name == STOP and len(self._shortcuts.of(STOP)) == 1:
-            self._tell("Stop keeps F12.")
+            self._tell(_("Stop keeps F12."))
             return
-        said = f"“{entry.words}” has no key of its own now."
-        self._stop_waiting("Stop has only F12 now." if entry.name == STOP else said)
+        said = _("“{command}” has no key of its own now.").format(command=entry.words)
+        self._stop_waiting(_("Stop has only F12 now.") if entry.name == STOP else said)
         self._shortcuts.give(entry.name, "")
 
     def _reset(self) -> None:
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
-            self._stop_waiting(f"“{entry.words}” has its first key again.")
+            self._stop_waiting(_("“{command}” has its first key again.").format(command=entry.words))
             self._shortcuts.reset(entry.name)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)

@@ -18,30 +18,37 @@ from app.core.documents.versions import Version, namesakes_of, versions_of
 from app.errors import DocumentError
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.dates import when_words
-from app.ui.text.numbers import plural
+from app.ui.text.numbers import grouped
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Found
+from nep.i18n import _, day_text, lazy, ngettext
 
 WIDE, MOST_HIGH, EMPTY_HIGH = 680, 560, 330
-HINT = "A copy opens in a tab of its own; the file stays as it is."
-WHAT_MAKES_ONE = (
+HINT = lazy("A copy opens in a tab of its own; the file stays as it is.")
+WHAT_MAKES_ONE = lazy(
     "Studio keeps what the file said before each time that it writes over it: when you save, save as, or"
     " close a tab with unsaved work."
 )
-SAVE_FIRST = "Save it. From then on Studio keeps what the file said before each time that you save again."
+SAVE_FIRST = lazy(
+    "Save it. From then on Studio keeps what the file said before each time that you save again."
+)
 
 
 def difference_words(found: Difference) -> str:
     """Say "14 blocks; since then 3 added, 1 removed"."""
-    counts = ((found.added, "added"), (found.removed, "removed"), (found.changed, "changed"))
-    since = ", ".join(f"{count} {what}" for count, what in counts if count)
-    if not since:
-        return (
-            f"{plural(found.blocks, 'block')}, {'put in another order' if found.moved else 'the same as now'}"
-        )
-    return f"{plural(found.blocks, 'block')}; since then {since}"
+    counts = (
+        (found.added, ngettext("{count} added", "{count} added", found.added)),
+        (found.removed, ngettext("{count} removed", "{count} removed", found.removed)),
+        (found.changed, ngettext("{count} changed", "{count} changed", found.changed)),
+    )
+    changes = ", ".join(words.format(count=count) for count, words in counts if count)
+    blocks = ngettext("{count} block", "{count} blocks", found.blocks).format(count=grouped(found.blocks))
+    if changes:
+        return _("{blocks}; since then {changes}").format(blocks=blocks, changes=changes)
+    same = _("{blocks}, put in another order") if found.moved else _("{blocks}, the same as now")
+    return same.format(blocks=blocks)
 
 
 class VersionHistorySheet(Overlay):
@@ -57,18 +64,18 @@ class VersionHistorySheet(Overlay):
         save: Callable[[], object],
     ) -> None:
         """``open_copy`` gets a version's file and the name for the copy, ``save`` saves the behaviour."""
-        super().__init__(theme, window, "Earlier versions")
+        super().__init__(theme, window, _("Earlier versions"))
         self._open_copy, self._save = open_copy, save
         self._now: Mapping[str, object] = {}
         self._name = ""
         self._versions: dict[str, Version] = {}
         self._unread: deque[str] = deque()
         self.heading = label("", "heading", wrap=True)
-        self.rows = EntryList(theme, "Earlier versions")
+        self.rows = EntryList(theme, _("Earlier versions"))
         self.rows.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.empty = EmptyState(theme, "history", "", "")
-        self.hint = label(HINT, "body", role="textSecondary", wrap=True)
-        self.button = Button(theme, "Open a copy", "file-plus", kind="primary", size="form")
+        self.hint = label(_(HINT), "body", role="textSecondary", wrap=True)
+        self.button = Button(theme, _("Open a copy"), "file-plus", kind="primary", size="form")
         self._reading = QTimer(self)
         self._reading.timeout.connect(self._read_one)
         self._lay_out()
@@ -77,7 +84,7 @@ class VersionHistorySheet(Overlay):
         self.button.clicked.connect(self.open_chosen)
 
     def _lay_out(self) -> None:
-        close = IconButton(self.theme, "x", "Close", "Esc")
+        close = IconButton(self.theme, "x", _("Close"), "Esc")
         close.clicked.connect(self.shut)
         head = QHBoxLayout()
         head.setContentsMargins(19, 0, 19, 0)
@@ -113,10 +120,10 @@ class VersionHistorySheet(Overlay):
         lines: list[Line] = [self._line(each, moment) for each in own]
         if others:
             lines += [
-                Heading(f"Of other files called {name}"),
+                Heading(_("Of other files called {name}").format(name=name)),
                 *(self._line(each, moment) for each in others),
             ]
-        self.heading.setText(f"Earlier versions of {name}")
+        self.heading.setText(_("Earlier versions of {name}").format(name=name))
         self.setAccessibleName(self.heading.text())
         self._say_nothing(name, path)
         for widget, shown in ((self.rows, True), (self._foot, True), (self.empty, False)):
@@ -127,11 +134,11 @@ class VersionHistorySheet(Overlay):
 
     def _say_nothing(self, name: str, path: Path | None) -> None:
         if path is None:
-            self.empty.say(f"{name} has no file yet", SAVE_FIRST)
-            self.empty.set_actions([EmptyAction("Save", self._save_it, "save", primary=True)])
+            self.empty.say(_("{name} has no file yet").format(name=name), _(SAVE_FIRST))
+            self.empty.set_actions([EmptyAction(_("Save"), self._save_it, "save", primary=True)])
         else:
-            self.empty.say("No earlier versions yet", WHAT_MAKES_ONE)
-            self.empty.set_actions([EmptyAction("Close", self.shut)])
+            self.empty.say(_("No earlier versions yet"), _(WHAT_MAKES_ONE))
+            self.empty.set_actions([EmptyAction(_("Close"), self.shut)])
 
     def _line(self, version: Version, now: dt.datetime) -> Found:
         then = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
@@ -162,7 +169,7 @@ class VersionHistorySheet(Overlay):
         try:
             note = difference_words(difference(read_file(self._versions[id].copy).workspace, self._now))
         except DocumentError as error:
-            reason = f"It {error.reason.partition(';')[0]}"
+            reason = _("It {reason}").format(reason=error.reason.partition(";")[0])
         self.rows.tell(id, note, reason)
 
     @property
@@ -189,7 +196,10 @@ class VersionHistorySheet(Overlay):
         version = self._versions[entry.id]
         then = dt.datetime.fromtimestamp(version.written_s).astimezone()
         self.shut()
-        self._open_copy(version.copy, f"{self._name}, {then.day} {then:%B} {then.hour}.{then.minute:02d}")
+        name = _("{name}, {day} {clock}").format(
+            name=self._name, day=day_text(then.day, then.month), clock=f"{then.hour}.{then.minute:02d}"
+        )
+        self._open_copy(version.copy, name)
 
     def _save_it(self) -> None:
         self.shut()

@@ -26,6 +26,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
 from app.ui.widgets.keyboard import proxy_of, tab_stops
 from app.ui.widgets.menus import Menu, drop_below
+from nep.i18n import _
 
 LEAST_BODY = QSize(160, 60)
 RESTS_AFTER_S = 2.0
@@ -91,10 +92,10 @@ class DockBody(QWidget):
     def fail(self, sentence: str, again: Callable[[], object]) -> None:
         """Show in place of the panel that it failed, with a way to try again."""
         if self._failure is None:
-            self._failure = EmptyState(self._theme, "circle-x", "This panel stopped", sentence)
+            self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), sentence)
             self._stack.addWidget(self._failure)
-        self._failure.say("This panel stopped", sentence)
-        self._failure.set_actions([EmptyAction("Try again", again, "rotate-ccw")])
+        self._failure.say(_("This panel stopped"), sentence)
+        self._failure.set_actions([EmptyAction(_("Try again"), again, "rotate-ccw")])
         self._stack.setCurrentWidget(self._failure)
 
     def show_panel(self) -> None:
@@ -118,7 +119,7 @@ class Unmade(PanelWidget):
     """
 
     def __init__(self, context: PanelContext, description: Panel, error: BaseException) -> None:
-        super().__init__(context, description.title)
+        super().__init__(context, _(description.title))
         self._description = description
         self._error: BaseException | None = error
         self._state: Mapping[str, object] = {}
@@ -144,14 +145,14 @@ class Dock(QDockWidget):
     """One panel in a workbench: moves, floats, closes, shares its place; `failed` panels are skipped."""
 
     def __init__(self, theme: Theme, description: Panel, panel: PanelWidget, density: Density) -> None:
-        super().__init__(description.title)
+        super().__init__(_(description.title))
         self.description, self.panel = description, panel
         self.failed = False
         self.front = False
         self._seen_s = -RESTS_AFTER_S
         self._theme, self._density = theme, density
         self.setObjectName(f"panel.{description.name}")
-        self.setAccessibleName(description.title)
+        self.setAccessibleName(_(description.title))
         self._hold(panel)
         self.visibilityChanged.connect(self._visibility)
         theme.changed.connect(self._restyle)
@@ -273,9 +274,9 @@ class Dock(QDockWidget):
         if own:
             menu.addSeparator()
         icon = self._theme.icon("picture-in-picture-2")
-        floating = menu.addAction(icon, "Dock it" if self.isFloating() else "Float")
+        floating = menu.addAction(icon, _("Dock it") if self.isFloating() else _("Float"))
         floating.triggered.connect(self._float)
-        menu.addAction(self._theme.icon("x"), "Close").triggered.connect(self.close)
+        menu.addAction(self._theme.icon("x"), _("Close")).triggered.connect(self.close)
         return menu
 
     def first_stop(self) -> QWidget:

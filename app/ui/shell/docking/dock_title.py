@@ -12,6 +12,7 @@ from app.ui.panels.base import Density, PanelWidget
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Elided, IconButton, paint, set_role
 from app.ui.widgets.buttons import PaintedButton
+from nep.i18n import _
 
 
 class TitleTab(PaintedButton):
@@ -53,7 +54,7 @@ class DockTitle(QWidget):
         self.name = Elided("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
         self._subtitle = Elided("code", "textTertiary")
         self._tabs: list[TitleTab] = []
-        self.more = IconButton(theme, "ellipsis", f"More about {panel.title()}")
+        self.more = IconButton(theme, "ellipsis", _("More about {panel}").format(panel=panel.title()))
         self.more.clicked.connect(lambda: self.menu_wanted.emit(self.more))
         self._row = QHBoxLayout(self)
         self._fill()

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from app.ui.panels.base import Density
+from nep.i18n import lazy
 
 
 @dataclass(frozen=True)
@@ -20,9 +21,9 @@ class Column:
 class Layout:
     """A layout as it is at first: columns from the left; in narrow windows ``narrow`` become tabs.
 
-    ``homes`` tells beside which panel another one opens, as a tab; the rest open beside the last panel.
-    ``brings`` tells which panel comes with another one when that is opened; it is ``later``: at first its row
-    is not there.
+    ``title`` is marked with `lazy`. ``homes`` tells beside which panel another one opens, as a tab; the rest
+    open beside the last panel. ``brings`` tells which panel comes with another one when that is opened; it is
+    ``later``: at first its row is not there.
     """
 
     name: str
@@ -42,7 +43,7 @@ class Layout:
 
 BEHAVIOUR = Layout(
     "behaviour",
-    "Behaviour",
+    lazy("Behaviour"),
     "blocks",
     "comfortable",
     (
@@ -63,7 +64,7 @@ BEHAVIOUR = Layout(
 )
 DEVELOPER = Layout(
     "developer",
-    "Developer",
+    lazy("Developer"),
     "activity",
     "compact",
     (

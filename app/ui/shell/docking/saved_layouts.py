@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from app.ui.shell.docking.layouts import LAYOUTS
+from app.ui.shell.docking.layouts import LAYOUTS, layout_named
 from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.window_state import WindowState
+from nep.i18n import _
 
 OWN = "own:"
 LONGEST = 40
@@ -60,11 +61,12 @@ class SavedLayouts:
         """Why a layout can't have that name, in a sentence; "" when it can."""
         name = name.strip()
         if not name:
-            return "A layout needs a name."
+            return _("A layout needs a name.")
         if len(name) > LONGEST:
-            return f"That is too long; {LONGEST} letters fit."
-        taken = {layout.title.lower() for layout in LAYOUTS} | {own.name.lower() for own in self.all()}
-        return f"“{name}” is there already." if name.lower() in taken - {but.lower()} else ""
+            return _("That is too long; {count} letters fit.").format(count=LONGEST)
+        taken = {_(layout.title).lower() for layout in LAYOUTS} | {own.name.lower() for own in self.all()}
+        is_taken = name.lower() in taken - {but.lower()}
+        return _("“{name}” is there already.").format(name=name) if is_taken else ""
 
     # -- a workbench ------------------------------------------------------------------------------
 
@@ -82,7 +84,8 @@ class SavedLayouts:
             self._complain(f"{type(error).__name__}: {error}")
         if not well:
             bench.arrange()
-            self._complain(f"The layout “{own or base}” could not be put back; it is as at first.")
+            words = _("The layout “{name}” could not be put back; it is as at first.")
+            self._complain(words.format(name=own or _(layout_named(base).title)))
 
     def keep(self, bench: Workbench, base: str) -> None:
         """Keep how a workbench looks now, under the name of what it shows."""

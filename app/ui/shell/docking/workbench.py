@@ -15,6 +15,7 @@ from app.ui.shell.docking.dock import Dock, made
 from app.ui.shell.docking.layouts import Layout
 from app.ui.shell.docking.sizes import fit
 from app.ui.theme.theme import Theme
+from nep.i18n import _
 
 ACROSS = Qt.Orientation.Horizontal
 DOWN = Qt.Orientation.Vertical
@@ -48,7 +49,7 @@ class Workbench(QMainWindow):
         # the width of the gaps was asked for before the property was there, and is remembered
         self.style().unpolish(self)
         QApplication.sendEvent(self, QEvent(QEvent.Type.StyleChange))
-        self.setAccessibleName(f"{layout.title} layout")
+        self.setAccessibleName(_("{layout} layout").format(layout=_(layout.title)))
         gap = theme.size("gap", layout.density)
         self.setContentsMargins(gap, gap, gap, gap)
         self.setDockOptions(QMainWindow.DockOption.AllowNestedDocks | QMainWindow.DockOption.AllowTabbedDocks)

@@ -10,6 +10,7 @@ from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
 from app.ui.shell.start_page.preview import block_path, paint_grid
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from nep.i18n import _, pgettext
 
 ART_HEIGHT = 158
 ROOM_HEIGHT = 296  # the whole room is painted this high; the card shows its upper part
@@ -55,7 +56,7 @@ class RobotArt(Art):
         super().__init__(theme)
         self._drawing = RobotDrawing(theme.font("bodyLarge"))
         self._made: tuple[tuple[object, ...], QPixmap] | None = None
-        self.setAccessibleName("A small white robot in a room, waving")
+        self.setAccessibleName(_("A small white robot in a room, waving"))
 
     def picture(self, painter: QPainter, area: QRectF) -> None:
         room = QRectF(area.left(), area.top() - 55, area.width(), ROOM_HEIGHT)
@@ -82,7 +83,9 @@ class EmptyPageArt(Art):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
-        self.setAccessibleName("An empty page with the block “when started”")
+        self.setAccessibleName(
+            _("An empty page with the block “{block}”").format(block=pgettext("block", "when started"))
+        )
 
     def picture(self, painter: QPainter, area: QRectF) -> None:
         theme = self._theme
@@ -90,20 +93,22 @@ class EmptyPageArt(Art):
         left, top = area.left() + max(24.0, area.width() / 2 - 108), area.top() + 41
         font = theme.font("body")
         font.setWeight(font.Weight.Bold)
-        block = QRectF(left, top, max(138.0, paint.width_of(font, "when started") + 32), 34)
+        words = pgettext("block", "when started")
+        block = QRectF(left, top, max(138.0, paint.width_of(font, words) + 32), 34)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(theme.block_colour("events"))
         painter.drawPath(block_path(block, radius=5, notch=12))
-        paint.words(painter, block.adjusted(14, 0, 0, 0), "when started", font, theme.block_text("events"))
+        paint.words(painter, block.adjusted(14, 0, 0, 0), words, font, theme.block_text("events"))
         quiet = theme.font("body")
         quiet.setWeight(quiet.Weight.Medium)
-        wide = max(200.0, paint.width_of(quiet, "drop a block here") + 40)
+        words = _("drop a block here")
+        wide = max(200.0, paint.width_of(quiet, words) + 40)
         place = QRectF(left, block.bottom(), wide, 34)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setPen(QPen(theme.colour("controlBorder"), 1.25, Qt.PenStyle.DashLine))
         painter.drawPath(block_path(place, radius=5, notch=12))
         colour = theme.colour("textSecondary")
-        paint.words(painter, place, "drop a block here", quiet, colour, paint.CENTRE)
+        paint.words(painter, place, words, quiet, colour, paint.CENTRE)
         self._mouse(painter, QPointF(place.right() - 18, place.bottom() + 8))
 
     def _mouse(self, painter: QPainter, tip: QPointF) -> None:

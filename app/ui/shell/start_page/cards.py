@@ -18,6 +18,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, Chip, Elided, label, paint
 from app.ui.widgets.buttons import LinkButton, PaintedButton
+from nep.i18n import _
 
 EXAMPLE_ART = 112
 RECENT_HEIGHT = 48
@@ -78,7 +79,7 @@ class ExampleCard(PaintedButton):
         super().__init__(theme, radius="card")
         self._text, self._rows = text, rows
         self.path = path
-        self.say(name, f"Open the example {name}. {text}")
+        self.say(name, _("Open the example {name}. {description}").format(name=name, description=text))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def _fonts(self) -> tuple[float, float]:
@@ -115,7 +116,7 @@ class RecentRow(PaintedButton):
         self.path = recent.path
         then = dt.datetime.fromtimestamp(recent.opened_s, tz=now.tzinfo)
         self._when = day_words(then, now)
-        self.say(recent.name, f"Open {recent.name}, {self._when}")
+        self.say(recent.name, _("Open {name}, {day}").format(name=recent.name, day=self._when))
         self.setToolTip(plain.tip(str(recent.path)))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
@@ -170,7 +171,7 @@ class DevelopersLine(QWidget):
         self._theme = theme
         self.setMinimumHeight(44)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        link = LinkButton(theme, "Open the Developer layout")
+        link = LinkButton(theme, _("Open the Developer layout"))
         link.clicked.connect(self.developer_pressed)
         row = QHBoxLayout(self)
         row.setSpacing(6)
@@ -180,10 +181,10 @@ class DevelopersLine(QWidget):
         theme.changed.connect(lambda: icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14)))
         row.addWidget(icon)
         question = Elided("body", "textSecondary")
-        question.setText("Do you write programs?")
+        question.setText(_("Do you write programs?"))
         row.addWidget(question)
         row.addWidget(link)
-        row.addWidget(label("or type", "body", role="textSecondary"))
+        row.addWidget(label(_("or type"), "body", role="textSecondary"))
         row.addWidget(_Key(theme, "nep topic list"))
         row.addStretch(1)
 

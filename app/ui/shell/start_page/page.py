@@ -28,13 +28,22 @@ from app.ui.shell.start_page.preview import Row, rows
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.buttons import LinkButton
+from nep.i18n import _, lazy, ngettext
 
 WIDTH = 1080
 BANNER_ROOM = 40
 """More room above the question, where the page is high enough: a banner that may not move the page covers no
 words there."""
 EXAMPLES_SHOWN = 4
-IN_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+ALL_WORDS = {
+    5: lazy("All five examples"),
+    6: lazy("All six examples"),
+    7: lazy("All seven examples"),
+    8: lazy("All eight examples"),
+    9: lazy("All nine examples"),
+    10: lazy("All ten examples"),
+}
+"""In words, where a person reads them more easily than a figure."""
 RECENT_SHOWN = 3
 
 
@@ -65,7 +74,9 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
 
 def all_words(count: int) -> str:
     """The words of the link that shows every example."""
-    return f"All {IN_WORDS[count] if count < len(IN_WORDS) else count} examples"
+    if count in ALL_WORDS:
+        return _(ALL_WORDS[count])
+    return ngettext("The only example", "All {count} examples", count).format(count=count)
 
 
 class StartPage(QWidget):
@@ -81,28 +92,28 @@ class StartPage(QWidget):
     def __init__(self, theme: Theme, examples: Sequence[Example]) -> None:
         super().__init__()
         self._theme, self.examples = theme, tuple(examples)
-        self.setAccessibleName("Start")
-        self._use = Button(theme, "Use the virtual robot", "bot", kind="primary", size="large")
+        self.setAccessibleName(_("Start"))
+        self._use = Button(theme, _("Use the virtual robot"), "bot", kind="primary", size="large")
         self._use.clicked.connect(self.virtual_robot)
-        self._new = Button(theme, "New behaviour", size="large")
+        self._new = Button(theme, _("New behaviour"), size="large")
         self._new.clicked.connect(self.new_behaviour)
         self.robot_card = BigCard(
             theme,
             RobotArt(theme),
-            "Connect a robot",
-            "A virtual Pepper comes with Studio. You can use it now and connect a real one later.",
+            _("Connect a robot"),
+            _("A virtual Pepper comes with Studio. You can use it now and connect a real one later."),
             [self._use],
         )
         self.new_card = BigCard(
             theme,
             EmptyPageArt(theme),
-            "Make a new behaviour",
-            "Start with an empty page and the blocks of your robot.",
+            _("Make a new behaviour"),
+            _("Start with an empty page and the blocks of your robot."),
             [self._new],
         )
         self._shows_all = False
         self._recent_box = QWidget()
-        self._open = Button(theme, "Open a file", "folder-open", kind="ghost", size="normal")
+        self._open = Button(theme, _("Open a file"), "folder-open", kind="ghost", size="normal")
         self._open.clicked.connect(self.open_pressed)
         self._build(examples)
         theme.changed.connect(self._restyle)
@@ -122,10 +133,10 @@ class StartPage(QWidget):
         column.addSpacerItem(
             QSpacerItem(0, BANNER_ROOM, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
         )
-        self._question = label("What would you like to do?", "display", wrap=True)
+        self._question = label(_("What would you like to do?"), "display", wrap=True)
         column.addWidget(self._question)
         column.addSpacing(7)
-        lead = "Build what a robot says and does, by putting blocks together. No programming needed."
+        lead = _("Build what a robot says and does, by putting blocks together. No programming needed.")
         column.addWidget(label(lead, "lead", role="textSecondary", wrap=True))
         column.addSpacing(24)
         cards = QHBoxLayout()
@@ -136,7 +147,7 @@ class StartPage(QWidget):
         column.addSpacing(26)
         self._all = LinkButton(self._theme, all_words(len(examples)), "arrow-right")
         self._all.clicked.connect(lambda: self.show_all(not self._shows_all))
-        head = self._head(label("Open an example", "heading"), self._open)
+        head = self._head(label(_("Open an example"), "heading"), self._open)
         head.addSpacing(8)
         head.addWidget(self._all)
         column.addLayout(head)
@@ -201,7 +212,7 @@ class StartPage(QWidget):
         for card in self.example_cards[EXAMPLES_SHOWN:]:
             paint.show_when(card, shown)
         paint.show_when(self._all, len(self.example_cards) > EXAMPLES_SHOWN)
-        words = "Fewer examples" if shown else all_words(len(self.example_cards))
+        words = _("Fewer examples") if shown else all_words(len(self.example_cards))
         self._all.set_word(words, None if shown else "arrow-right")
 
     def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
@@ -218,10 +229,10 @@ class StartPage(QWidget):
         paint.show_when(self._open, not recent)
         if not recent:
             return
-        other = Button(self._theme, "Open a file", "folder-open", kind="ghost")
+        other = Button(self._theme, _("Open a file"), "folder-open", kind="ghost")
         other.clicked.connect(self.open_pressed)
         head = QWidget()
-        head.setLayout(self._head(label("Recent", "heading"), other))
+        head.setLayout(self._head(label(_("Recent"), "heading"), other))
         layout.addWidget(head)
         holder = QWidget()
         row = QHBoxLayout(holder)
@@ -232,7 +243,7 @@ class StartPage(QWidget):
             shown.clicked.connect(lambda _on=False, path=file.path: self.file_chosen.emit(path))
             row.addWidget(shown, 1)
             self.recent_rows.append(shown)
-        for _ in range(RECENT_SHOWN - len(recent[:RECENT_SHOWN])):
+        for _place in range(RECENT_SHOWN - len(recent[:RECENT_SHOWN])):
             row.addStretch(1)
         layout.addWidget(holder)
 
