@@ -35,8 +35,8 @@ UNITS = frozenset({
 })  # fmt: skip
 NAMES = frozenset({
     "Alt", "Blockly", "Ctrl", "DNS", "Del", "Enter", "Esc", "F1", "HTTP", "ID", "IP", "JSON", "Linux", "NEP",
-    "OpenCV", "PNG", "Pepper", "PySide6", "Python", "Qt", "RIZE", "ROS", "Shift", "Studio", "Tab", "TCP",
-    "UDP", "Windows", "ZeroMQ", "macOS", "nep",
+    "OpenCV", "PNG", "Pepper", "PySide6", "Python", "Qt", "RIZE", "ROS", "Return", "Shift", "Space", "Studio",
+    "TCP", "Tab", "UDP", "Windows", "ZeroMQ", "macOS", "nep",
 })  # fmt: skip
 """Names of things and of keys, the same in every language."""
 
@@ -98,7 +98,7 @@ def untranslated(text: str, *data: str) -> list[str]:
     """The words of a text that are in no language but English: none of `data`, of markup, units and names."""
     plain = MARKUP.sub(" ", _TAG.sub(" ", text))
     for each in sorted(filter(None, data), key=len, reverse=True):
-        plain = plain.replace(each, " ")
+        plain = re.sub(rf"(?<![A-Za-z]){re.escape(each)}(?![A-Za-z])", " ", plain)
     return [word for word in _WORD.findall(plain) if word not in UNITS and word not in NAMES]
 
 
@@ -147,7 +147,7 @@ def _own_texts(widget: QWidget) -> Iterable[tuple[str, str]]:
 
 
 def _texts_of_items(widget: QWidget) -> Iterable[tuple[str, str]]:
-    from PySide6.QtCore import Qt
+    from PySide6.QtCore import QAbstractListModel, Qt
     from PySide6.QtWidgets import QAbstractItemView, QComboBox, QTabBar
 
     if isinstance(widget, QTabBar):
@@ -158,7 +158,8 @@ def _texts_of_items(widget: QWidget) -> Iterable[tuple[str, str]]:
         for index in range(widget.count()):
             yield "itemText", widget.itemText(index)
     if isinstance(widget, QAbstractItemView) and (model := widget.model()) is not None:
-        for column in range(model.columnCount()):
+        columns = 0 if isinstance(model, QAbstractListModel) else model.columnCount()  # a list has no heads
+        for column in range(columns):
             for role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
                 head = model.headerData(column, Qt.Orientation.Horizontal, role)
                 if isinstance(head, str):

@@ -53,12 +53,12 @@ MESSAGE = 24  # letters of the text that should be seen
 _ROOT = QModelIndex()
 
 
-def line_of(record: LogRecord) -> str:
-    """A record as text, for the clipboard: a line of a log, in no language."""
+def line_of(record: LogRecord, level: str = "") -> str:
+    """A record as text, for the clipboard: as logs are written, unless its ``level`` is said otherwise."""
     moment = time.localtime(record.stamp_s)
     clock = f"{time.strftime('%H:%M:%S', moment)}.{int(record.stamp_s % 1 * 1000):03d}"
     logger = f" [{record.logger}]" if record.logger else ""
-    return f"{clock} {record.level} {record.origin}{logger} {record.text}"
+    return f"{clock} {level or record.level} {record.origin}{logger} {record.text}"
 
 
 def tip_of(record: LogRecord) -> str:
@@ -117,7 +117,7 @@ class ConsoleModel(QAbstractListModel):
         if role == RECORD_ROLE:
             return record
         if role in {Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole}:
-            return line_of(record)
+            return line_of(record, _level_words(record))
         return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
     def show_all(self, records: Sequence[LogRecord], wanted: Callable[[LogRecord], bool]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -48,6 +49,18 @@ def padded(rect: QRect, column: int, last: int) -> QRectF:
     left = EDGE if column == 0 else PADDING
     right = EDGE if column == last else PADDING
     return QRectF(rect.adjusted(left, 0, -right, 0))
+
+
+def head_font(theme: Theme) -> QFont:
+    """The font of the words in the head."""
+    font = theme.font("small")
+    font.setWeight(QFont.Weight.Medium)
+    return font
+
+
+def head_width(theme: Theme, column: Column[Any]) -> int:
+    """The room that a column's head wants, at the outer edge too."""
+    return math.ceil(QFontMetricsF(head_font(theme)).horizontalAdvance(_(column.title))) + EDGE + PADDING + 1
 
 
 class CellDelegate(QStyledItemDelegate):
@@ -160,8 +173,7 @@ class Head(QHeaderView):
         painter.fillRect(rect, theme.colour("panel"))
         painter.setPen(theme.colour("border"))
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
-        font = theme.font("small")
-        font.setWeight(QFont.Weight.Medium)
+        font = head_font(theme)
         box = padded(rect, section, self._view.last_shown)
         ordered = self._view.shown_order.column is column
         metrics = QFontMetricsF(font)

@@ -130,10 +130,13 @@ class TableModel(QAbstractTableModel, Generic[Row]):
     ) -> object:
         if orientation != Qt.Orientation.Horizontal or not 0 <= section < len(self.columns):
             return None
+        column = self.columns[section]
         if role == Qt.ItemDataRole.DisplayRole:
-            return _(self.columns[section].title)
+            return _(column.title)
+        if role == Qt.ItemDataRole.ToolTipRole:  # where there is no room for the whole
+            return plain.tip(_(column.words or column.title)) or None
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _alignment(self.columns[section].figures)
+            return _alignment(column.figures)
         return None
 
     # -- what a panel asks and says ---------------------------------------------------------------------

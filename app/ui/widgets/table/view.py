@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
-from app.ui.widgets.table.cells import CellDelegate, Head
+from app.ui.widgets.table.cells import CellDelegate, Head, head_width
 from app.ui.widgets.table.columns import ColumnChoice
 from app.ui.widgets.table.model import Cell, Column, Order, TableModel
 
@@ -223,6 +223,12 @@ class TableView(QTableView, Generic[Row]):
         scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
         room = self.viewport().width()
         shown = self.choice.fit(scaled, room)
+        spare = room - sum(scaled[place] for place in shown)
+        for place in sorted(shown):  # words of other languages may be longer; they take room that is left
+            more = head_width(self.theme, self.columns[place]) - scaled[place]
+            if not self.columns[place].stretch and more > 0 and spare > 0:
+                scaled[place] += min(more, spare)
+                spare -= min(more, spare)
         rest = room - sum(scaled[place] for place in shown if not self.columns[place].stretch)
         for place, column in enumerate(self.columns):
             self.setColumnHidden(place, place not in shown)
