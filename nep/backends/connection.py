@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from nep.errors import NepError, did_you_mean
+from nep.i18n import _
 
 __all__ = ["Configuration", "Direct", "Hybrid", "Mode", "checked_mode", "checked_port"]
 
@@ -46,12 +47,16 @@ def checked_mode(mode: str) -> Mode:
     try:
         return _MODES[mode]
     except KeyError:
-        raise NepError(f"no mode '{mode}'; {did_you_mean(mode, tuple(_MODES))}") from None
+        raise NepError(
+            _("no mode '{mode}'; {did_you_mean}").format(
+                mode=mode, did_you_mean=did_you_mean(mode, tuple(_MODES))
+            )
+        ) from None
 
 
 def checked_port(port: str | int) -> int:
     """`port` as a number from 1 to 65535. Raises `NepError`."""
     text = str(port)
     if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 65535:
-        raise NepError(f"'{port}' is no port; use a number from 1 to 65535")
+        raise NepError(_("'{port}' is no port; use a number from 1 to 65535").format(port=port))
     return int(text)

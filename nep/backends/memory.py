@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.errors import NepError, RequestRefusedError
+from nep.i18n import _
 from nep.masters.graph import Graph
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message, arrived, kind_of
@@ -87,7 +88,7 @@ forks.in_child(_forked)
 
 def _hub(configuration: Configuration) -> _Hub:
     if not isinstance(configuration, Hybrid):
-        raise NepError("the back end 'memory' has no direct connections; use 'zeromq' for them")
+        raise NepError(_("the back end 'memory' has no direct connections; use 'zeromq' for them"))
     with _hubs_lock:
         return _hubs.setdefault(configuration.master, _Hub())
 

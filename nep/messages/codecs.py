@@ -33,6 +33,7 @@ import msgpack  # type: ignore[import-untyped]
 import orjson
 
 from nep.errors import DecodeError, EncodeError, did_you_mean
+from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.encoded import Encoded, encoded
 from nep.messages.packing import pack, unpack
@@ -72,7 +73,7 @@ def _plain(value: object) -> object:
     to_list = getattr(value, "tolist", None)
     if callable(to_list):
         return to_list()
-    raise TypeError(f"'{type(value).__name__}' has no form in it")
+    raise TypeError(_("'{kind}' has no form in it").format(kind=type(value).__name__))
 
 
 def _encode_json(payload: object) -> Encoded:
@@ -83,7 +84,7 @@ def _encode_json(payload: object) -> Encoded:
     try:
         return Encoded(orjson.dumps(payload, _plain, _NUMPY | orjson.OPT_NON_STR_KEYS))
     except (TypeError, RecursionError) as error:
-        reason = str(error.__cause__ or error) or "it does not fit"
+        reason = str(error.__cause__ or error) or _("it does not fit")
         raise EncodeError("json", type(payload).__name__, reason) from error
 
 
@@ -104,7 +105,7 @@ def _anything(payload: object) -> None:
 
 def _check_string(payload: object) -> str:
     if not isinstance(payload, str):
-        raise EncodeError("string", type(payload).__name__, "publish a 'str', or use the type 'json'")
+        raise EncodeError("string", type(payload).__name__, _("publish a 'str', or use the type 'json'"))
     return payload
 
 
@@ -113,19 +114,21 @@ def _encode_string(payload: object) -> Encoded:
     try:
         return Encoded(text.encode("utf-8"))
     except UnicodeEncodeError as error:
-        raise EncodeError("string", "str", "it holds half of a surrogate pair") from error
+        raise EncodeError("string", "str", _("it holds half of a surrogate pair")) from error
 
 
 def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
     try:
         return str(data, "utf-8")
     except UnicodeDecodeError as error:
-        raise DecodeError("string", len(data), f"byte {error.start} is no UTF-8") from error
+        raise DecodeError(
+            "string", len(data), _("byte {start} is no UTF-8").format(start=error.start)
+        ) from error
 
 
 def _check_bytes(payload: object) -> bytes | bytearray | memoryview:
     if not isinstance(payload, _BYTES):
-        raise EncodeError("bytes", type(payload).__name__, "publish 'bytes'")
+        raise EncodeError("bytes", type(payload).__name__, _("publish 'bytes'"))
     return payload
 
 
@@ -208,7 +211,9 @@ def codec(name: str) -> Codec:
     try:
         return CODECS[name]
     except KeyError:
-        raise DecodeError(name, 0, f"no such codec; {did_you_mean(name, tuple(CODECS))}") from None
+        raise DecodeError(
+            name, 0, _("no such codec; {did_you_mean}").format(did_you_mean=did_you_mean(name, tuple(CODECS)))
+        ) from None
 
 
 def codec_numbered(number: int) -> Codec | None:

@@ -21,6 +21,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from nep.errors import DecodeError, EncodeError
+from nep.i18n import _, lazy
 from nep.messages.encoded import Encoded
 from nep.messages.image_files import ImageFile, check_size, examine
 
@@ -41,7 +42,7 @@ __all__ = [
 ]
 
 JPEG_QUALITY = 90
-_NEEDS = "install the picture codec with: pip install 'nep-studio[image]'"
+_NEEDS = lazy("install the picture codec with: pip install 'nep-studio[image]'")
 _QUICK_PNG = [16, 1]  # IMWRITE_PNG_COMPRESSION: the quickest that compresses
 _NAMED = {
     "mono8": ("u1", 1), "bgr8": ("u1", 3), "bgra8": ("u1", 4), "rgb8": ("u1", 3), "rgba8": ("u1", 4),
@@ -51,7 +52,7 @@ _NAMED = {
 _NUMBERS = {"8U": "u1", "8S": "i1", "16U": "<u2", "16S": "<i2", "32S": "<i4", "32F": "<f4", "64F": "<f8"}
 _LAYOUT = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)C([1-4])")
 _ENCODING = {value: key for key, value in _NAMED.items() if not key.startswith("rgb")}
-_TYPE_NAMES = "uint8, int8, uint16, int16, int32, float32 or float64"
+_TYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,7 @@ def encode(payload: object) -> Encoded:
         if numbers in ("uint8", "uint16") and channels in (1, 3, 4):
             return _as_file(frame, "png", _QUICK_PNG)
     except ImportError as error:
-        raise EncodeError("image", kind, _NEEDS) from error
+        raise EncodeError("image", kind, _(_NEEDS)) from error
     return _raw(frame)
 
 
@@ -106,7 +107,7 @@ def raw_image(payload: object) -> Encoded:
     try:
         return _raw(_checked(payload))
     except ImportError as error:
-        raise EncodeError("image", type(payload).__name__, _NEEDS) from error
+        raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
 
 
 def _as_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
@@ -116,7 +117,7 @@ def _as_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
     except opencv.error:  # such as a JPEG of more than 65535 rows
         is_made, buffer = False, None
     if not is_made:
-        reason = f"OpenCV cannot make a {kind} of it; publish 'nep.raw_image(…)' of it"
+        reason = _("OpenCV cannot make a {kind} of it; publish 'nep.raw_image(…)' of it").format(kind=kind)
         raise EncodeError("image", type(frame).__name__, reason)
     return Encoded(buffer.tobytes(), {"shape": _shape(frame), "encoding": kind})
 
@@ -146,7 +147,7 @@ def check(payload: object) -> None:
     try:
         _picture(payload)
     except ImportError as error:
-        raise EncodeError("image", type(payload).__name__, _NEEDS) from error
+        raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
 
 
 def _picture(payload: object) -> NDArray[Any]:
@@ -154,12 +155,18 @@ def _picture(payload: object) -> NDArray[Any]:
     np = _numpy()
     kind = type(payload).__name__
     if not isinstance(payload, np.ndarray):
-        raise EncodeError("image", kind, "publish a 'uint8' array (height, width, 3) or a JPEG")
+        raise EncodeError("image", kind, _("publish a 'uint8' array (height, width, 3) or a JPEG"))
     if _numbers(payload.dtype) not in _NUMBERS.values():
-        raise EncodeError("image", kind, f"its numbers are '{payload.dtype}'; use {_TYPE_NAMES}")
+        raise EncodeError(
+            "image",
+            kind,
+            _("its numbers are '{dtype}'; use {types}").format(dtype=payload.dtype, types=_(_TYPE_NAMES)),
+        )
     is_picture = payload.ndim == 2 or (payload.ndim == 3 and 1 <= payload.shape[2] <= 4)
     if not is_picture or 0 in payload.shape:
-        reason = f"its shape {payload.shape} is none of a picture; use (height, width, 3)"
+        reason = _("its shape {shape} is none of a picture; use (height, width, 3)").format(
+            shape=payload.shape
+        )
         raise EncodeError("image", kind, reason)
     frame: NDArray[Any] = payload
     try:
@@ -198,7 +205,7 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
             frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
         return frame
     except ImportError as error:
-        raise DecodeError("image", data.nbytes, _NEEDS) from error
+        raise DecodeError("image", data.nbytes, _(_NEEDS)) from error
 
 
 def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
@@ -212,9 +219,9 @@ def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
     try:
         picture = opencv.imdecode(np.frombuffer(file.data, np.uint8), flag)
     except (opencv.error, MemoryError) as error:
-        raise DecodeError("image", len(file.data), "they are a picture larger than can be read") from error
+        raise DecodeError("image", len(file.data), _("they are a picture larger than can be read")) from error
     if picture is None:
-        raise DecodeError("image", len(file.data), "they are no picture that OpenCV reads")
+        raise DecodeError("image", len(file.data), _("they are no picture that OpenCV reads"))
     return _turned(picture, file.orientation)
 
 
@@ -247,11 +254,15 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
     numbers = np.dtype(layout.numbers)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
     if len(sides) < 2 or not all(isinstance(side, int) for side in sides):
-        raise DecodeError("image", data.nbytes, f"'{shape!s:.60}' is no shape of a picture")
+        raise DecodeError(
+            "image", data.nbytes, _("'{shape}' is no shape of a picture").format(shape=str(shape)[:60])
+        )
     height, width = sides
     pixel_bytes = layout.channels * numbers.itemsize
     if min(height, width) < 1 or height * width * pixel_bytes != data.nbytes:
-        reason = f"a picture of {width} x {height} pixels with {pixel_bytes} bytes each has another size"
+        reason = _(
+            "a picture of {width} x {height} pixels with {pixel_bytes} bytes each has another size"
+        ).format(width=width, height=height, pixel_bytes=pixel_bytes)
         raise DecodeError("image", data.nbytes, reason)
     check_size(width, height, pixel_bytes, data.nbytes)
     flat: NDArray[Any] = np.frombuffer(data, numbers)

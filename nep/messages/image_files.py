@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from nep.errors import DecodeError
+from nep.i18n import _, number
 
 __all__ = ["MOST_BYTES", "MOST_PIXELS", "ImageFile", "check_size", "examine"]
 
@@ -84,11 +85,13 @@ def examine(data: bytes | memoryview) -> ImageFile:
         return _Jpeg(file).read()
     size = len(file)
     if not size:
-        raise DecodeError("image", 0, "there is nothing in it")
+        raise DecodeError("image", 0, _("there is nothing in it"))
     for start, name in _OTHERS.items():
         if head.startswith(start):
-            raise DecodeError("image", size, f"it is {name}, and only JPEG and PNG are read")
-    raise DecodeError("image", size, "they are no picture: neither JPEG nor PNG")
+            raise DecodeError(
+                "image", size, _("it is {name}, and only JPEG and PNG are read").format(name=name)
+            )
+    raise DecodeError("image", size, _("they are no picture: neither JPEG nor PNG"))
 
 
 def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> None:
@@ -97,13 +100,21 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
     `pixel_bytes` is what each takes in memory, `size_bytes` how many bytes told of them.
     """
     if width < 1 or height < 1:
-        raise DecodeError("image", size_bytes, f"a picture of {width} × {height} pixels is none")  # noqa: RUF001
+        raise DecodeError(
+            "image",
+            size_bytes,
+            _("a picture of {width} × {height} pixels is none").format(width=width, height=height),  # noqa: RUF001
+        )
     if width * height > MOST_PIXELS:
-        reason = f"{width} × {height} pixels are too many, {MOST_PIXELS // 10**6} million are read"  # noqa: RUF001
+        reason = _("{width} × {height} pixels are too many, {most} million are read").format(  # noqa: RUF001
+            width=width, height=height, most=MOST_PIXELS // 10**6
+        )
         raise DecodeError("image", size_bytes, reason)
     needed = width * height * pixel_bytes
     if needed > MOST_BYTES:
-        reason = f"{width} × {height} pixels take {needed / 1e6:.0f} MB, {MOST_BYTES // 10**6} are given"  # noqa: RUF001
+        reason = _("{width} × {height} pixels take {needed} MB, {most} are given").format(  # noqa: RUF001
+            width=width, height=height, needed=number(needed / 1000000.0, ".0f"), most=MOST_BYTES // 10**6
+        )
         raise DecodeError("image", size_bytes, reason)
 
 
@@ -122,7 +133,9 @@ class _Reader:
 
     def broken(self, reason: str) -> DecodeError:
         """The error that refuses the file."""
-        reason = f"they are no picture that can be read, but a broken {self.kind.upper()}: {reason}"
+        reason = _("they are no picture that can be read, but a broken {upper}: {reason}").format(
+            upper=self.kind.upper(), reason=reason
+        )
         return DecodeError("image", self.size, reason)
 
 
@@ -138,50 +151,54 @@ class _Jpeg(_Reader):
     def read(self) -> ImageFile:
         """See `examine`."""
         frame, orientation, at = None, 1, 2
-        for _ in range(MOST_PIECES):
+        for _piece in range(MOST_PIECES):
             marker, at = self._marker(at)
             if marker in _ALONE:
                 continue
             length = self.number(at, 2)
             if length < 2 or at + length > self.size:
-                raise self.broken("it ends too early")
+                raise self.broken(_("it ends too early"))
             if marker in _FRAMES:
                 if frame is not None:
-                    raise self.broken("it has two heads")
+                    raise self.broken(_("it has two heads"))
                 frame = self._frame(marker, at, length)
             elif marker == _SCAN:
                 if frame is None:
-                    raise self.broken("its pixels come before their size")
+                    raise self.broken(_("its pixels come before their size"))
                 return self._checked(frame, orientation, at)
             elif marker == _APP1:
                 orientation = _orientation(self.data[at + 2 : at + length]) or orientation
             elif marker not in _TABLES:
-                raise self.broken(f"what 'ff{marker:02x}' is nobody knows")
+                raise self.broken(_("what 'ff{marker}' is nobody knows").format(marker=number(marker, "02x")))
             at += length
-        raise self.broken("it has too many segments")
+        raise self.broken(_("it has too many segments"))
 
     def _marker(self, at: int) -> tuple[int, int]:
         """The marker there and where it ends."""
         if self.number(at, 1) != 0xFF:
-            reason = "it ends too early" if at >= self.size else "its segments do not follow each other"
+            reason = _("it ends too early") if at >= self.size else _("its segments do not follow each other")
             raise self.broken(reason)
         found = _FILL.match(self.data, at)
         at = found.end() if found is not None else at
         if at >= self.size:
-            raise self.broken("it ends too early")
+            raise self.broken(_("it ends too early"))
         return self.data[at], at + 1
 
     def _frame(self, marker: int, at: int, length: int) -> _Frame:
         bits, height, width = self.number(at + 2, 1), self.number(at + 3, 2), self.number(at + 5, 2)
         components = self.number(at + 7, 1)
         if length != 8 + 3 * components or components not in (1, 3, 4):
-            raise self.broken(f"it has {components} colours")
+            raise self.broken(_("it has {components} colours").format(components=components))
         if bits != 8:
-            raise DecodeError("image", self.size, f"a JPEG of {bits} bits for a colour is not read, a PNG is")
+            raise DecodeError(
+                "image",
+                self.size,
+                _("a JPEG of {bits} bits for a colour is not read, a PNG is").format(bits=bits),
+            )
         sampling = [self.number(at + 9 + 3 * each, 1) for each in range(components)]
         factors = [(each >> 4, each & 15) for each in sampling]
         if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
-            raise self.broken("its colours have no size")
+            raise self.broken(_("its colours have no size"))
         return _Frame(width, height, components, _FRAMES[marker], factors)
 
     def _checked(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
@@ -195,7 +212,9 @@ class _Jpeg(_Reader):
             # One scan may come in a few bytes and makes the decoder walk over all pixels again.
             scans = bytes(self.data[at:]).count(b"\xff\xda") + 1
             if scans > MOST_SCANS or scans * frame.width * frame.height > MOST_SCANNED:
-                reason = f"{frame.width} × {frame.height} pixels in {scans} passes take too long"  # noqa: RUF001
+                reason = _("{width} × {height} pixels in {scans} passes take too long").format(  # noqa: RUF001
+                    width=frame.width, height=frame.height, scans=scans
+                )
                 raise DecodeError("image", self.size, reason)
         width, height = frame.width, frame.height
         if orientation >= _TURNED:
@@ -230,11 +249,13 @@ class _Png(_Reader):
     def read(self) -> ImageFile:
         """See `examine`."""
         if self.size < 33 or self.data[8:16] != b"\0\0\0\x0dIHDR":
-            raise self.broken("it does not begin with its size")
+            raise self.broken(_("it does not begin with its size"))
         width, height = self.number(16, 4), self.number(20, 4)
         depth, colour = self.data[24], self.data[25]
         if depth not in _DEPTHS.get(colour, ()):
-            raise self.broken(f"colour type {colour} has no depth of {depth} bits")
+            raise self.broken(
+                _("colour type {colour} has no depth of {depth} bits").format(colour=colour, depth=depth)
+            )
         needed, kinds, orientation = self._chunks()
         channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _CHANNELS[colour]
         bits = 16 if depth == 16 else 8
@@ -255,10 +276,10 @@ class _Png(_Reader):
         needed: list[tuple[int, int]] = []
         kinds: set[bytes] = set()
         orientation, at = 1, 8
-        for _ in range(MOST_PIECES):
+        for _piece in range(MOST_PIECES):
             kind, end = bytes(self.data[at + 4 : at + 8]), min(self.size, at + 12 + self.number(at, 4))
             if kind == b"IHDR" and kind in kinds:
-                raise self.broken("it has two heads")
+                raise self.broken(_("it has two heads"))
             if kind in _NEEDED:
                 kinds.add(kind)
                 if needed and needed[-1][1] == at:
@@ -272,7 +293,7 @@ class _Png(_Reader):
             at = end
             if kind == b"IEND" or at + 8 > self.size:
                 return needed, kinds, orientation
-        raise self.broken("it has too many chunks")
+        raise self.broken(_("it has too many chunks"))
 
 
 _HEAD = 4096

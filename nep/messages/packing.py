@@ -7,6 +7,8 @@ from typing import TypeVar
 
 import msgpack  # type: ignore[import-untyped]
 
+from nep.i18n import _
+
 __all__ = ["pack", "pack_surely", "saturated", "unpack", "unpack_bounded", "unpack_first"]
 
 _Made = TypeVar("_Made")
@@ -22,14 +24,14 @@ def pack(value: object, default: Callable[[object], object] | None = None) -> by
     try:
         packed: bytes = msgpack.packb(value, use_bin_type=True, default=default, datetime=True)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise ValueError(str(error) or "it does not fit") from error
+        raise ValueError(str(error) or _("it does not fit")) from error
     return packed
 
 
 def saturated(value: object) -> int:
     """The nearest number that msgpack has a form for. Raises `TypeError` for what is none."""
     if not isinstance(value, int):
-        raise TypeError(f"a '{type(value).__name__}' has no form in msgpack")
+        raise TypeError(_("a '{kind}' has no form in msgpack").format(kind=type(value).__name__))
     return max(_LEAST, min(_MOST, value))
 
 
@@ -53,7 +55,7 @@ def unpack(data: bytes | memoryview) -> object:
     except (TypeError, OverflowError):  # rare: a list is a key, a timestamp is no date
         return _unpack_rare(data)
     except (ValueError, msgpack.UnpackException, RecursionError) as error:
-        raise ValueError(str(error) or "the bytes end too early") from error
+        raise ValueError(str(error) or _("the bytes end too early")) from error
     return value
 
 
@@ -66,9 +68,9 @@ def _unpack_rare(data: bytes | memoryview) -> object:
         except OverflowError:
             continue
         except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-            raise ValueError(str(error) or "the bytes end too early") from error
+            raise ValueError(str(error) or _("the bytes end too early")) from error
         return value
-    raise ValueError("a timestamp in it is no time")
+    raise ValueError(_("a timestamp in it is no time"))
 
 
 def _map(pairs: list[tuple[object, object]]) -> dict[object, object]:
@@ -90,7 +92,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
         nonlocal left
         left -= 1
         if left < 0:
-            raise ValueError(f"it has more than {most_lists} lists and maps")
+            raise ValueError(_("it has more than {most_lists} lists and maps").format(most_lists=most_lists))
         return value
 
     try:
@@ -104,7 +106,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
             max_map_len=longest,
         )
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-        raise ValueError(str(error) or "the bytes end too early") from error
+        raise ValueError(str(error) or _("the bytes end too early")) from error
     return value
 
 
@@ -115,5 +117,5 @@ def unpack_first(data: bytes) -> object:
     try:
         value: object = unpacker.unpack()
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-        raise ValueError(str(error) or "the bytes end too early") from error
+        raise ValueError(str(error) or _("the bytes end too early")) from error
     return value

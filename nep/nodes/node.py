@@ -20,6 +20,7 @@ from nep.backends.base import PublisherSpec, Sink, SubscriberSpec, SubscriberTra
 from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port
 from nep.backends.lookup import backend_named
 from nep.errors import ClosedError, DecodeError, WrongTypeError
+from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.queue import MAX_MESSAGES, Keep
 from nep.nodes.arguments import at_least, flag, function, limit, one_of, seconds, text
@@ -236,7 +237,11 @@ class Node:
             return self.hybrid()
         if not isinstance(configuration, Hybrid | Direct):
             kind = type(configuration).__name__
-            raise WrongTypeError(f"configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'")
+            raise WrongTypeError(
+                _("configuration is a '{kind}'; make one with 'node.hybrid' or 'node.direct'").format(
+                    kind=kind
+                )
+            )
         return configuration
 
     def _subscribed(self, transport: SubscriberTransport, spec: SubscriberSpec) -> Subscriber:

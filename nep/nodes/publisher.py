@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from nep.backends.base import PublisherSpec, PublisherTransport
 from nep.errors import ClosedError, EncodeError, WireError
+from nep.i18n import _
 from nep.messages.codecs import NullTeller
 from nep.messages.encoded import Encoded, encoded
 from nep.nodes.arguments import limit
@@ -144,9 +145,9 @@ class Publisher:
             return
         codec, data, extension = self._spec.codec.name, payload.data, payload.extension
         if not isinstance(data, _DATA):
-            raise EncodeError(codec, type(data).__name__, "give its 'bytes'")
+            raise EncodeError(codec, type(data).__name__, _("give its 'bytes'"))
         if extension is not None and not isinstance(extension, Mapping):
-            raise EncodeError(codec, type(extension).__name__, "an extension is a map")
+            raise EncodeError(codec, type(extension).__name__, _("an extension is a map"))
 
     def _skip(self, payload: object) -> None:
         """Count a message that nobody wants; now and then see whether it could be sent."""
@@ -279,7 +280,7 @@ def place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
     Empty when that is the whole, or is not found among ten thousand values.
     """
     path, value, left = "", payload, _LOOKED_AT
-    for _ in range(_DEEPEST):
+    for _level in range(_DEEPEST):
         for step, part in _parts(value):
             left -= 1
             if left <= 0:

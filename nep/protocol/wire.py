@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from nep.errors import BadNameError, BadTopicError, WireError
+from nep.i18n import _
 from nep.messages.packing import pack, unpack
 from nep.text import control_in
 
@@ -115,18 +116,24 @@ def check_topic(topic: str) -> str:
     Raises `BadTopicError` with the reason.
     """
     if not isinstance(topic, str):
-        raise BadTopicError(str(topic), "a topic is a 'str'")
+        raise BadTopicError(str(topic), _("a topic is a 'str'"))
     try:
         size = len(topic.encode("utf-8"))
     except UnicodeEncodeError:
-        raise BadTopicError(ascii(topic), "it is no Unicode text") from None
+        raise BadTopicError(ascii(topic), _("it is no Unicode text")) from None
     if not 1 <= size <= TOPIC_MAX_BYTES:
-        raise BadTopicError(topic, f"it has {size} bytes, 1 to {TOPIC_MAX_BYTES} are allowed")
+        raise BadTopicError(
+            topic, _("it has {size} bytes, 1 to {most} are allowed").format(size=size, most=TOPIC_MAX_BYTES)
+        )
     for letter in topic:
         if letter.isspace() or letter == "{":
-            raise BadTopicError(topic, f"the character '{ascii(letter)[1:-1]}' is not allowed in it")
+            raise BadTopicError(
+                topic, _("the character '{ascii}' is not allowed in it").format(ascii=ascii(letter)[1:-1])
+            )
     if control := control_in(topic):
-        raise BadTopicError(topic, f"the character '{control}' is not allowed in it")
+        raise BadTopicError(
+            topic, _("the character '{control}' is not allowed in it").format(control=control)
+        )
     return topic
 
 
@@ -136,12 +143,15 @@ def check_node_name(name: str) -> str:
     Raises `BadNameError` with the reason.
     """
     if not isinstance(name, str):
-        raise BadNameError(str(name), "a name is a 'str'")
+        raise BadNameError(str(name), _("a name is a 'str'"))
     if control := control_in(name):
-        raise BadNameError(name, f"the character '{control}' is not allowed in it")
+        raise BadNameError(name, _("the character '{control}' is not allowed in it").format(control=control))
     size = len(name.encode("utf-8"))
     if not 1 <= size <= NODE_NAME_MAX_BYTES:
-        raise BadNameError(name, f"it has {size} bytes, 1 to {NODE_NAME_MAX_BYTES} are allowed")
+        raise BadNameError(
+            name,
+            _("it has {size} bytes, 1 to {most} are allowed").format(size=size, most=NODE_NAME_MAX_BYTES),
+        )
     return name
 
 
@@ -211,10 +221,18 @@ def parse_read(part: bytes) -> Read | None:
 def read_header(part: bytes) -> Header:
     """The header in a second part. Raises `WireError`; an unknown version is named in it."""
     if len(part) != HEADER_BYTES:
-        raise WireError(f"a header has {HEADER_BYTES} bytes, this one has {len(part)}", len(part))
+        raise WireError(
+            _("a header has {size} bytes, this one has {count}").format(size=HEADER_BYTES, count=len(part)),
+            len(part),
+        )
     version, codec, flags, size, seq, stamp_ns, publisher = _HEADER.unpack(part)
     if version != VERSION:
-        raise WireError(f"its version is {version}, this nep reads version {VERSION}; update nep", len(part))
+        raise WireError(
+            _("its version is {version}, this nep reads version {own}; update nep").format(
+                version=version, own=VERSION
+            ),
+            len(part),
+        )
     return Header(codec, flags, seq, stamp_ns, publisher, size)
 
 
@@ -223,7 +241,7 @@ def extension_part(extension: Mapping[str, object]) -> bytes:
     try:
         return pack(dict(extension))
     except ValueError as error:
-        raise WireError(f"an extension holds what msgpack cannot: {error}") from error
+        raise WireError(_("an extension holds what msgpack cannot: {error}").format(error=error)) from error
 
 
 def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
@@ -231,9 +249,9 @@ def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
     try:
         value = unpack(part)
     except ValueError as error:
-        raise WireError(f"the extension is no msgpack: {error}", len(part)) from error
+        raise WireError(_("the extension is no msgpack: {error}").format(error=error), len(part)) from error
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
-        raise WireError("the extension is no map with names", len(part))
+        raise WireError(_("the extension is no map with names"), len(part))
     return value
 
 
@@ -254,7 +272,7 @@ def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
     """Topic, header and payload of a message in one part. Raises `WireError` when it is too short."""
     cut = part.find(b"\0") + 1
     if not cut or len(part) < cut + HEADER_BYTES:
-        raise WireError("a message has 3 or 4 parts, this one has 1", len(part))
+        raise WireError(_("a message has 3 or 4 parts, this one has 1"), len(part))
     return part[:cut], part[cut : cut + HEADER_BYTES], part[cut + HEADER_BYTES :]
 
 
@@ -270,7 +288,7 @@ class Parts(NamedTuple):
 def split(parts: Sequence[bytes | memoryview]) -> Parts:
     """The message in `parts`. Raises `WireError` for anything that the specification does not allow."""
     if not parts:
-        raise WireError("a message has 3 or 4 parts, this one has none")
+        raise WireError(_("a message has 3 or 4 parts, this one has none"))
     first, *rest = apart(bytes(parts[0])) if len(parts) == 1 else parts
     header, payload, extension = split_rest(rest)
     return Parts(_topic_in(bytes(first)), header, payload, extension)
@@ -281,16 +299,23 @@ def split_rest(
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
     """Header, payload and extension of a message from what follows its first part. Raises `WireError`."""
     if not rest:
-        raise WireError("a message has 3 or 4 parts, this one has 1")
+        raise WireError(_("a message has 3 or 4 parts, this one has 1"))
     header = read_header(bytes(rest[0]))
     wanted, there = 4 if header.flags & EXTENSION else 3, len(rest) + 1
     if there not in {3, 4}:
-        raise WireError(f"a message has 3 or 4 parts, this one has {there}")
+        raise WireError(_("a message has 3 or 4 parts, this one has {there}").format(there=there))
     if there != wanted:
-        raise WireError(f"its flags ask for {wanted} parts, there are {there}")
+        raise WireError(
+            _("its flags ask for {wanted} parts, there are {there}").format(wanted=wanted, there=there)
+        )
     size = len(rest[1])
     if header.size and header.size != size:
-        raise WireError(f"its header tells of {header.size} bytes, its payload has {size}", size)
+        raise WireError(
+            _("its header tells of {size} bytes, its payload has {payload}").format(
+                size=header.size, payload=size
+            ),
+            size,
+        )
     return header, rest[1], read_extension(rest[2]) if header.flags & EXTENSION else {}
 
 
@@ -298,7 +323,7 @@ def _topic_in(part: bytes) -> str:
     """The topic in a first part."""
     try:
         if part[-1:] != b"\0":
-            raise WireError("its topic does not end with a zero byte", len(part))
+            raise WireError(_("its topic does not end with a zero byte"), len(part))
         return check_topic(part[:-1].decode("utf-8"))
     except (UnicodeDecodeError, BadTopicError) as error:
-        raise WireError(f"its topic is none: {error}", len(part)) from error
+        raise WireError(_("its topic is none: {error}").format(error=error), len(part)) from error

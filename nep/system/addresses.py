@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from nep.errors import NepError, WrongTypeError
+from nep.i18n import _
 from nep.system.lazy_import import later
 
 if TYPE_CHECKING:
@@ -61,7 +62,9 @@ def master_address(address: str | None = None) -> str:
     """`address`, else $NEP_MASTER, else "127.0.0.1:7780"; the port 7780 is added when there is none."""
     if address is not None and not isinstance(address, str):
         raise WrongTypeError(
-            f"an address is a 'str' such as '{DEFAULT_MASTER}', not a '{type(address).__name__}'"
+            _("an address is a 'str' such as '{example}', not a '{kind}'").format(
+                example=DEFAULT_MASTER, kind=type(address).__name__
+            )
         )
     chosen = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
     if "://" not in chosen and ("[" in chosen or chosen.count(":") > 1):
@@ -70,7 +73,11 @@ def master_address(address: str | None = None) -> str:
     if not colon:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
     if not _HOST.fullmatch(host) or not _is_possible(host) or not port.isdigit() or int(port) > 65535:
-        raise NepError(f"'{chosen}' is no address of a master; write it as '{DEFAULT_MASTER}'")
+        raise NepError(
+            _("'{chosen}' is no address of a master; write it as '{example}'").format(
+                chosen=chosen, example=DEFAULT_MASTER
+            )
+        )
     return chosen
 
 
@@ -81,11 +88,17 @@ def checked_host(host: object) -> str:
     """
     if isinstance(host, str) and ":" in host:
         raise NepError(
-            f"'{host}' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1', "
-            "or the computer's name"
+            _(
+                "'{host}' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1', "
+                "or the computer's name"
+            ).format(host=host)
         )
     if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_possible(host):
-        raise NepError(f"'{host}' is no address of a computer; use one such as '127.0.0.1', or a name")
+        raise NepError(
+            _("'{host}' is no address of a computer; use one such as '127.0.0.1', or a name").format(
+                host=host
+            )
+        )
     return host
 
 
@@ -188,7 +201,10 @@ def in_numbers(address: str) -> str:
         return f"{look_up(host)}:{address.rpartition(':')[2]}"
     except (OSError, UnicodeError) as error:
         raise NepError(
-            f"no computer is called '{host}' here; look for a typing error, or write its address in numbers"
+            _(
+                "no computer is called '{host}' here; look for a typing error, or write its address "
+                "in numbers"
+            ).format(host=host)
         ) from error
 
 

@@ -7,6 +7,8 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from nep.i18n import _
+
 __all__ = ["replace_file"]
 
 _TRIES = 20
@@ -35,7 +37,7 @@ def replace_file(
             if getattr(error, "winerror", None) not in _SHARING:
                 raise
             if tried == _TRIES:
-                said = "another program has the file open; close it there"
+                said = _("another program has the file open; close it there")
                 raise PermissionError(error.errno, said, str(old)) from error
             wait(_PAUSE_S)
         else:

@@ -32,6 +32,7 @@ from nep.backends.zeromq.sockets import (
 from nep.backends.zeromq.sub_socket import Into
 from nep.backends.zeromq.subscriber import SocketSubscriber
 from nep.errors import ClosedError, WireError
+from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
@@ -89,7 +90,7 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
     try:
         return base64.b64decode(frame, validate=True)
     except binascii.Error as error:
-        raise WireError("a picture is not base64", len(frame)) from error
+        raise WireError(_("a picture is not base64"), len(frame)) from error
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
@@ -262,7 +263,11 @@ class OriginalSubSocket:
             except zmq.Again:
                 return None
             if len(parts) != 1:
-                self.refusals.add(f"a message of the original NEP has one part, this one has {len(parts)}")
+                self.refusals.add(
+                    _("a message of the original NEP has one part, this one has {count}").format(
+                        count=len(parts)
+                    )
+                )
                 continue
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec.name, parts[0])

@@ -25,6 +25,7 @@ from nep.errors import (
     RequestRefusedError,
     TooManyFilesError,
 )
+from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     RENEW_S,
@@ -222,7 +223,9 @@ class MasterSession:
         self.wait_for_name(timeout_s)
         reply = self._calls.ask(Look(), timeout_s)
         if not isinstance(reply, Seen):
-            raise RequestRefusedError(f"the master at '{self.address}' shows no graph")
+            raise RequestRefusedError(
+                _("the master at '{address}' shows no graph").format(address=self.address)
+            )
         return reply.view
 
     def begin_leave(self) -> None:

@@ -14,6 +14,7 @@ import zmq
 
 from nep.backends.zeromq.sockets import Refusals, Socket, wait_until
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
+from nep.i18n import _
 from nep.protocol.encoding import call_of_view, decode_answer, encode_request
 from nep.protocol.requests import Push, Refused, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
@@ -135,9 +136,11 @@ class RpcClient:
             reply = decode_answer(view)[1]
         except WireError as error:
             self._refuse(error)
-            raise RequestRefusedError(f"the master's answer cannot be read: {error.reason}") from error
+            raise RequestRefusedError(
+                _("the master's answer cannot be read: {reason}").format(reason=error.reason)
+            ) from error
         if isinstance(reply, Push):
-            raise RequestRefusedError("the master's answer is none")
+            raise RequestRefusedError(_("the master's answer is none"))
         return reply
 
     def tell(self, request: Request, then: Then | None = None) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import zmq
 
 from nep.errors import AddressInUseError, NepError
+from nep.i18n import _
 from nep.system.addresses import endpoint_of, host_of, in_numbers, is_endpoint, is_loopback
 from nep.system.descriptors import check_room
 from nep.system.log_rarely import is_told
@@ -72,7 +73,7 @@ class Refusals:
         """The newest reason and how many there were; empty when there was none in the last seconds."""
         if not self.count or time.monotonic() - self._last_at > _TOLD_S:
             return ""
-        return f"{self._reason} ({self.count} so far)"
+        return _("{reason} ({count} so far)").format(reason=self._reason, count=self.count)
 
 
 def send_mark(owner: Socket) -> None:
@@ -95,7 +96,7 @@ def wait_shortly(owner: Socket) -> None:
 
 def bind_free_port(owner: Socket, host: str) -> str:
     """Bind to a free port of `host`, none of the original NEP's; the endpoint. Raises `AddressInUseError`."""
-    for _ in range(100):
+    for _port in range(100):
         endpoint = bind(owner, f"{host}:*")
         if int(endpoint.rpartition(":")[2]) not in _ORIGINAL_PORTS:
             return endpoint
@@ -117,7 +118,11 @@ def connect(owner: Socket, address: str) -> str:
     """Connect to an address, whether something is there yet or not; the endpoint. Raises `NepError`."""
     endpoint = endpoint_of(address)
     if not is_endpoint(endpoint):
-        raise NepError(f"'{address}' cannot be connected to; use a computer's address and a port up to 65535")
+        raise NepError(
+            _("'{address}' cannot be connected to; use a computer's address and a port up to 65535").format(
+                address=address
+            )
+        )
     endpoint = endpoint_of(in_numbers(address))
     owner.connect(endpoint)
     return endpoint

@@ -19,6 +19,7 @@ from nep.backends.zeromq.byte_window import WINDOW_BYTES
 from nep.backends.zeromq.loss import HeardPublisher, HeardPublishers
 from nep.backends.zeromq.sockets import Refusals, Socket, keep_alive, receive_mark, wait_shortly
 from nep.errors import WireError
+from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for, codec_numbered
 from nep.messages.message import NOTHING, UNDECODED, Message, arrived, kind_of, new_message
 from nep.protocol.requests import RemotePublisher
@@ -55,7 +56,7 @@ _DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as muc
 _EVENTS = int(zmq.EVENTS)
 _RCVMORE = int(zmq.RCVMORE)
 _POLLIN = int(zmq.POLLIN)
-_TOO_SHORT = "a message has 3 or 4 parts, this one ends earlier"
+_TOO_SHORT = lazy("a message has 3 or 4 parts, this one ends earlier")
 
 
 class _CarefulParser:
@@ -88,7 +89,7 @@ class _CarefulParser:
         if not rest and first.startswith(self._topic):
             first, *rest = apart(first)
         if not is_alone and first != self._topic:
-            raise WireError("a message begins with something else than its topic")
+            raise WireError(_("a message begins with something else than its topic"))
         if is_alone and len(rest) == 1:
             self._notice(read_header(bytes(rest[0])))
             return None
@@ -106,7 +107,9 @@ class _CarefulParser:
         else:
             source.has_echoed = True
         if not is_possible:
-            raise WireError(f"its publisher's number leaps from {last} to {header.seq}")
+            raise WireError(
+                _("its publisher's number leaps from {last} to {seq}").format(last=last, seq=header.seq)
+            )
 
     def _message(
         self, header: Header, payload: _Part, extension: Mapping[str, object], *, is_alone: bool
@@ -114,7 +117,9 @@ class _CarefulParser:
         codec = codec_numbered(header.codec)
         if codec is None:
             raise WireError(
-                f"its codec has the number {header.codec}, which this nep does not know; update nep"
+                _("its codec has the number {codec}, which this nep does not know; update nep").format(
+                    codec=header.codec
+                )
             )
         if not self._sources.arrived(header.publisher, header.seq, is_alone=is_alone):
             return None
@@ -202,7 +207,9 @@ class SubSocket:
         name = source.remote.node_name if source.remote is not None else ""
         shown = ascii(endpoint[:100])[1:-1]
         source.refused = endpoint
-        source.problem = f"the endpoint '{shown}' of '{name}' cannot be connected to: {why}"
+        source.problem = _("the endpoint '{shown}' of '{name}' cannot be connected to: {why}").format(
+            shown=shown, name=name, why=why
+        )
         if self.refusals.add(source.problem):
             _logger.warning("subscribing to '%s': %s", self._name, source.problem)
 
@@ -328,7 +335,7 @@ class SubSocket:
                         raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
                         return None, arrived(source.kind, raw, stamp_ns, seq, publisher)
         except zmq.Again:
-            self.refusals.add(_TOO_SHORT)
+            self.refusals.add(_(_TOO_SHORT))
             return None, None
         return self._carefully(first, head, data)
 
@@ -342,7 +349,9 @@ class SubSocket:
         rest: list[_Part] = [each.buffer if isinstance(each, zmq.Frame) else each for each in read]
         if rest and bytes(rest[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
             following = bytes(rest.pop())
-            self.refusals.add(f"a message has 3 or 4 parts, this one has {len(rest) + 1}")
+            self.refusals.add(
+                _("a message has 3 or 4 parts, this one has {count}").format(count=len(rest) + 1)
+            )
             return following, None
         more = bool(self._socket.getsockopt(_RCVMORE))
         while more:

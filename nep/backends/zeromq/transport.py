@@ -25,6 +25,7 @@ from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.backends.zeromq.subscriber import NativeSubscriber, SocketSubscriber
 from nep.errors import ClosedError, NepError
+from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import SUBSCRIPTION_MAX_BYTES
@@ -274,7 +275,7 @@ class ZeromqTransport:
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Who is there. See `Transport.graph`."""
         if isinstance(configuration, Direct):
-            raise NepError("a direct connection has no master; ask with a hybrid one")
+            raise NepError(_("a direct connection has no master; ask with a hybrid one"))
         return self._session(configuration.master).look(timeout_s)
 
     def begin_close(self) -> None:
