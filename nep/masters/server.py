@@ -345,7 +345,8 @@ class MasterServer:
         member = self._graph.node_at(route)
         return () if member is None else (member.node.id,)
 
-    def _refused(self, reason: str = _("the master could not carry this out; its log says why")) -> Refused:
+    def _refused(self, reason: str = "") -> Refused:
+        reason = reason or _("the master could not carry this out; its log says why")
         return Refused(self._graph.epoch, self._graph.revision, reason)
 
     def _tell_listeners(self, now: float) -> None:
