@@ -10,8 +10,10 @@ from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action
 from app.ui.panels.robots.controls.chooser import control_for
 from app.ui.panels.robots.form import ActionForm
+from app.ui.panels.robots.input_text import input_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Choice, ColourSwatches, Segments, SliderWithUnit, Switch
+from nep.i18n import _, translate
 from tests.ui.fakes import ACTIONS
 
 FEW = (Option("en", "English"), Option("fr", "French"))
@@ -158,3 +160,18 @@ def test_the_name_of_a_value_is_shown_as_it_is(qtbot, theme) -> None:
     qtbot.addWidget(form)
     (name,) = (each for each in form.findChildren(QLabel) if each.buddy() is not None)
     assert name.text() == "R&&D"  # beside its control an & would underline the D
+
+
+def test_in_every_language_a_sentence_finds_its_row(qtbot, theme, pseudo) -> None:
+    made = action(Parameter("p", "p", "number", required=True), Parameter("q", "q", "number"))
+    form = ActionForm(theme, made)
+    qtbot.addWidget(form)
+    form.show_problems(made.check({"q": "x"}))
+    below = {name: label.text() for name, label in form._sentences.items()}
+    assert all(below.values())
+    assert form.problem.isHidden()
+
+
+def test_in_every_language_a_time_is_said_in_a_few_words(pseudo) -> None:
+    waits = action(Parameter("s", translate("robot", "seconds"), "number", unit="s"))
+    assert input_words(waits, {"s": 2.0}) == _("for {duration}").format(duration="2 s")

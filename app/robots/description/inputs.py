@@ -210,7 +210,7 @@ def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -
             if wrong is not None:
                 sentences.append(f"{action}: {parameter.title} {wrong}")
         elif parameter.required:
-            sentences.append(_("{action}: {value} is missing").format(action=action, value=parameter.title))
+            sentences.append(f"{action}: {parameter.title} {_('is missing')}")
     return tuple(sentences)
 
 

@@ -11,7 +11,7 @@ from app.core.messages.lazy_json import LazyList, LazyObject
 from app.core.messages.reader import LARGE_BYTES, Reading, read
 from app.ui.text.numbers import size_words
 from nep.errors import NepError
-from nep.i18n import ngettext
+from nep.i18n import _, ngettext
 
 if TYPE_CHECKING:
     from nep.messages.message import Message
@@ -123,7 +123,7 @@ def image_summary(message: Message) -> Mapping[str, object]:
         [*shape, 0, 0][: max(2, len(shape))] if isinstance(shape, (list, tuple)) else (0, 0)
     )
     return {
-        "encoding": message.extension.get("encoding", "not told"),
+        "encoding": message.extension.get("encoding", _("not told")),
         "width": width,
         "height": height,
         "channels": depth[0] if depth else 1,

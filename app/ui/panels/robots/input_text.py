@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from app.robots.description.description import Action, Parameter
 from app.robots.description.inputs import to_words
-from nep.i18n import _, number
+from nep.i18n import _, number, translate
 
-UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit says how long
+UNITS = {"s": "seconds", "min": "minutes"}
 LONGEST_TEXT = 32
 
 
@@ -18,6 +18,12 @@ def input_words(action: Action, given: Mapping[str, object], *, texts: bool = Tr
     return ", ".join(words for words in found if words)
 
 
+def is_unit(title: str, unit: str | None) -> bool:
+    """Whether a title only names its unit, as "seconds" does: such a value says how long."""
+    english = UNITS.get(unit or "")
+    return english is not None and title in {english, translate("robot", english)}
+
+
 def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
     title = next((choice.title for choice in parameter.choices if choice.value == value), None)
     if title is not None:
@@ -25,7 +31,7 @@ def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
     if parameter.kind in NUMBERS and isinstance(value, (int, float)):
         said = number(value) if isinstance(value, float) else str(value)
         said += f"{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}"
-        if UNITS.get(parameter.unit or "") == parameter.title:
+        if is_unit(parameter.title, parameter.unit):
             return _("for {duration}").format(duration=said)
         return f"{parameter.title} {said}"
     if not texts:

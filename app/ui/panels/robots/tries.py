@@ -11,7 +11,7 @@ from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description.description import Action, DataField
-from app.ui.panels.robots.input_text import input_words
+from app.ui.panels.robots.input_text import input_words, is_unit
 from app.ui.text import plain
 from app.ui.text.numbers import seconds_words
 from app.ui.text.sensor_values import number_words, yes_words
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 TO_GO = "to_go"
 SHARES = ("progress", "ratio", "share")
 PERCENT = ("percent", "percentage")
-SILENT_UNITS = {"s": "seconds", "min": "minutes"}  # a title that only names its unit
 ROW = 28
 SHOWN = 5
 
@@ -46,7 +45,7 @@ def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
             if field.name == TO_GO:
                 parts.append(f"{words} {field.title}")
             else:
-                bare = SILENT_UNITS.get(field.unit or "") == field.title
+                bare = is_unit(field.title, field.unit)
                 parts.append(words if bare else f"{field.title} {words}")
         else:
             parts.append(f"“{value}”")
@@ -60,7 +59,7 @@ def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
 
 def output_words(action: Action, output: Mapping[str, object]) -> str:
     """What the robot answered; how long it took is said by the result itself."""
-    told = [field for field in action.output if SILENT_UNITS.get(field.unit or "") != field.title]
+    told = [field for field in action.output if not is_unit(field.title, field.unit)]
     return field_words(told, output)
 
 
