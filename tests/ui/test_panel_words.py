@@ -35,7 +35,11 @@ SHOWING = frozenset({
     "set_name", "set_title", "set_word", "tip", "toast",
 })  # fmt: skip
 NOT_SHOWN = frozenset({"icon", "kind", "role", "size", "status"})
-NO_WORDS = ("Ctrl", "Shift", "Return", "Space", "bodyLarge", "textSecondary", "textTertiary")  # keys, roles
+NO_WORDS = (
+    "Ctrl", "Esc", "NEP Studio", "Return", "Shift", "Space", "bodyLarge", "font-weight", "textSecondary",
+    "textTertiary",
+)  # fmt: skip
+"""Keys, our name, roles and styles."""
 SAID = (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole)
 
 
@@ -223,7 +227,7 @@ def _constants(given: ast.expr) -> Iterator[str]:
         yield from _constants(given.orelse)
 
 
-@pytest.mark.parametrize("folder", ["panels", "pictures", "text", "widgets"])
+@pytest.mark.parametrize("folder", ["panels", "pictures", "shell", "startup", "text", "widgets"])
 def test_no_words_are_shown_that_nobody_can_translate(folder) -> None:
     found = [each for each in bare_words(folder) if not any(known in each for known in NO_WORDS)]
     assert "\n".join(found) == ""
