@@ -20,6 +20,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+pytest.register_assert_rewrite("tests.robots.whose_words_count")  # a contract: others hold to it
 os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
 USUAL_S = 0.2

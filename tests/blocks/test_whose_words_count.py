@@ -2,23 +2,109 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Iterator
-from typing import cast
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import ClassVar
 
 import pytest
 
 import nep
 from app.blocks.runtime.find_robots import find_robots
+from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.network import Network
-from app.robots.identity import DESCRIPTION_TYPE
+from app.robots.description.description import Robot
+from app.robots.identity import hearing
 from nep.masters.master import Master
 from tests.blocks.fakes import until
-from tests.blocks.samples import robot
 from tests.blocks.wire_robot import WireRobot
+from tests.robots.whose_words_count import WhoseWordsCount, answer
 
 pytestmark = pytest.mark.usefixtures("patient")
-SHORT_S = 0.3
+
+
+class Program:
+    """A program's side of the contract: it looks for robots, then has the network of those."""
+
+    told: ClassVar = {
+        "another topic": r".*/Evil/description says that it is Pepper.*",
+        "two programs": r"2 programs say that they are Pepper: “Pepper”.*“evil”.*",
+        "foreign topic": (
+            r"Evil says that /Pepper/LEAF is its own, which belongs to Pepper; Evil is left out\."
+        ),
+    }
+
+    def __init__(self, node: nep.Node) -> None:
+        self._node = node
+        self._network: Network | None = None
+
+    @property
+    def network(self) -> Network:
+        assert self._network is not None
+        return self._network
+
+    def close(self) -> None:
+        if self._network is not None:
+            self._network.close()
+
+    def until(self, true: Callable[[], object]) -> None:
+        until(lambda: bool(true()))
+
+    def meet(self, described: Robot, node_id: str) -> None:
+        self._network = Network(self._node, "program-1", [described], owners={described.name: node_id})
+
+    def invoke(self, action: str, input: Mapping[str, object]) -> RobotCall:
+        return self.network.invoke("Pepper", action, input)
+
+    def runs(self, call: RobotCall) -> bool:
+        return not call.done
+
+    def check_ended(self, call: RobotCall, states: Sequence[str]) -> None:
+        assert (call.done, call.state, call.began) == (True, states[-1], "running" in states)
+
+    def knows(self, publisher: nep.Publisher) -> bool:
+        message = nep.Message("/Pepper/answer", b"", "json", "robot/answer", publisher=publisher._spec.id)
+        return self.network._senders.node_of(message) is not None
+
+    def hearing_commands(self) -> int:
+        self.network._look()
+        return len(hearing(self.network._view, "/Pepper/command"))
+
+    def watch(self, sensor: str) -> AbstractContextManager[object]:
+        return nullcontext(self.network.sensor("Pepper", sensor))
+
+    def value(self, sensor: str) -> object:
+        return self.network.sensor("Pepper", sensor)
+
+    def stop(self, patience_s: float = 30.0) -> bool:
+        missing = self.network.stop_robots(patience_s)
+        assert missing in {(), ("Pepper",)}
+        return not missing
+
+    def stop_says(self) -> str:
+        return self.network.stop_words("Pepper")
+
+    def robots(self) -> Mapping[str, tuple[str, str]]:
+        found = find_robots(self._node, 30.0)
+        return {
+            robot.name: (robot.topics.command, found.owners[robot.name].node_id) for robot in found.robots
+        }
+
+    def claim(self, topic: str) -> str:
+        (claim,) = find_robots(self._node, 30.0).claims
+        return claim
+
+    def claims_nothing(self) -> bool:
+        return not find_robots(self._node, 30.0).claims
+
+
+class TestAProgram(WhoseWordsCount):
+    """What every side owes, of a program."""
+
+    @pytest.fixture
+    def side(self, node: nep.Node) -> Iterator[Program]:
+        made = Program(node)
+        yield made
+        made.close()
 
 
 @pytest.fixture
@@ -47,49 +133,16 @@ def network(node: nep.Node, pepper: WireRobot) -> Iterator[Network]:
     made.close()
 
 
-def answer(id: object, state: str, op: str = "invoke", **more: object) -> dict[str, object]:
-    return {"id": id, "op": op, "state": state, "output": {}, "feedback": {}, "error": None, **more}
-
-
-def test_a_stranger_ends_no_action(network: Network, pepper: WireRobot, evil: nep.Node) -> None:
-    pepper.slow = {"say"}
-    call = network.invoke("Pepper", "say", {"text": "Hi"})
-    until(lambda: call.state == "accepted")
-    forged = evil.new_pub("/Pepper/answer", "robot/answer")
-    forged.publish(answer(call.id, "succeeded"))
-    until(lambda: network._senders.node_of(_of(forged)) == evil.id)  # the master has been asked
-    pepper._say(pepper.heard("invoke")[0], "running")
-    until(lambda: call.state == "running")
-    assert not call.done
-    pepper._say(pepper.heard("invoke")[0], "succeeded")
-    until(lambda: call.done)
-
-
-def _of(publisher: nep.Publisher) -> nep.Message:
-    return nep.Message("/Pepper/answer", b"", "json", "robot/answer", publisher=publisher._spec.id)
-
-
-def test_a_stranger_proves_no_stop_and_says_no_stop_of_others(
-    network: Network, pepper: WireRobot, evil: nep.Node
-) -> None:
+def test_a_stranger_says_no_stop_of_others(network: Network, pepper: WireRobot, evil: nep.Node) -> None:
     outside: list[str] = []
     network.listen(lambda: None, outside.append)
     forged = evil.new_pub("/Pepper/answer", "robot/answer")
     forged.publish(answer("somebody's", "succeeded", "stop"))
-    until(lambda: network._senders.node_of(_of(forged)) == evil.id)
-    pepper.silent = {"stop"}
-
-    def forge(messages: object) -> None:
-        for message in cast("list[nep.Message]", messages):
-            command = cast("dict[str, object]", message.payload)
-            if command["op"] == "stop":
-                forged.publish(answer(command["id"], "succeeded", "stop"))
-
-    # It only publishes its answers from another node, so that it serves nothing and is a stranger.
-    with nep.node("spy", master=evil._master) as spy:
-        spy.new_sub("/Pepper/command", "robot/command", sink=forge)
-        assert network.stop_robots(SHORT_S) == ("Pepper",)
-    assert network.stop_words("Pepper") == "Pepper did not answer"
+    told = nep.Message("/Pepper/answer", b"", "json", "robot/answer", publisher=forged._spec.id)
+    until(lambda: network._senders.node_of(told) == evil.id)  # the master has been asked
+    pepper.slow = {"say"}
+    call = network.invoke("Pepper", "say", {"text": "Hi"})
+    until(lambda: call.state == "accepted")
     assert outside == []
 
 
@@ -98,16 +151,6 @@ def test_a_refusal_is_told_in_the_robots_words(network: Network, pepper: WireRob
     pepper._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")  # type: ignore[method-assign]
     assert network.stop_robots(30.0) == ("Pepper",)
     assert network.stop_words("Pepper") == "Pepper may still move: the brake is stuck"
-
-
-def test_a_twin_must_answer_too(network: Network, pepper: WireRobot, master: Master) -> None:
-    twin = WireRobot(master.address)
-    try:
-        assert network.stop_robots(30.0) == ()
-        twin.silent = {"stop"}
-        assert network.stop_robots(SHORT_S) == ("Pepper",)
-    finally:
-        twin.close()
 
 
 def test_a_stranger_starts_no_script_but_another_program_may_be_a_robots_eye(
@@ -137,22 +180,6 @@ def test_a_stranger_starts_no_script_but_another_program_may_be_a_robots_eye(
     until(told_by_another)
 
 
-def test_an_answer_of_a_publisher_that_is_not_known_yet_waits_for_the_master(
-    node: nep.Node, evil: nep.Node
-) -> None:
-    """The robot makes its answer topic only when it has something to say."""
-    network = Network(node, "program-1", [robot()], owners={"Pepper": evil.id})
-    try:
-        call = network.invoke("Pepper", "say", {"text": "Hi"})
-        answers = evil.new_pub("/Pepper/answer", "robot/answer")
-        for state in ("accepted", "running", "succeeded"):
-            answers.publish(answer(call.id, state))
-        until(lambda: call.done)
-        assert (call.state, call.began) == ("succeeded", True)
-    finally:
-        network.close()
-
-
 def test_a_robot_that_is_started_anew_is_believed_when_the_runner_says_so(
     network: Network, pepper: WireRobot, master: Master
 ) -> None:
@@ -168,43 +195,3 @@ def test_a_robot_that_is_started_anew_is_believed_when_the_runner_says_so(
         until(lambda: second.done)
     finally:
         new.close()
-
-
-# ---- who is found --------------------------------------------------------------------------------------
-
-
-def announce(node: nep.Node, topic: str, name: str, **topics: str) -> nep.Publisher:
-    described = copy.deepcopy(dict(robot(name).source))
-    described["rb:topics"] = {**cast("dict[str, str]", described.get("rb:topics") or {}), **topics}
-    publisher = node.new_pub(topic, DESCRIPTION_TYPE, latched=True)
-    publisher.publish(described)
-    return publisher
-
-
-def test_a_description_on_another_topic_is_left_out(
-    node: nep.Node, pepper: WireRobot, evil: nep.Node
-) -> None:
-    announce(evil, "/Evil/description", "Pepper", command="/Evil/command")
-    found = find_robots(node, 30.0)
-    assert [each.topics.command for each in found.robots] == ["/Pepper/command"]
-    assert found.owners["Pepper"].node_id == pepper._node.id
-    assert "/Evil/description says that it is Pepper" in found.claims[0]
-
-
-def test_the_first_program_of_a_name_is_found(node: nep.Node, pepper: WireRobot, evil: nep.Node) -> None:
-    announce(evil, "/Pepper/description", "Pepper", command="/Evil/command")
-    found = find_robots(node, 30.0, wanted=["Pepper"])
-    assert found.robots[0].topics.command == "/Pepper/command"
-    assert found.claims[0].startswith("2 programs say that they are Pepper: “Pepper”")
-    assert "“evil”" in found.claims[0]
-
-
-def test_a_robot_with_the_topics_of_another_is_left_out(
-    node: nep.Node, pepper: WireRobot, evil: nep.Node
-) -> None:
-    announce(evil, "/Evil/description", "Evil", command="/Pepper/command")
-    found = find_robots(node, 30.0)
-    assert [each.name for each in found.robots] == ["Pepper"]
-    assert found.claims == (
-        "Evil says that /Pepper/command is its own, which belongs to Pepper; Evil is left out.",
-    )

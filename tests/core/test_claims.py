@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 import json
-from collections.abc import Iterator, Mapping
-from typing import cast
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import ClassVar
 
 import pytest
 
@@ -13,14 +13,16 @@ import nep
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watches
 from app.core.robots.announcements import MOST_ROBOTS, Announcements
-from app.core.robots.robot_link import RobotLink
+from app.core.robots.robot_link import Invocation, RobotLink
 from app.core.session import Session
+from app.robots.description.description import Robot
 from app.robots.identity import DESCRIPTION_TYPE, Senders
 from nep.masters.master import Master
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
-from tests.blocks.samples import block, number, robot, started, workspace
+from tests.blocks.samples import block, number, started, workspace
 from tests.blocks.wire_robot import WireRobot
 from tests.core.waiting import tick_until
+from tests.robots.whose_words_count import WhoseWordsCount, announce, described
 
 
 @pytest.fixture
@@ -56,18 +58,6 @@ class Clock:
         return self.now
 
 
-def description(name: str = "Pepper", **topics: str) -> dict[str, object]:
-    made = copy.deepcopy(dict(robot(name).source))
-    made["rb:topics"] = {**cast("Mapping[str, object]", made.get("rb:topics") or {}), **topics}
-    return made
-
-
-def announce(node: nep.Node, topic: str, described: Mapping[str, object]) -> nep.Publisher:
-    publisher = node.new_pub(topic, DESCRIPTION_TYPE, latched=True)
-    publisher.publish(dict(described))
-    return publisher
-
-
 def claimed(session: Session, id: str) -> str:
     """The words of the alert about a claim, as soon as it is there."""
     tick_until(session, lambda: session.alerts.has(f"claim:{id}"))
@@ -82,19 +72,92 @@ def stop_is_proven(session: Session) -> None:
     assert session.runs.view().state == "proven", session.runs.view().title
 
 
-def test_a_description_on_another_topic_does_not_replace_the_robot(
-    session: Session, pepper: WireRobot, evil: nep.Node
-) -> None:
-    link = the_link(session)
-    known, identity = link.robot, link.identity
-    topics = {"command": "/Evil/command", "answer": "/Evil/answer"}
-    announce(evil, "/Evil/description", description("Pepper", **topics))
-    said = claimed(session, "/Evil/description")
-    assert "/Evil/description says that it is Pepper" in said
-    assert session.fleet.link("Pepper") is link
-    assert (link.robot, link.identity) == (known, identity)
-    stop_is_proven(session)
-    assert len(pepper.heard("stop")) == 1
+class Studio:
+    """Studio's side of the contract: a session, and what a person sees of it."""
+
+    told: ClassVar = {
+        "another topic": r".*/Evil/description says that it is Pepper.*",
+        "two programs": r"2 programs say that they are Pepper\..*“Pepper” on .*“evil” on .*",
+        "foreign topic": r".*Evil says that /Pepper/LEAF is its own, which belongs to Pepper.*",
+    }
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self._link: RobotLink | None = None
+        self._before: tuple[object, ...] = ()
+
+    @property
+    def link(self) -> RobotLink:
+        assert self._link is not None
+        return self._link
+
+    def until(self, true: Callable[[], object]) -> None:
+        tick_until(self.session, true)
+
+    def meet(self, described: Robot, node_id: str) -> None:
+        self._link = the_link(self.session, described.name)
+        assert self.link.identity.node_id == node_id
+        self._before = (self.link.robot, self.link.identity)
+        self.until(lambda: _subscribers(self.session, "/Pepper/answer") == 2)  # also the stop's
+
+    def invoke(self, action: str, input: Mapping[str, object]) -> Invocation:
+        return self.session.fleet.invoke("Pepper", action, input)
+
+    def runs(self, call: Invocation) -> bool:
+        return call.running and self.link.goes_on == ""
+
+    def check_ended(self, call: Invocation, states: Sequence[str]) -> None:
+        assert (call.running, call.state) == (False, states[-1])
+
+    def knows(self, publisher: nep.Publisher) -> bool:
+        """The graph shows it, with what its node serves."""
+        graph = self.session.graph
+        return graph is not None and publisher._spec.id in {
+            each.id for each in graph.topics["/Pepper/answer"].publishers
+        }
+
+    def hearing_commands(self) -> int:
+        return _subscribers(self.session, "/Pepper/command")
+
+    def watch(self, _sensor: str) -> AbstractContextManager[object]:
+        return self.session.fleet.look_at("Pepper")
+
+    def value(self, sensor: str) -> object:
+        return self.link.values.get(sensor)
+
+    def stop(self, _patience_s: float = 30.0) -> bool:
+        self.session.runs.stop()
+        self.until(lambda: self.session.runs.view().state in {"proven", "unanswered"})
+        return self.session.runs.view().state == "proven"
+
+    def stop_says(self) -> str:
+        return self.session.runs.view().title
+
+    def robots(self) -> Mapping[str, tuple[str, str]]:
+        """Those that are connected; what Studio has of Pepper is what it had before."""
+        assert self.session.fleet.link("Pepper") is self.link
+        assert (self.link.robot, self.link.identity) == self._before
+        links = [link for link in self.session.fleet.links if link.connected]
+        return {link.name: (link.robot.topics.command, link.identity.node_id) for link in links}
+
+    def claim(self, topic: str) -> str:
+        return claimed(self.session, topic)
+
+    def claims_nothing(self) -> bool:
+        return not any(alert.id.startswith("claim:") for alert in self.session.alerts.active)
+
+
+class TestStudio(WhoseWordsCount):
+    """What every side owes, of Studio."""
+
+    @pytest.fixture
+    def side(self, session: Session) -> Studio:
+        return Studio(session)
+
+
+def _subscribers(session: Session, topic: str) -> int:
+    info = session.graph.topics.get(topic) if session.graph is not None else None
+    return len(info.subscribers) if info is not None else 0
 
 
 def test_a_stop_reaches_the_robot_whoever_describes_it_as_well(
@@ -104,7 +167,7 @@ def test_a_stop_reaches_the_robot_whoever_describes_it_as_well(
     diverted: list[object] = []
     evil.new_sub("/Evil/command", "robot/command", sink=diverted.extend)
     topics = {"command": "/Evil/command", "answer": "/Evil/answer"}
-    announce(evil, "/Evil/description", description("Pepper", **topics))
+    announce(evil, "/Evil/description", described("Pepper", **topics))
 
     def is_seen() -> bool:
         link = session.fleet.link("Pepper")
@@ -117,93 +180,11 @@ def test_a_stop_reaches_the_robot_whoever_describes_it_as_well(
     assert (len(pepper.heard("stop")), diverted) == (1, [])
 
 
-def test_a_twin_that_does_not_answer_leaves_a_stop_without_proof(
-    session: Session, pepper: WireRobot, evil: nep.Node
-) -> None:
-    the_link(session)
-    announce(evil, "/Pepper/description", description())
-    evil.new_pub("/Pepper/answer", "robot/answer")
-    evil.new_sub("/Pepper/command", "robot/command")  # hears, and says nothing
-    tick_until(session, lambda: _subscribers(session, "/Pepper/command") == 2)
-    session.runs.stop()
-    tick_until(session, lambda: session.runs.view().state in {"proven", "unanswered"})
-    assert session.runs.view().state == "unanswered"
-    assert len(pepper.heard("stop")) == 1
-
-
 def test_a_robot_whose_description_is_huge_is_refused_with_an_alert(session: Session, evil: nep.Node) -> None:
-    announce(evil, "/Big/description", {**description("Big"), "note": "x" * 1_100_000})
+    announce(evil, "/Big/description", {**described("Big"), "note": "x" * 1_100_000})
     tick_until(session, lambda: session.fleet.link("Big") is not None or bool(session.alerts.active))
     assert session.fleet.link("Big") is None
     assert any("Big" in f"{alert.title} {alert.detail}" for alert in session.alerts.active)
-
-
-def test_a_second_program_of_the_name_changes_nothing_and_both_are_named(
-    session: Session, pepper: WireRobot, evil: nep.Node
-) -> None:
-    link = the_link(session)
-    announcement = announce(evil, "/Pepper/description", description("Pepper", command="/Evil/command"))
-    said = claimed(session, "/Pepper/description")
-    assert "2 programs say that they are Pepper." in said
-    assert "“Pepper” on " in said
-    assert "“evil” on " in said
-    assert link.robot.topics.command == "/Pepper/command"
-    announcement.close()
-    tick_until(session, lambda: not session.alerts.has("claim:/Pepper/description"))
-    assert link.connected
-
-
-def test_an_answer_of_a_stranger_ends_no_try(session: Session, pepper: WireRobot, evil: nep.Node) -> None:
-    link = the_link(session)
-    pepper.slow = {"say"}
-    tried = session.fleet.invoke("Pepper", "say", {"text": "Hi"})
-    tick_until(session, lambda: tried.state == "accepted")
-    forged = evil.new_pub("/Pepper/answer", "robot/answer")
-    told = {"id": tried.id, "op": "invoke", "action": "say", "state": "succeeded", "output": {}}
-    forged.publish({**told, "feedback": {}, "error": None})
-    forged.publish({"op": "alive", "id": "", "state": "running", "not_ended": ["say"], "error": "forged"})
-    graph = session.graph
-    tick_until(session, lambda: session.graph is not graph)  # its publisher is known now
-    pepper._say(pepper.heard("invoke")[0], "running")
-    tick_until(session, lambda: tried.state == "running")
-    assert (tried.running, link.goes_on) == (True, "")
-    pepper._say(pepper.heard("invoke")[0], "succeeded")
-    tick_until(session, lambda: tried.state == "succeeded")
-
-
-def test_a_value_of_a_stranger_is_not_the_robots(session: Session, pepper: WireRobot, evil: nep.Node) -> None:
-    link = the_link(session)
-    with session.fleet.look_at("Pepper"):
-        forged = evil.new_pub("/Pepper/battery", "json")
-        tick_until(session, lambda: forged.subscribers)
-
-        def told() -> bool:
-            pepper.tell("battery", {"value": 84})
-            forged.publish({"value": 7})
-            return "battery" in link.values
-
-        tick_until(session, told)
-        assert link.values["battery"] == 84
-
-
-def test_an_answer_from_a_publisher_that_the_graph_does_not_show_yet_is_kept(session: Session) -> None:
-    with nep.node("late") as node:
-        announce(node, "/Pepper/description", description())
-        heard: list[Mapping[str, object]] = []
-        node.new_sub("/Pepper/command", sink=lambda messages: heard.extend(_payloads(messages)))
-        the_link(session)
-        tick_until(session, lambda: _subscribers(session, "/Pepper/answer") == 2)  # also the stop's
-        tried = session.fleet.invoke("Pepper", "say", {"text": "Hi"})
-        tick_until(session, lambda: any(command["op"] == "invoke" for command in heard))
-        answers = node.new_pub("/Pepper/answer", "robot/answer")
-        answers.publish({"id": tried.id, "op": "invoke", "state": "succeeded", "output": {}})
-        tick_until(session, lambda: not tried.running)
-        assert tried.state == "succeeded"
-
-
-def _subscribers(session: Session, topic: str) -> int:
-    info = session.graph.topics.get(topic) if session.graph is not None else None
-    return len(info.subscribers) if info is not None else 0
 
 
 def _payloads(messages: object) -> list[Mapping[str, object]]:
@@ -277,18 +258,10 @@ def test_nor_of_one_that_a_person_moved(session: Session, master: Master, pepper
         thief.close()
 
 
-@pytest.mark.parametrize("leaf", ["command", "answer", "world"])
-def test_a_robot_may_not_name_the_topics_of_another_its_own(
-    session: Session, pepper: WireRobot, evil: nep.Node, leaf: str
+def test_a_robot_may_not_name_the_topics_of_one_that_comes_later_its_own(
+    session: Session, master: Master, evil: nep.Node
 ) -> None:
-    the_link(session)
-    announce(evil, "/Evil/description", description("Evil", **{leaf: f"/Pepper/{leaf}"}))
-    assert "which belongs to Pepper" in claimed(session, "/Evil/description")
-    assert session.fleet.link("Evil") is None
-
-
-def test_nor_before_the_other_is_there(session: Session, master: Master, evil: nep.Node) -> None:
-    announce(evil, "/Evil/description", description("Evil", command="/Pepper/command"))
+    announce(evil, "/Evil/description", described("Evil", command="/Pepper/command"))
     evil_link = the_link(session, "Evil")
     pepper = WireRobot(master.address)
     try:
@@ -301,13 +274,13 @@ def test_nor_before_the_other_is_there(session: Session, master: Master, evil: n
 
 
 def test_a_changed_description_moves_what_is_sent_to_the_new_topic(session: Session, evil: nep.Node) -> None:
-    announcement = announce(evil, "/Pepper/description", description())
+    announcement = announce(evil, "/Pepper/description", described())
     link = the_link(session)
     old, new = [], []
     evil.new_sub("/Pepper/command", sink=lambda messages: old.extend(_payloads(messages)))
     evil.new_sub("/Pepper/orders", sink=lambda messages: new.extend(_payloads(messages)))
     tick_until(session, lambda: link.publisher is not None and link.publisher.subscribers)
-    announcement.publish(description("Pepper", command="/Pepper/orders"))
+    announcement.publish(described("Pepper", command="/Pepper/orders"))
     tick_until(session, lambda: link.publisher is not None and link.publisher.topic == "/Pepper/orders")
     session.fleet.invoke("Pepper", "say", {"text": "Hi"})
     tick_until(session, lambda: any(command["op"] == "invoke" for command in new))
@@ -359,7 +332,7 @@ def _two_programs(*announcing: str) -> GraphView:
 
 
 def _said_by(publisher: int) -> Batch:
-    payload = json.dumps(description()).encode()
+    payload = json.dumps(described()).encode()
     topic = "/Pepper/description"
     return Batch([nep.Message(topic, payload, "json", DESCRIPTION_TYPE, publisher=publisher)])
 
@@ -387,7 +360,7 @@ def test_what_one_program_said_wrongly_is_not_held_against_the_next() -> None:
     opened: list[str] = []
     announcements = Announcements(Watches(opened.append, opened.remove), Senders())
     announcements.update(_two_programs("first"))
-    payload = json.dumps(description("Turtle")).encode()  # on the topic of Pepper
+    payload = json.dumps(described("Turtle")).encode()  # on the topic of Pepper
     wrong = nep.Message("/Pepper/description", payload, "json", DESCRIPTION_TYPE, publisher=1)
     announcements.add({"/Pepper/description": Batch([wrong])})
     assert "/Pepper/description" in announcements.claims
@@ -412,17 +385,17 @@ def test_a_description_that_cant_be_used_is_told_and_what_was_said_before_counts
     session: Session, pepper: WireRobot, evil: nep.Node
 ) -> None:
     the_link(session)
-    wrong = description("Rover")
+    wrong = described("Rover")
     wrong["actions"] = {"do it": {}}
-    described = announce(evil, "/Rover/description", wrong)
+    announcement = announce(evil, "/Rover/description", wrong)
     said = claimed(session, "/Rover/description")
     assert "The description of 'Rover' can't be used: actions" in said
     assert "It comes from “evil” on" in said
     assert "before" not in said
-    described.publish(description("Rover"))
+    announcement.publish(described("Rover"))
     tick_until(session, lambda: not session.alerts.has("claim:/Rover/description"))
     the_link(session, "Rover")
-    described.publish(wrong)
+    announcement.publish(wrong)
     assert "What it said before still counts." in claimed(session, "/Rover/description")
     assert session.fleet.link("Rover").connected
 

@@ -1,0 +1,233 @@
+"""The contract of whoever commands robots: it believes its robots' own programs, and nobody else.
+
+A program that runs and Studio keep it alike; each has an adapter (`Side`) beside its own cases, in
+`tests/blocks/test_whose_words_count.py` and `tests/core/test_claims.py`.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import Protocol, cast
+
+import pytest
+
+import nep
+from app.robots.description.description import Robot
+from app.robots.identity import DESCRIPTION_TYPE
+from nep.masters.master import Master
+from tests.blocks.samples import robot
+from tests.blocks.wire_robot import WireRobot
+
+SHORT_S = 0.3
+"""How long somebody waits for who stays silent."""
+
+
+class Invoked(Protocol):
+    """What a side keeps of a command that it sent."""
+
+    id: str
+    state: str
+
+
+class Side(Protocol):
+    """Who commands robots."""
+
+    told: Mapping[str, str]
+    """What it says of "another topic", "two programs" and "foreign topic", as whole regular expressions."""
+
+    def until(self, true: Callable[[], object]) -> None:
+        """Go on until something is true; fails when it never is."""
+
+    def meet(self, described: Robot, node_id: str) -> None:
+        """Be ready to command this robot, which is that node."""
+
+    def invoke(self, action: str, input: Mapping[str, object]) -> Invoked:
+        """Let Pepper do something."""
+
+    def runs(self, call: Invoked) -> bool:
+        """Whether it waits for the end of a command, and for nothing else of the robot."""
+
+    def check_ended(self, call: Invoked, states: Sequence[str]) -> None:
+        """Fail unless all that it keeps of a command is what these answers said."""
+
+    def knows(self, publisher: nep.Publisher) -> bool:
+        """Whether it has asked the master whose publisher of Pepper's answers this is, which has sent one."""
+
+    def hearing_commands(self) -> int:
+        """How many programs are there that hear Pepper's commands."""
+
+    def watch(self, sensor: str) -> AbstractContextManager[object]:
+        """Want Pepper's sensor meanwhile."""
+
+    def value(self, sensor: str) -> object:
+        """The newest value of Pepper's sensor, None before there is one."""
+
+    def stop(self, patience_s: float = 30.0) -> bool:
+        """Stop the robots; whether all are proven still."""
+
+    def stop_says(self) -> str:
+        """What it says of Pepper after a stop that was not proven."""
+
+    def robots(self) -> Mapping[str, tuple[str, str]]:
+        """The robots that it believes in: where they are commanded, and which node they are."""
+
+    def claim(self, topic: str) -> str:
+        """What it says about whoever announces something on this topic that is not believed."""
+
+    def claims_nothing(self) -> bool:
+        """Whether there is nothing that it does not believe."""
+
+
+def described(name: str = "Pepper", **topics: str) -> dict[str, object]:
+    """The description of a robot, with some of its topics elsewhere."""
+    made = copy.deepcopy(dict(robot(name).source))
+    made["rb:topics"] = {**cast("Mapping[str, object]", made.get("rb:topics") or {}), **topics}
+    return made
+
+
+def announce(node: nep.Node, topic: str, description: Mapping[str, object]) -> nep.Publisher:
+    """Let a node say that it is this robot."""
+    publisher = node.new_pub(topic, DESCRIPTION_TYPE, latched=True)
+    publisher.publish(dict(description))
+    return publisher
+
+
+def answer(id: object, state: str, op: str = "invoke", **more: object) -> dict[str, object]:
+    """What a robot answers."""
+    told = {"id": id, "op": op, "action": "say", "state": state, "output": {}, "feedback": {}, "error": None}
+    return {**told, **more}
+
+
+class WhoseWordsCount:
+    """The cases; a subclass has the fixture `side`."""
+
+    @pytest.fixture
+    def pepper(self, master: Master) -> Iterator[WireRobot]:
+        made = WireRobot(master.address)
+        yield made
+        made.close()
+
+    @pytest.fixture
+    def evil(self, master: Master) -> Iterator[nep.Node]:
+        with nep.node("evil", master=master.address) as made:
+            yield made
+
+    def test_an_answer_of_a_stranger_ends_no_action(
+        self, pepper: WireRobot, evil: nep.Node, side: Side
+    ) -> None:
+        side.meet(pepper.described, pepper._node.id)
+        pepper.slow = {"say"}
+        call = side.invoke("say", {"text": "Hi"})
+        side.until(lambda: call.state == "accepted")
+        forged = evil.new_pub("/Pepper/answer", "robot/answer")
+        forged.publish(answer(call.id, "succeeded"))
+        forged.publish({"op": "alive", "id": "", "state": "running", "not_ended": ["say"], "error": "forged"})
+        side.until(lambda: side.knows(forged))
+        pepper._say(pepper.heard("invoke")[0], "running")
+        side.until(lambda: call.state == "running")
+        assert side.runs(call)
+        pepper._say(pepper.heard("invoke")[0], "succeeded")
+        side.until(lambda: call.state == "succeeded")
+
+    def test_a_value_of_a_stranger_is_not_the_robots(
+        self, pepper: WireRobot, evil: nep.Node, side: Side
+    ) -> None:
+        side.meet(pepper.described, pepper._node.id)
+        with side.watch("battery"):
+            forged = evil.new_pub("/Pepper/battery", "json")
+            side.until(lambda: forged.subscribers)
+
+            def told() -> bool:
+                pepper.tell("battery", {"value": 84})
+                forged.publish({"value": 7})
+                return side.value("battery") is not None
+
+            side.until(told)
+            assert side.value("battery") == 84
+
+    def test_a_stranger_proves_no_stop(self, pepper: WireRobot, evil: nep.Node, side: Side) -> None:
+        side.meet(pepper.described, pepper._node.id)
+        pepper.silent = {"stop"}
+        forged = evil.new_pub("/Pepper/answer", "robot/answer")
+        forged.publish(answer("somebody's", "succeeded", "stop"))
+        side.until(lambda: side.knows(forged))
+
+        def forge(messages: Sequence[nep.Message]) -> None:
+            for message in messages:
+                command = cast("dict[str, object]", message.payload)
+                if command["op"] == "stop":
+                    forged.publish(answer(command["id"], "succeeded", "stop"))
+
+        # It only publishes its answers from another node, so that it serves nothing and is a stranger.
+        with nep.node("spy", master=evil._master) as spy:
+            spy.new_sub("/Pepper/command", "robot/command", sink=forge)
+            assert not side.stop(SHORT_S)
+        assert side.stop_says() == "Pepper did not answer"
+
+    @pytest.mark.parametrize("silent", [False, True])
+    def test_a_twin_must_answer_too(
+        self, pepper: WireRobot, master: Master, side: Side, silent: bool
+    ) -> None:
+        side.meet(pepper.described, pepper._node.id)
+        twin = WireRobot(master.address)
+        try:
+            twin.silent = {"stop"} if silent else set()
+            assert side.claim("/Pepper/description")
+            side.until(lambda: side.hearing_commands() == 2)
+            assert side.stop(SHORT_S if silent else 30.0) is not silent
+            assert (len(pepper.heard("stop")), len(twin.heard("stop"))) == (1, 1)
+        finally:
+            twin.close()
+
+    @pytest.mark.parametrize("states", [("succeeded",), ("accepted", "running", "succeeded")], ids=len)
+    def test_an_answer_of_a_publisher_that_is_not_known_yet_waits_for_the_master(
+        self, master: Master, side: Side, states: tuple[str, ...]
+    ) -> None:
+        """The robot makes its answer topic only when it has something to say."""
+        with nep.node("late", master=master.address) as late:
+            announce(late, "/Pepper/description", described())
+            heard: list[object] = []
+            late.new_sub("/Pepper/command", sink=lambda messages: heard.extend(m.payload for m in messages))
+            side.meet(robot(), late.id)
+            call = side.invoke("say", {"text": "Hi"})
+            side.until(lambda: any(cast("dict[str, object]", each)["op"] == "invoke" for each in heard))
+            answers = late.new_pub("/Pepper/answer", "robot/answer")
+            for state in states:
+                answers.publish(answer(call.id, state))
+            side.until(lambda: call.state == "succeeded")
+            side.check_ended(call, states)
+
+    def test_a_description_on_another_topic_does_not_replace_the_robot(
+        self, pepper: WireRobot, evil: nep.Node, side: Side
+    ) -> None:
+        side.meet(pepper.described, pepper._node.id)
+        topics = {"command": "/Evil/command", "answer": "/Evil/answer"}
+        announce(evil, "/Evil/description", described("Pepper", **topics))
+        assert re.fullmatch(side.told["another topic"], side.claim("/Evil/description"))
+        assert side.robots() == {"Pepper": ("/Pepper/command", pepper._node.id)}
+        assert side.stop()
+        assert len(pepper.heard("stop")) == 1
+
+    def test_the_first_program_of_a_name_is_the_robot_and_both_are_named(
+        self, pepper: WireRobot, evil: nep.Node, side: Side
+    ) -> None:
+        side.meet(pepper.described, pepper._node.id)
+        second = announce(evil, "/Pepper/description", described("Pepper", command="/Evil/command"))
+        assert re.fullmatch(side.told["two programs"], side.claim("/Pepper/description"))
+        assert side.robots() == {"Pepper": ("/Pepper/command", pepper._node.id)}
+        second.close()
+        side.until(side.claims_nothing)
+        assert side.robots() == {"Pepper": ("/Pepper/command", pepper._node.id)}
+
+    @pytest.mark.parametrize("leaf", ["command", "answer", "world"])
+    def test_a_robot_may_not_name_the_topics_of_another_its_own(
+        self, pepper: WireRobot, evil: nep.Node, side: Side, leaf: str
+    ) -> None:
+        side.meet(pepper.described, pepper._node.id)
+        announce(evil, "/Evil/description", described("Evil", **{leaf: f"/Pepper/{leaf}"}))
+        said = side.claim("/Evil/description")
+        assert re.fullmatch(side.told["foreign topic"].replace("LEAF", leaf), said)
+        assert side.robots() == {"Pepper": ("/Pepper/command", pepper._node.id)}
