@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QLibraryInfo, QLocale, Qt, QTimer, QTranslator
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
@@ -34,7 +34,7 @@ from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
-from nep.i18n import _
+from nep.i18n import ENGLISH, _, language
 
 LOG_EVERY_MS = 500
 SOON = (
@@ -76,11 +76,24 @@ def make_application() -> QApplication:
     application.setApplicationName("nep-studio")
     application.setApplicationDisplayName("NEP Studio")
     application.setDesktopFileName("nep-studio")
+    translate_qt(application)
     refused = fonts.load()
     if refused:
         words = _("Qt can't use the fonts {fonts}; others stand in").format(fonts=", ".join(refused))
         sys.stderr.write(f"{words}\n")
     return application
+
+
+def translate_qt(application: QCoreApplication) -> QTranslator | None:
+    """Let Qt's own words, as in its dialogs for files, be in the language of ours; None where it has none."""
+    if language() == ENGLISH:
+        return None
+    translator = QTranslator(application)
+    folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
+    if not translator.load(QLocale(language()), "qtbase", "_", folder):
+        return None
+    application.installTranslator(translator)
+    return translator
 
 
 def steps_after(window: MainWindow) -> list[Callable[[], object]]:

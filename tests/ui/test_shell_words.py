@@ -7,7 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QKeyCombination, Qt
+from PySide6.QtCore import QCoreApplication, QKeyCombination, Qt
 from PySide6.QtWidgets import QMenu, QWidget
 
 from app import resources
@@ -19,7 +19,7 @@ from app.core.robots.stop_report import RobotStop, StopReport
 from app.core.run.view import RunState, RunView, view_of
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.application import why_not
+from app.ui.application import translate_qt, why_not
 from app.ui.shell.actions.shortcuts import FIXED
 from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import Facts
@@ -356,6 +356,19 @@ def test_what_stands_in_place_of_a_layout_or_a_panel(qtbot, whole: MainWindow) -
     dock.body.fail("", dock.try_again)
     assert forgotten(dock) == []
     dock.body.show_panel()
+
+
+def test_the_words_of_qt_itself(qapp, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert translate_qt(qapp) is None, "English has no need of it"
+    monkeypatch.setattr("app.ui.application.language", lambda: "es")
+    translator = translate_qt(qapp)
+    assert translator is not None
+    try:
+        assert QCoreApplication.translate("QPlatformTheme", "Cancel") == "Cancelar"
+    finally:
+        qapp.removeTranslator(translator)
+    monkeypatch.setattr("app.ui.application.language", lambda: "qps")
+    assert translate_qt(qapp) is None, "Qt has none for a language that it does not know"
 
 
 @pytest.mark.parametrize("count", [1, *range(5, 13)])
