@@ -9,6 +9,7 @@ from app.ui.shell.bars.run_bar import ToolBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freezable
 from app.ui.shell.commands.shell import Shell
+from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Line, paint
@@ -64,7 +65,7 @@ class DeveloperTools(QObject):
         self.freeze = ToggleButton(theme, _("Freeze"), "snowflake")
         self.layout = MenuButton(theme, _("Developer"), "panel-left", size="small")
         self.panels = MenuButton(theme, _("Panels"), size="small")
-        self.panels.setToolTip(_("Opens and closes panels"))
+        self.panels.setToolTip(plain.tip(_("Opens and closes panels")))
         self._actions.bind(self.freeze, FREEZE)
         self._actions[FREEZE].triggered.connect(self.refresh)
         self.layout.clicked.connect(lambda: menus.drop_layouts(self.layout))
