@@ -45,17 +45,21 @@ class Siege:
         self.pubs = [each.new_pub("/state") for each in self.nodes]
         self.epoch = self.nodes[0].graph().epoch
         self._context = stack.enter_context(zmq.Context())
-        self._stack = stack
+        self._attackers = ExitStack()
         self._said = 0
 
     def attacker(self, routing_id: bytes = b"") -> zmq.Socket[bytes]:
         """One more connection to the master."""
-        socket = self._stack.enter_context(self._context.socket(zmq.DEALER))
+        socket = self._attackers.enter_context(self._context.socket(zmq.DEALER))
         socket.setsockopt(zmq.LINGER, 0)
         if routing_id:
             socket.setsockopt(zmq.ROUTING_ID, routing_id)
         socket.connect(f"tcp://{self._address}")
         return socket
+
+    def end_attack(self) -> None:
+        """Close what the attacker opened."""
+        self._attackers.close()
 
     def go_on(self) -> None:
         """What each publishes reaches all; the graph shows all; a new node joins."""
@@ -82,6 +86,12 @@ def siege() -> Iterator[Siege]:
         assert [each.id for each in made.nodes] == ids
         assert set(ids) <= made.nodes[0].graph().nodes.keys()
         assert psutil.Process(master.process.pid).memory_info().rss < MEMORY_MAX_BYTES
+
+
+@pytest.fixture(autouse=True)
+def _attackers_end(siege: Siege) -> Iterator[None]:
+    yield
+    siege.end_attack()
 
 
 def mallory(n: int) -> NodeRecord:
