@@ -144,6 +144,7 @@ def data_of(session: Session) -> Iterator[str]:
 @pytest.fixture
 def shown(qtbot, theme: Theme) -> Show:
     """Shows a panel in its dock, at its usual size."""
+    theme.apply()
 
     @contextmanager
     def show(name: str, session: Session) -> Iterator[tuple[Dock, PanelWidget]]:
@@ -163,7 +164,8 @@ def shown(qtbot, theme: Theme) -> Show:
         for _each in range(3):
             session.tick()
             dock.refresh()
-        qtbot.wait(20)
+        for _each in range(2):  # layouts come to rest
+            qtbot.wait(20)
         yield dock, widget
         widget.shut()
 

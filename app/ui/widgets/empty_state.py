@@ -100,7 +100,9 @@ class EmptyState(QWidget):
     def _fit(self) -> None:
         """In a low place the words go before the picture."""
         width = self.width() - 32
-        high = self._title.heightForWidth(width) + self._text.heightForWidth(min(width, TEXT_WIDTH)) + 4
+        text = self._text.heightForWidth(min(width, TEXT_WIDTH))
+        self._text.setMinimumHeight(max(0, text))  # else a low place takes some pixels of its last line
+        high = self._title.heightForWidth(width) + text + 4
         high += self._row.sizeHint().height() if self._buttons else 0
         self._tile.setVisible(self.height() - 2 * MARGIN >= high + TILE + BELOW_TILE)
 
