@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 
 import pytest
@@ -481,91 +480,3 @@ def test_sensors_events_and_the_blackboard(turtle):
     assert board == [{"primitive": "bumpers", "input": {"left": 1}, "robot": "Turtle"}]
     with pytest.raises(KeyError):
         body.link.sense("speed", 1)
-
-
-# ---- RIZE -----------------------------------------------------------------------------------------
-
-SAY = {"primitive": "say", "input": "hello", "options": {"contextual": True, "pitch": 50, "velocity": 50}}
-COMMAND = {
-    "node": "action", "primitives": SAY, "robots": "Turtle", "state": "idle", "times": 0,
-    "id": "acti20261120075304-0",
-}  # fmt: skip
-
-
-def test_rize_gets_its_own_object_back(turtle):
-    body, ears, _ = turtle
-    body.go_on.set()
-    ears.rize(COMMAND)
-    eventually(lambda: ears.heard["action_state"])
-    (answer,) = ears.heard["action_state"]
-    assert json.dumps(answer) == json.dumps({**COMMAND, "state": "success"})
-    assert body.done == [("say", "hello")]
-    assert ears.heard["answer"] == []
-
-
-def test_a_list_of_primitives_runs_side_by_side(turtle):
-    body, ears, clock = turtle
-    wait = {"primitive": "wait", "input": "2", "options": "none"}
-    ears.rize({**COMMAND, "primitives": [SAY, wait], "robots": ["Other", "Turtle"]})
-    body.go_on.set()
-    eventually(lambda: body.done)
-    assert ears.heard["action_state"] == []
-    eventually(lambda: clock.advance(0.5) or ears.heard["action_state"])
-    assert ears.heard["action_state"][0]["state"] == "success"
-    assert ears.heard["action_state"][0]["primitives"] == [SAY, wait]
-
-
-@pytest.mark.parametrize(
-    "primitives",
-    [
-        {"primitive": "fly", "input": "high", "options": "none"},
-        {"primitive": "wait", "input": "soon", "options": "none"},
-        {"primitive": "say", "input": "", "options": "none"},
-        {"primitive": "move", "input": "99", "options": "none"},
-        [],
-        None,
-        [SAY, {"primitive": "fly"}],
-    ],
-)
-def test_what_rize_can_not_have_is_a_failure(turtle, primitives):
-    body, ears, _ = turtle
-    body.go_on.set()
-    ears.rize({**COMMAND, "primitives": primitives})
-    eventually(lambda: ears.heard["action_state"])
-    assert ears.heard["action_state"] == [{**COMMAND, "primitives": primitives, "state": "failure"}]
-
-
-def test_numbers_come_as_text_and_go_by_name(turtle):
-    body, ears, _ = turtle
-    body.go_on.set()
-    moved = {"primitive": "move", "input": "0.75", "options": "none"}
-    lit = {"primitive": "leds", "input": "#112233", "options": {"bright": "false", "strange": 1}}
-    ears.rize({**COMMAND, "primitives": [moved, lit]})
-    eventually(lambda: ears.heard["action_state"])
-    assert ears.heard["action_state"][0]["state"] == "success"
-    assert sorted(body.done) == [("light", "#112233", False), ("move", 0.75)]
-
-
-def test_commands_for_other_robots_are_left_alone(turtle):
-    body, ears, _ = turtle
-    body.go_on.set()
-    ears.rize({**COMMAND, "robots": "Turtle2"})
-    ears.rize({**COMMAND, "robots": ["a", "b"]})
-    ears.rize({**COMMAND, "robots": None})
-    ears.rize({**COMMAND, "id": "mine"})
-    eventually(lambda: ears.heard["action_state"])
-    assert [answer["id"] for answer in ears.heard["action_state"]] == ["mine"]
-    assert body.done == [("say", "hello")]
-
-
-def test_rize_is_told_of_a_stop_and_can_cancel(turtle):
-    _, ears, _ = turtle
-    ears.rize(COMMAND)
-    eventually(lambda: ears.invoke("q", "say", text="x") or ears.states("q"))
-    ears.command(id="s", op="stop")
-    eventually(lambda: ears.heard["action_state"])
-    assert ears.heard["action_state"][0]["state"] == "failure"
-    ears.rize({**COMMAND, "id": "two"})
-    ears.rize({"node": "cancel", "robots": "Turtle", "id": "c"})
-    eventually(lambda: len(ears.heard["action_state"]) == 2)
-    assert ears.heard["action_state"][1] == {**COMMAND, "id": "two", "state": "failure"}

@@ -13,7 +13,6 @@ import psutil
 import pytest
 
 import nep
-from app.robots import rize
 from app.robots.description.description import parse
 from tests.robots.conftest import Ears, eventually
 
@@ -145,28 +144,6 @@ def test_wrong_arguments_are_told(network):
     code, errors = ended(start("-m", "app.robots.simulated", "--color", "red", network=network), 15)
     assert code == 2
     assert "--color" in errors
-
-
-def test_the_example_driver_of_rize_is_driven(network):
-    """The same 30 lines run on the original nep; here on ours, which has the paper's spelling."""
-    process = start("examples/rize_driver.py", "Turtle", network=network)
-    robot = rize.robot("Turtle")
-    try:
-        with nep.node("me", master=network) as node:
-            answers: list[object] = []
-            node.new_sub("action_state", sink=lambda batch: answers.extend(m.payload for m in batch))
-            commands = node.new_pub("robot_action")
-            eventually(lambda: "robot_action" in node.graph().topics and commands.subscribers)
-            for other in (rize.robot("Turtle2"), robot):
-                commands.publish(rize.to_command(other, "say", {"text": "hello"}, other.name))
-            commands.publish(rize.to_command(robot, "turn", {"direction": "left", "degrees": 90}, "2"))
-            eventually(lambda: len(answers) == 2)
-    finally:
-        process.kill()
-        output, _ = process.communicate()
-    read = [rize.from_answer(answer) for answer in answers]
-    assert [(answer["id"], answer["state"]) for answer in read] == [("Turtle", "succeeded"), ("2", "failed")]
-    assert output.startswith("Turtle says: hello {")
 
 
 CHATTERBOX = """

@@ -216,36 +216,6 @@ def test_reset(pepper):
     eventually(lambda: pepper.newest("state")["objects"][0]["x"] == 1.95)
 
 
-def test_rize_drives_it(pepper):
-    def primitive(name: str, given: str, options: object) -> dict[str, object]:
-        return {"primitive": name, "input": given, "options": options}
-
-    both = [
-        primitive("turn", "right", {"degrees": 20}),
-        primitive("leds", "eyes", {"R": 255, "G": 0, "B": 16}),
-    ]
-    command = {
-        "node": "action",
-        "primitives": both,
-        "robots": "Pepper",
-        "state": "idle",
-        "times": 0,
-        "id": "acti1-0",
-    }
-    pepper.rize(command)
-    eventually(lambda: pepper.heard["action_state"])
-    assert pepper.heard["action_state"] == [{**command, "state": "success"}]
-    eventually(lambda: pepper.newest("state")["theta_deg"] == -20)
-    eventually(lambda: pepper.newest("state")["eyes"] == "#ff0010")
-    pepper.rize({**command, "id": "2", "primitives": primitive("walk", "backwards", {"meters": 0.1})})
-    eventually(lambda: len(pepper.heard["action_state"]) == 2)
-    assert pepper.heard["action_state"][1]["state"] == "success"
-    eventually(lambda: pepper.newest("state")["x"] < -0.55)
-    pepper.rize({**command, "id": "3", "primitives": primitive("walk", "sideways", {"meters": 0.1})})
-    eventually(lambda: len(pepper.heard["action_state"]) == 3)
-    assert pepper.heard["action_state"][2]["state"] == "failure"
-
-
 def test_its_model_is_the_one_that_is_shipped():
     from tests.robots.test_description import model
 
