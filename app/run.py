@@ -19,14 +19,14 @@ from typing import TextIO
 import nep
 from app.blocks import Program, compile_behaviour
 from app.blocks.model.workspace import Workspace, parse_workspace
-from app.blocks.runtime.find_robots import Found, find_robots
+from app.blocks.runtime.find_robots import FoundRobots, find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.blocks.runtime.publishing import guarded
 from app.core.documents.document import read
 from app.core.robots.motion_permission import risky, wanted_by
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import StopReport
-from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, Processes
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, VirtualProcesses
 from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError
 from app.robots.description.description import Robot, parse
@@ -96,18 +96,18 @@ def run_file(
 
 def _robots_for(
     workspace: Mapping[str, object], node: nep.Node, wait_s: float, known: Sequence[Robot]
-) -> Found:
+) -> FoundRobots:
     """The robots that a behaviour names, once they are there; all that are there when it publishes."""
     wanted = robots_named(workspace)
-    found = find_robots(node, wait_s, wanted=wanted, known=known) if wanted else Found()
+    found = find_robots(node, wait_s, wanted=wanted, known=known) if wanted else FoundRobots()
     if compile_behaviour(workspace, found.robots, absent=known).publishes:
         found = find_robots(node, EVERYBODY_S, wanted=(), known=known)  # it may move any of them
     return found
 
 
-def _judged(found: Found) -> Found:
+def _judged(found: FoundRobots) -> FoundRobots:
     """The same; virtual are only robots whose programs are known to be ours (docs/trust.md)."""
-    processes = Processes(VIRTUAL_ROBOTS.values())
+    processes = VirtualProcesses(VIRTUAL_ROBOTS.values())
     robots = (
         replace(robot, virtual=robot.virtual and processes.is_ours(found.owners[robot.name]))
         if robot.name in found.owners
@@ -216,7 +216,9 @@ class _Reach:
     stopper: RobotStopper
 
 
-def _run(program: Program, found: Found, reach: _Reach, say: _Lines, interrupted: threading.Event) -> int:
+def _run(
+    program: Program, found: FoundRobots, reach: _Reach, say: _Lines, interrupted: threading.Event
+) -> int:
     stopper = reach.stopper
     told = _Told(say)
     runner = Runner(told)

@@ -43,7 +43,7 @@ from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.stop import RobotStopper, StopTarget
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
-from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, CompanionFailed, Companions, Processes
+from app.core.robots.virtual_processes import VIRTUAL_ROBOTS, CompanionFailed, Companions, VirtualProcesses
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.core.storage.settings import Settings
@@ -90,7 +90,7 @@ class Session:
         self.images = Images(self.watch, clock)
         self.source: Source = source if source is not None else self._live_network()
         modules = VIRTUAL_ROBOTS.values()
-        processes = Processes(modules, lambda: self.companions.process_ids)
+        processes = VirtualProcesses(modules, lambda: self.companions.process_ids)
         self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["MOST", "Frequency", "Traffic", "Window"]
+__all__ = ["MOST", "Bandwidth", "Frequency", "Window"]
 
 MOST = 100_000
 """Messages that a window holds at most; a faster topic is measured over a shorter time."""
@@ -27,7 +27,7 @@ class Frequency:
 
 
 @dataclass(frozen=True)
-class Traffic:
+class Bandwidth:
     """How much: bytes a second, and the mean, smallest and largest size of a message (bytes)."""
 
     bandwidth_Bps: float  # noqa: N815 - B/s
@@ -65,7 +65,7 @@ class Window:
         deviation = math.sqrt(sum((gap - mean) ** 2 for gap in gaps) / len(gaps))
         return Frequency(1 / mean, min(gaps), max(gaps), deviation, len(moments))
 
-    def traffic(self, now: float) -> Traffic | None:
+    def traffic(self, now: float) -> Bandwidth | None:
         """None as long as there are fewer than two messages."""
         recent = self._recent(now)
         if len(recent) < 2:
@@ -76,7 +76,7 @@ class Window:
             return None
         # the first message came at the beginning of the span: it belongs to the time before
         bandwidth = sum(sizes[1:]) / span
-        return Traffic(bandwidth, sum(sizes) / len(sizes), min(sizes), max(sizes), len(sizes))
+        return Bandwidth(bandwidth, sum(sizes) / len(sizes), min(sizes), max(sizes), len(sizes))
 
     def _recent(self, now: float) -> Sequence[tuple[float, float, int]]:
         with self._lock:

@@ -14,7 +14,7 @@ import typer
 
 from nep.cli.complete import complete_topic
 from nep.cli.graphs import Waiting, node_for
-from nep.cli.measure import Frequency, Traffic, Window
+from nep.cli.measure import Bandwidth, Frequency, Window
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
 from nep.errors import WaitTimeoutError
@@ -93,7 +93,7 @@ class _Report:
         topics: Sequence[str],
         window_s: float,
         heads: Sequence[str],
-        figures: Callable[[Window, float], tuple[Frequency | Traffic | None, Sequence[str]]],
+        figures: Callable[[Window, float], tuple[Frequency | Bandwidth | None, Sequence[str]]],
     ) -> None:
         self._windows = {topic: Window(window_s) for topic in topics}
         self._heads = heads
@@ -175,7 +175,7 @@ def _frequency_cells(window: Window, now: float) -> tuple[Frequency | None, Sequ
     return found, (rate(found.rate_hz), *(gap(each) for each in (found.min_s, found.max_s, found.std_s)))
 
 
-def _traffic_cells(window: Window, now: float) -> tuple[Traffic | None, Sequence[str]]:
+def _traffic_cells(window: Window, now: float) -> tuple[Bandwidth | None, Sequence[str]]:
     found = window.traffic(now)
     if found is None:
         return None, (UNKNOWN,) * 4

@@ -17,7 +17,7 @@ import pytest
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion_permission import MayNotMoveError, Moving
-from app.core.robots.virtual_processes import Processes
+from app.core.robots.virtual_processes import VirtualProcesses
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
@@ -56,17 +56,17 @@ def process() -> Iterator[subprocess.Popen[bytes]]:
 
 
 def test_a_process_that_was_started_here_is_ours(process: subprocess.Popen[bytes]) -> None:
-    known = Processes(MODULES, lambda: [process.pid])
+    known = VirtualProcesses(MODULES, lambda: [process.pid])
     assert known.is_ours(Identity("n", "Turtle", HERE, process.pid))
     assert known.is_ours(Identity("n", "Turtle", HERE, os.getpid()))
 
 
 def test_a_process_that_only_names_the_module_is_not(process: subprocess.Popen[bytes]) -> None:
-    assert not Processes(MODULES).is_ours(Identity("n", "Turtle", HERE, process.pid))
+    assert not VirtualProcesses(MODULES).is_ours(Identity("n", "Turtle", HERE, process.pid))
 
 
 def test_who_is_elsewhere_or_nowhere_is_not(process: subprocess.Popen[bytes]) -> None:
-    known = Processes(MODULES, lambda: [process.pid])
+    known = VirtualProcesses(MODULES, lambda: [process.pid])
     assert not known.is_ours(Identity("n", "Turtle", "another-computer", process.pid))
     assert not known.is_ours(Identity("n", "Turtle", HERE, None))
     assert not known.is_ours(Identity("n", "Turtle", HERE, 2**31 - 1))
@@ -77,8 +77,10 @@ def test_a_virtual_robot_of_another_studio_of_this_person_is_ours(master: Master
     command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle", "--owner-pid", str(os.getpid())]
     made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
     try:
-        assert Processes(MODULES).is_ours(Identity("n", "Turtle", HERE, made.pid))
-        assert not Processes(("app.robots.simulated",)).is_ours(Identity("n", "Turtle", HERE, made.pid))
+        assert VirtualProcesses(MODULES).is_ours(Identity("n", "Turtle", HERE, made.pid))
+        assert not VirtualProcesses(("app.robots.simulated",)).is_ours(
+            Identity("n", "Turtle", HERE, made.pid)
+        )
     finally:
         made.terminate()
         made.wait(10)
@@ -87,7 +89,7 @@ def test_a_virtual_robot_of_another_studio_of_this_person_is_ours(master: Master
 def test_whether_a_process_has_ended_is_known_of_this_computer_only(
     process: subprocess.Popen[bytes],
 ) -> None:
-    known = Processes(MODULES)
+    known = VirtualProcesses(MODULES)
     identity = Identity("n", "Turtle", HERE, process.pid)
     assert not known.has_ended(identity)
     process.kill()
@@ -105,7 +107,9 @@ STRANGE = Identity("1", "rover driver", "lab-2", 7)
 @pytest.fixture
 def fleet(tmp_path: Path) -> Fleet:
     watches = Watches(lambda _topic: None, lambda _topic: None)
-    return Fleet(watches, lambda _what, _job: None, settings=Settings(tmp_path), processes=Processes(MODULES))
+    return Fleet(
+        watches, lambda _what, _job: None, settings=Settings(tmp_path), processes=VirtualProcesses(MODULES)
+    )
 
 
 def turtle(*, virtual: bool = True) -> Robot:

@@ -15,7 +15,7 @@ import pytest
 from PySide6.QtCore import QMessageLogContext, QtMsgType
 
 from app.core.faults import IN_CONSOLE, LogFile
-from app.ui.startup.qt_log import FLAGS, Log, Terminal, on_qt_message, quiet_chromium
+from app.ui.startup.qt_log import FLAGS, Log, TerminalHandler, on_qt_message, quiet_chromium
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ class Stuck(io.StringIO):
 
 def test_a_terminal_that_takes_nothing_does_not_stop_the_window():
     stuck = Stuck()
-    handler = Terminal(stuck)
+    handler = TerminalHandler(stuck)
     for n in range(1000):
         handler.handle(
             logging.makeLogRecord({"name": "qt", "levelno": logging.WARNING, "msg": f"no. {n}\x1b[2J"})

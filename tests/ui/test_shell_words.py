@@ -22,7 +22,7 @@ from app.core.storage.settings import Settings
 from app.ui.application import translate_qt, why_not
 from app.ui.shell.actions.shortcuts import FIXED
 from app.ui.shell.bars.app_bar import robots_chip
-from app.ui.shell.bars.status_bar import Facts
+from app.ui.shell.bars.status_bar import StatusFacts
 from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.dialogs.command_palette import Palette
 from app.ui.shell.dialogs.motion_permission import MotionQuestion
@@ -311,7 +311,7 @@ def test_the_chip_of_robots(pseudo, states: tuple[str, ...], run: str) -> None:
 
 @pytest.mark.parametrize("session", [fakes.Session, fakes.Session.full], ids=["empty", "full"])
 def test_the_facts_of_the_status_bar(pseudo, session) -> None:
-    facts = Facts(session())
+    facts = StatusFacts(session())
     told = [facts.health(), facts.saved(), facts.topics(), facts.master(), facts.traffic()]
     told += [facts.lost(), facts.shown(), facts.window()]
     for alert in list(facts._session.alerts.active):

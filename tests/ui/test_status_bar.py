@@ -9,7 +9,7 @@ import pytest
 
 from app.core.network.master import MasterState
 from app.ui.shell.bars.app_bar import robots_chip
-from app.ui.shell.bars.status_bar import Facts, StatusBar
+from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
 from app.ui.theme.theme import Theme
 from tests.ui import fakes
 
@@ -30,8 +30,8 @@ def session() -> fakes.Session:
     return fakes.Session.full()
 
 
-def facts(session: object) -> Facts:
-    return Facts(session, clock=time.gmtime)  # type: ignore[arg-type]
+def facts(session: object) -> StatusFacts:
+    return StatusFacts(session, clock=time.gmtime)  # type: ignore[arg-type]
 
 
 def test_health_names_the_alerts_before_the_robots(session: fakes.Session) -> None:

@@ -55,7 +55,7 @@ class GraphNode(Protocol):
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundRobots:
     """The robots that are there, by name; ``owners`` are the programs that they are.
 
     ``claims`` say what programs tell of themselves and is not believed, as sentences.
@@ -87,7 +87,7 @@ def find_robots(
     known: Sequence[Robot] = (),
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
-) -> Found:
+) -> FoundRobots:
     """The robots that announce themselves, each on its own topic, by the program that was first.
 
     With `wanted` it waits until those are there, `timeout_s` at most; else it takes who is there at once.
@@ -154,7 +154,7 @@ def _hear(each: _Topic, topic: str, senders: Senders) -> None:
     each.robot = None if each.wrong else robot
 
 
-def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> Found:
+def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRobots:
     """The result, with what is not believed in words; a robot with another one's topics is left out."""
     claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
     claims += [
@@ -182,4 +182,4 @@ def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> Found:
         for each in asked.values()
         if each.robot is not None and each.robot.name in robots
     }
-    return Found(tuple(robots.values()), owners, tuple(claims))
+    return FoundRobots(tuple(robots.values()), owners, tuple(claims))

@@ -37,7 +37,7 @@ LEFT = "to_go"
 """The feedback with which an action says how much is left, in the unit of one of its parameters."""
 
 
-class Stage(Protocol):
+class ProgramContext(Protocol):
     """What a robot's handle needs of the program that runs."""
 
     scheduler: Scheduler
@@ -71,7 +71,7 @@ class Stage(Protocol):
 class RobotHandle:
     """``robot("Pepper")``."""
 
-    def __init__(self, name: str, runtime: Stage) -> None:
+    def __init__(self, name: str, runtime: ProgramContext) -> None:
         self._name = name
         self._runtime = runtime
 

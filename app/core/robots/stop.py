@@ -70,7 +70,7 @@ class StopPublisher(Protocol):
         ...
 
 
-class Subscriber(Protocol):
+class StopSubscriber(Protocol):
     """What is needed of NEP's subscriber."""
 
     def close(self) -> None:
@@ -89,7 +89,7 @@ class StopNode(Protocol):
 
     def new_sub(
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
-    ) -> Subscriber:
+    ) -> StopSubscriber:
         """A subscriber whose messages go to `sink`, in the node's thread."""
         ...
 
@@ -122,7 +122,7 @@ class _Way:
     """Where one robot is told to stop, and where it answers."""
 
     publisher: StopPublisher
-    subscriber: Subscriber | None
+    subscriber: StopSubscriber | None
 
     def close(self) -> None:
         self.publisher.close()

@@ -229,7 +229,7 @@ def _tail(log: IO[bytes]) -> str:
     return log.read().decode("utf-8", "replace").strip()
 
 
-class Processes:
+class VirtualProcesses:
     """Looks at processes of this computer. One thread uses it; what was found out about one is kept."""
 
     def __init__(self, modules: Collection[str], started: Callable[[], Collection[int]] = tuple) -> None:

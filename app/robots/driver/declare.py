@@ -289,7 +289,7 @@ class Kind:
             raise DescriptionError(self.model, (_("exactly one method must be marked with safe_stop"),))
         return found[0]
 
-    def _twice(self, lines: Mapping[str, list[Line]]) -> list[str]:
+    def _twice(self, lines: Mapping[str, list[SourceLine]]) -> list[str]:
         """A sentence for each declared thing whose name the class gives again, which would hide the first."""
         declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
         twice = [(name, found) for name, found in lines.items() if len(found) > 1 and name in declared]
@@ -360,7 +360,7 @@ def _described(schema: Callable[[Described], Schema], kind: Described) -> Schema
         frame = sys._getframe(1)  # noqa: SLF001 - the documented way to who calls
         while frame.f_back is not None and frame.f_code.co_filename == __file__:
             frame = frame.f_back
-        where = Line(Path(frame.f_code.co_filename).name, frame.f_lineno)
+        where = SourceLine(Path(frame.f_code.co_filename).name, frame.f_lineno)
         raise DeclarationError("", str(error), str(where)) from error
 
 
@@ -372,7 +372,7 @@ def _given(found: Mapping[str, object]) -> Schema:
     return {name: value for name, value in found.items() if value is not None}
 
 
-def _with_line(problem: str, lines: Mapping[str, list[Line]]) -> str:
+def _with_line(problem: str, lines: Mapping[str, list[SourceLine]]) -> str:
     """A problem of the description, which begins with the path of what is wrong, with the line of that."""
     path = problem.replace(":", ".").split(" ")[0].split(".")
     found = lines.get(path[1]) if len(path) > 1 and path[0] in {"actions", "properties", "events"} else None
@@ -380,7 +380,7 @@ def _with_line(problem: str, lines: Mapping[str, list[Line]]) -> str:
 
 
 @dataclass(frozen=True)
-class Line:
+class SourceLine:
     """A line of a file, as people look it up: ``table.py, line 12``."""
 
     file: str
@@ -391,13 +391,13 @@ class Line:
         return _("{file}, line {number}").format(file=self.file, number=self.number)
 
 
-def line_of(function: object) -> Line | None:
+def line_of(function: object) -> SourceLine | None:
     """Where a function begins; None for what was not written in Python."""
     code = getattr(inspect.unwrap(function), "__code__", None) if callable(function) else None
-    return None if code is None else Line(Path(code.co_filename).name, code.co_firstlineno)
+    return None if code is None else SourceLine(Path(code.co_filename).name, code.co_firstlineno)
 
 
-def lines_of(body: type) -> dict[str, list[Line]]:
+def lines_of(body: type) -> dict[str, list[SourceLine]]:
     """The lines at which a class gives each of its names something; empty where its source can't be read.
 
     What a property's setter or an overload gives again is no second name.
@@ -408,11 +408,11 @@ def lines_of(body: type) -> dict[str, list[Line]]:
         tree = ast.parse(textwrap.dedent("".join(lines)))
     except (OSError, TypeError, SyntaxError, ValueError):
         return {}
-    found: dict[str, list[Line]] = {}
+    found: dict[str, list[SourceLine]] = {}
     (declared,) = tree.body
     for statement in declared.body if isinstance(declared, ast.ClassDef) else ():
         for name in _names_given(statement):
-            found.setdefault(name, []).append(Line(file, first + statement.lineno - 1))
+            found.setdefault(name, []).append(SourceLine(file, first + statement.lineno - 1))
     return found
 
 

@@ -136,7 +136,7 @@ def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Seen:
+class ColourPatch:
     """The largest patch of a colour: ``x`` from -1 (left) to 1, ``area`` as a share of the picture."""
 
     name: str
@@ -144,7 +144,7 @@ class Seen:
     area: float
 
 
-def colours_in(picture: Picture) -> dict[str, Seen]:
+def colours_in(picture: Picture) -> dict[str, ColourPatch]:
     """The colours of a BGR picture that fill at least 0.4 % of it in one piece."""
     height, width = picture.shape[:2]
     hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
@@ -161,5 +161,5 @@ def colours_in(picture: Picture) -> dict[str, Seen]:
         area = float(parts[largest, cv2.CC_STAT_AREA]) / (width * height)
         if area >= LEAST_AREA:
             x = float(middles[largest][0]) / width * 2 - 1
-            found[name] = Seen(name, round(x, 3), round(area, 4))
+            found[name] = ColourPatch(name, round(x, 3), round(area, 4))
     return found

@@ -17,7 +17,7 @@ from app.ui.shell.bars.app_bar import AppBar, robots_chip
 from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
 from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
-from app.ui.shell.bars.status_bar import Facts, StatusBar
+from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.shell import START
@@ -72,7 +72,7 @@ class MainWindow(QMainWindow):
         self.on_shut: Callable[[], object] = lambda: None
         self._showing = ""
         self.benches: dict[str, Workbench] = {}
-        self._facts = Facts(session)
+        self._facts = StatusFacts(session)
         self._alerts_seen = -1
         self._ticks = self._halves = 0
         self._twice = False  # the timer runs twice as often as the tick

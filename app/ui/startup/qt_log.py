@@ -92,7 +92,7 @@ class Log(logging.Handler):
             add(*self._kept.popleft())
 
 
-class Terminal(logging.StreamHandler[terminal.Terminal]):
+class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
     """Warnings and errors on the standard error output, with the traceback of what is new.
 
     Nobody waits for it, the window's thread least of all: a terminal may take nothing for hours.
@@ -127,7 +127,7 @@ def listen() -> Log:
     qInstallMessageHandler(on_qt_message)
     root = logging.getLogger()
     if not root.handlers:
-        root.addHandler(Terminal(sys.stderr))
+        root.addHandler(TerminalHandler(sys.stderr))
     log = Log()
     root.addHandler(log)
     root.addHandler(faults.LogFile(faults.log_folder()))

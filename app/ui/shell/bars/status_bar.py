@@ -28,7 +28,7 @@ def _worst(found: Iterable[str]) -> tuple[str, str]:
     return ("circle-x", "error") if "error" in found else ("triangle-alert", "warn")
 
 
-class Facts:
+class StatusFacts:
     """Reads the session and says it in a few words."""
 
     def __init__(self, session: Session, clock: Callable[[float], time.struct_time] = time.localtime) -> None:

@@ -10,7 +10,7 @@ from nep.i18n import lazy
 
 
 @dataclass(frozen=True)
-class Column:
+class DockColumn:
     """Panels above each other: (names that share a place, height). ``width`` 0 takes the rest."""
 
     width: int
@@ -30,7 +30,7 @@ class Layout:
     title: str
     icon: str
     density: Density
-    columns: tuple[Column, ...]
+    columns: tuple[DockColumn, ...]
     narrow: tuple[str, str]
     homes: Mapping[str, str]
     brings: Mapping[str, str] = field(default_factory=dict)
@@ -47,8 +47,8 @@ BEHAVIOUR = Layout(
     "blocks",
     "comfortable",
     (
-        Column(0, ((("behaviour",), 626), (("problems",), 124))),
-        Column(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190))),
+        DockColumn(0, ((("behaviour",), 626), (("problems",), 124))),
+        DockColumn(384, ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190))),
     ),
     ("robot", "camera"),
     {
@@ -68,9 +68,9 @@ DEVELOPER = Layout(
     "activity",
     "compact",
     (
-        Column(640, ((("topics",), 780),)),
-        Column(330, ((("inspector",), 780),)),
-        Column(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
+        DockColumn(640, ((("topics",), 780),)),
+        DockColumn(330, ((("inspector",), 780),)),
+        DockColumn(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
     ("topics", "inspector"),
     {"robots": "topics", "doctor": "topics", "robot": "image", "camera": "image", "health": "console"},
