@@ -38,6 +38,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import StatusItem
 from app.ui.widgets.lists.entry_list import EntryList, Heading
+from nep import i18n
 from nep.i18n import _
 from nep.system.addresses import OwnAddress
 from tests.pseudo import texts_of, untranslated
@@ -55,7 +56,7 @@ EXAMPLES = read_examples(resources.folder() / "examples")
 DATA = (
     *(text for each in EXAMPLES for text in (each.name, each.text)),
     *(title for title, _accepts in NAMES.values()),
-    "Greeting", "Mine", "Rover", "Turtle", "topic list", "NEP_MASTER", "wlan0", "tun0", "lo", "[Pseudo]",
+    "Greeting", "Mine", "Rover", "Turtle", "topic list", "NEP_MASTER", "wlan0", "tun0", "lo",
 )  # fmt: skip
 """What comes from elsewhere: plain panels, which nobody translates, files and robots."""
 KEYS = ("Delete", "PgUp", "PgDown")
@@ -151,9 +152,10 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
 def test_the_window_says_every_word_in_the_chosen_language(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     found: set[str] = set()
     paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(snapshots.folder(whole.session.settings)))
+    languages = [name for _code, name in i18n.offered()]  # each is called what it calls itself
 
     def look(what: str, root: QWidget) -> None:
-        found.update(f"{what}: {each}" for each in forgotten(root, *paths))
+        found.update(f"{what}: {each}" for each in forgotten(root, *paths, *languages))
 
     everything(qtbot, whole, look)
     assert "\n".join(sorted(found)) == ""
