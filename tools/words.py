@@ -51,7 +51,8 @@ FOREIGN = (
     "Aborted!", "Aborted.", "Arguments", "Commands", "Error", "Missing command.",
     "No such command {name!r}.", "Options", "Show this message and exit.",
     "Try [blue]'{command_path} {help_option}'[/] for help.", "[default: {}]", "[required]",
-    "options", "positional arguments", "show this help message and exit",
+    "options", "positional arguments", "show program's version number and exit",
+    "show this help message and exit",
 )  # fmt: skip
 """What typer and argparse say themselves, by gettext too."""
 FORMATS = {"es": "es_419"}
