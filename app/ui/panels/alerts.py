@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.text.numbers import grouped
 from app.ui.widgets import Chip, EmptyState
-from app.ui.widgets.alert_box import AlertRow
+from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.lists.scroll_areas import PanelRows
 from nep.i18n import _, lazy, ngettext
 

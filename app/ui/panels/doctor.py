@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction, QGuiApplication
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.widgets import Chip, EmptyState, IconButton
-from app.ui.widgets.alert_box import AlertRow
+from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.lists.scroll_areas import PanelRows
 from nep.doctor import report
 from nep.i18n import _, lazy

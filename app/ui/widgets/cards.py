@@ -1,16 +1,24 @@
-"""Surfaces that hold other widgets, and the tile of an action or a block."""
+"""Surfaces: cards, the tile of an action or a block, and alerts in the colours of their severity.
+
+The banner is such an alert, and so are the rows of alerts and findings.
+"""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QFrame, QWidget
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.buttons import Button
+from app.ui.widgets.indicators import spoken
+from app.ui.widgets.labels import label
+from nep.i18n import _
 
 TILE = 28
+BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 
 
 class Card(QFrame):
@@ -44,3 +52,98 @@ class Tile(QWidget):
         ink = self._theme.block_text(self._category)
         paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), self._icon, ink)
         painter.end()
+
+
+class AlertBox(QWidget):
+    """Tint, border and icon of a status, words, and buttons beside them or, in narrow places, below."""
+
+    icon_side, icon_left, left, high, gap = 18, 12, 40, 10, 10
+    least_words = 220  # px at 100 % that the words have beside the buttons
+
+    def __init__(self, theme: Theme, *, framed: bool = True) -> None:
+        """What is not ``framed`` is well: only its icon says what it is."""
+        super().__init__()
+        self._theme, self._framed = theme, framed
+        self._status = "info"
+        self.text_column, self.button_row = QVBoxLayout(), QHBoxLayout()
+        self.button_row.setSpacing(self.gap)
+        self._whole = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        high = self.high if framed else 4
+        self._whole.setContentsMargins(self.left, high, 12, high)
+        self._whole.setSpacing(self.gap)
+        self._whole.addLayout(self.text_column, 1)
+        self._whole.addLayout(self.button_row)
+
+    def set_status(self, status: str) -> None:
+        """Show the colours and the icon of another status."""
+        self._status = status
+        self.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.LayoutRequest:
+            self._fit()
+        return super().event(event)
+
+    def _fit(self) -> None:
+        """Large or long words: the buttons go below them."""
+        room = self.width() - self.button_row.sizeHint().width()
+        beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.least_words)
+        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        if self._whole.direction() != wanted:
+            self._whole.setDirection(wanted)
+            right = Qt.AlignmentFlag.AlignRight
+            self._whole.setAlignment(self.button_row, Qt.AlignmentFlag(0) if beside else right)
+
+    def icon_top(self) -> float:
+        """How far below its upper edge the icon is."""
+        return 11.0 if self._framed else 4.0
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        status = theme.status(self._status)
+        if self._framed:
+            edge = theme.colour(BORDERS.get(self._status, "borderStrong"))
+            fill = theme.colour(status.tint or "panel")
+            paint.box(painter, QRectF(self.rect()), theme.radius("panel"), fill, edge)
+        square = QRectF(self.icon_left, self.icon_top(), self.icon_side, self.icon_side)
+        paint_icon(painter, square, status.icon, theme.colour(status.colour))
+        painter.end()
+
+
+class AlertRow(AlertBox):
+    """One of several: what is wrong in bold, what it means, what to type, since when, and its next step."""
+
+    def __init__(self, theme: Theme, *, framed: bool = True) -> None:
+        super().__init__(theme, framed=framed)
+        self.text_column.setSpacing(2)
+        self._lines = (
+            label("", "title" if framed else "body", wrap=True),
+            label("", "body", role="textSecondary", wrap=True),
+            label("", "code", role="textSecondary", wrap=True),
+            label("", "small", role="textTertiary"),
+        )
+        self._lines[2].setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        for line in self._lines:
+            self.text_column.addWidget(line)
+        self.button = Button(theme, "", size="small")
+        self.button_row.addWidget(self.button)
+
+    def say(
+        self, status: str, title: str, detail: str, *, command: str = "", note: str = "", button: str = ""
+    ) -> None:
+        """Show this, without what is empty; the button stays, also under a mouse that is pressed."""
+        self.set_status(status)
+        for line, text in zip(self._lines, (title, detail, command, note), strict=True):
+            line.setText(text)
+            paint.show_when(line, bool(text))
+        self.button.set_word(button)
+        paint.show_when(self.button, bool(button))
+        said = _("{status}: {sentence}").format(status=spoken(status), sentence=f"{title} {detail}".strip())
+        self.setAccessibleName(said)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(160, super().minimumSizeHint().height())

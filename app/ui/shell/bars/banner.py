@@ -19,8 +19,8 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.alert_box import AlertBox
 from app.ui.widgets.buttons import Button, IconButton
+from app.ui.widgets.cards import AlertBox
 from app.ui.widgets.labels import label
 from nep.i18n import _, ngettext
 
