@@ -95,6 +95,8 @@ def template(root: Path = ROOT) -> Catalog:
         made.add(english, locations=[("nep/cli", 0)])
     for english, place in sentences_of_robots(root):
         made.add(english, locations=[(place, 0)], context="robot")
+    for english, place in sentences_of_examples(root):
+        made.add(english, locations=[(place, 0)], context="about an example")
     for context, english, place in sentences_of_blocks():
         made.add(english, locations=[(place, 0)], context=context)
     return made
@@ -109,6 +111,12 @@ def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
         for english in _of_description(json.loads(path.read_text(encoding="utf-8")), is_inside=False):
             if has_words(english):
                 yield english, place
+
+
+def sentences_of_examples(root: Path) -> Iterator[tuple[str, str]]:
+    """(What it does, its file) of each example that we ship."""
+    for path in sorted((root / "resources" / "examples").glob("*.nepb")):
+        yield json.loads(path.read_text(encoding="utf-8"))["description"], path.relative_to(root).as_posix()
 
 
 def _of_description(value: object, *, is_inside: bool) -> Iterator[str]:

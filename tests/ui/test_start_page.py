@@ -20,7 +20,9 @@ from app.ui.text.dates import day_words
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 from app.ui.widgets.buttons import LinkButton
+from nep.i18n import PSEUDO, install
 from tests.ui.shell_parts import examples
+from tools.words import compile_all, extract
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 NOW = dt.datetime(2026, 11, 20, 9, 0, tzinfo=dt.timezone.utc)
@@ -126,6 +128,14 @@ def test_the_shipped_examples_are_read_with_their_blocks() -> None:
         assert example.text
         assert len(example.rows) >= 3
         assert example.rows[0].category == "events"
+
+
+def test_what_an_example_does_is_said_in_the_language_of_studio(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("nep.i18n._now", None)
+    extract(tmp_path)
+    compile_all(tmp_path)
+    install(PSEUDO, tmp_path)
+    assert all(each.text.startswith("[") for each in read_examples(resources.folder() / "examples"))
 
 
 def test_a_damaged_example_is_left_out(tmp_path: Path) -> None:

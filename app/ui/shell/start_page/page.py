@@ -28,7 +28,7 @@ from app.ui.shell.start_page.preview import Row, rows
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.buttons import LinkButton
-from nep.i18n import _, lazy, ngettext
+from nep.i18n import _, lazy, ngettext, pgettext
 
 WIDTH = 1080
 BANNER_ROOM = 40
@@ -67,7 +67,7 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
         except (OSError, ValueError, KeyError, TypeError):
             continue
         if isinstance(workspace, dict):
-            text = str(data.get("description", ""))
+            text = pgettext("about an example", str(data.get("description", "")))
             found.append(Example(path, str(data.get("name", path.stem)), text, rows(workspace)))
     return tuple(found)
 
