@@ -184,6 +184,7 @@ def at_its_start(kind: Kind, name: str) -> Iterator[Bench]:
 @pytest.fixture(scope="module")
 def shared(kind: Kind) -> Iterator[Bench]:
     with at_its_start(kind, f"The {kind.model}") as bench:
+        bench.stop()  # an async one begins the robot's event loop, which lasts as long as the robot
         yield bench
 
 
