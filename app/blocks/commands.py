@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import sys
 
-from app.blocks.runtime import calls, lists, values
+from app.blocks.runtime import lists, values
 from app.blocks.runtime.find_robots import find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.blocks.runtime.network import Network
-from app.blocks.runtime.runtime import Runtime
+from app.blocks.runtime.runtime import Runtime, stop_script
 from nep import node as new_node
 from nep.i18n import _
 from nep.system.streams import prepare_streams
@@ -39,7 +39,6 @@ on_true = _runtime.on_true
 publish = _runtime.publish
 robot = _runtime.robot
 stop_program = _runtime.stop_program
-stop_script = calls.stop_script
 wait = _runtime.wait
 wait_until = _runtime.wait_until
 write = _runtime.write

@@ -16,7 +16,6 @@ from types import SimpleNamespace
 import numpy as np
 
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
-from app.blocks.runtime.heartbeat import Heartbeat
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents import document as document_module
@@ -33,6 +32,7 @@ from app.core.robots import fleet as fleet_module
 from app.core.robots import robot_link as link_module
 from app.robots.description.inputs import Choice, Parameter
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
+from app.robots.heartbeat import Heartbeat
 from nep.doctor import Finding
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from typing import Protocol
 
-from app.blocks.runtime.heartbeat import Heartbeat
 from app.blocks.runtime.link import LAST_STATES, STATES, RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
 from app.robots import rize
 from app.robots.description.description import Robot
+from app.robots.heartbeat import Heartbeat
 from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
 from nep.errors import NepError
 from nep.i18n import _

@@ -1,4 +1,4 @@
-"""What a program may call: robots, waiting, topics, and how its scripts begin.
+"""What a program may call: robots, waiting, topics, its own functions, and how its scripts begin.
 
 One `Runtime` runs one program. The compiler's names (`namespace`) are its methods and the functions of
 `app.blocks.runtime.values`.
@@ -6,18 +6,17 @@ One `Runtime` runs one program. The compiler's names (`namespace`) are its metho
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 
 from app.blocks.runtime import lists, values
-from app.blocks.runtime.calls import Calls, EndScript, stop_script
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.link import ProgramLink
-from app.blocks.runtime.robot_handle import RobotHandle
+from app.blocks.runtime.robot_handle import RobotHandle, StatusText
 from app.blocks.runtime.scheduler import Scheduler, Stopped
-from app.blocks.runtime.status_text import StatusText
 from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
@@ -39,6 +38,49 @@ Decorator = Callable[[Script], Script]
 
 MESSAGES_WAITING = 16
 EVENTS_WAITING = 1
+MOST_DEEP = 200
+"""How deep functions may call each other."""
+_FRAMES = 6000  # Python's own limit: a call of ours with its values takes up to a dozen of its calls
+
+
+class EndScript(Stopped):
+    """Raised by "stop this script" inside a function: the script ends, the others go on."""
+
+
+def stop_script() -> None:
+    """End the script from inside a function."""
+    raise EndScript
+
+
+class Calls:
+    """Runs the functions of one program: how deep they are, and where the script is after one of them."""
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        self._scheduler = scheduler
+        self._mine = threading.local()
+
+    def begin(self) -> None:
+        """Let Python go as deep as functions may; for the whole process, which is the program's."""
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), _FRAMES))
+
+    def run(self, block: str, name: str, call: Callable[[], object]) -> object:
+        """Call; BehaviourError when functions call each other too deep."""
+        depth = int(getattr(self._mine, "depth", 0))
+        if depth >= MOST_DEEP:
+            raise BehaviourError(
+                _("“{name}” uses itself more than {count} times, one inside the other.").format(
+                    name=name, count=MOST_DEEP
+                ),
+                block,
+            )
+        self._mine.depth = depth + 1
+        before = self._scheduler.block()
+        try:
+            result = call()
+        finally:
+            self._mine.depth = depth
+        self._scheduler.return_to(before)
+        return result
 
 
 class Runtime:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from app.blocks.runtime.heartbeat import Heartbeat
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
@@ -25,6 +24,7 @@ from app.core.storage.settings import Settings
 from app.errors import AppError, RobotInputError, RobotUnknownError
 from app.robots import rize
 from app.robots.description.description import Robot, topic_of
+from app.robots.heartbeat import Heartbeat
 from app.robots.identity import (
     GATEWAY,
     Identity,
