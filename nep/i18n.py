@@ -163,14 +163,20 @@ def install(wanted: str, folder: Path = LOCALE) -> _Words:
 def begin(chosen: str = "") -> None:
     """At the start of a program: use NEP_LANG, else what a person has `chosen`, else the computer's language.
 
-    The programs that this one starts follow it; so do the words of Python's own command lines.
+    The computer's counts only when it is offered: nobody gets a half translated program unasked. The
+    programs that this one starts follow it; so do the words of Python's own command lines.
     """
-    install(os.environ.get(LANG_VARIABLE) or chosen or system_language())
+    install(os.environ.get(LANG_VARIABLE) or chosen or _computers_language())
     os.environ[LANG_VARIABLE] = language()
     if language() != ENGLISH:
         os.environ["LANGUAGE"] = language()
         _standard().bindtextdomain(DOMAIN, str(LOCALE))
         _standard().textdomain(DOMAIN)
+
+
+def _computers_language() -> str:
+    found = best_match(system_language())
+    return found if found in dict(offered()) else ENGLISH
 
 
 def editor_words(folder: Path = LOCALE) -> Mapping[str, str]:

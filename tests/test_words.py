@@ -203,6 +203,22 @@ def test_nep_lang_comes_before_what_was_chosen(monkeypatch) -> None:
     assert i18n.language() == "en"
 
 
+@pytest.mark.parametrize(("share", "expected"), [(0.9, "es"), (0.89, "en")])
+def test_the_computers_language_counts_when_it_is_offered(share, expected, spanish, monkeypatch) -> None:
+    monkeypatch.setenv("NEP_LANG", "")
+    monkeypatch.setenv("LANGUAGE", "es_MX")
+    known = {"en": {"share": 1.0}, "es": {"share": share}}
+    monkeypatch.setattr(i18n, "known_languages", lambda _folder: known)
+    i18n.begin()
+    assert i18n.language() == expected
+    monkeypatch.setenv("NEP_LANG", "")
+    i18n.begin("es")
+    assert i18n.language() == "es"
+    monkeypatch.setenv("NEP_LANG", "es_MX")
+    i18n.begin("en")
+    assert i18n.language() == "es"
+
+
 def test_the_pseudo_language_is_offered_only_while_it_is_used(pseudo, tmp_path) -> None:
     install("en")
     assert "qps" not in dict(i18n.offered())
