@@ -70,6 +70,10 @@ def test_who_comes_late_sees_the_last_errors_first_and_each_once(master, capfd):
 
 def test_an_error_that_comes_while_one_looks_is_shown_once(busy, capfd):
     log("error", "other", 1, busy)
+    with nep.node("looker", master=busy) as looker:  # it is kept a moment after it was told
+        eventually(lambda: LAST_ERRORS_TOPIC in looker.graph().topics)
+        with looker.new_sub(LAST_ERRORS_TOPIC) as kept:
+            assert kept.listen(timeout_s=30.0)[0]
     log("error", "other", 1, busy)  # the same one, which is kept
     assert capfd.readouterr().out.count("not mine") == 2
 

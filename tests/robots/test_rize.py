@@ -225,7 +225,7 @@ def test_a_program_and_a_driver_understand_each_other(speaker):
             assert (refused.state, refused.error) == ("failed", f"{robot.name} could not mode")
         finally:
             program.close()
-    assert [answer["state"] for answer in speaker.answers] == ["success", "failure"]
+    assert [answer["state"] for answer in speaker.answered(2)] == ["success", "failure"]
 
 
 # ---- one driver ------------------------------------------------------------------------------------------
