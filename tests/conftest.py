@@ -27,26 +27,26 @@ USUAL_S = 0.2
 """What a test takes, all in all, ..."""
 LONG_S = {
     "ports": 210.0,
-    "tests/core/test_run_file.py": 100.0,
+    "tests/core/run/test_run_file.py": 100.0,
     "tests/e2e/test_soak.py": 63.0,
     "tests/e2e/test_behaviour.py": 56.0,
     "tests/e2e/test_stop.py": 44.0,
     "tests/e2e/test_nothing_is_lost.py": 44.0,
-    "tests/core/test_claims.py": 33.0,
+    "tests/core/robots/test_claims.py": 33.0,
     "tests/core/test_session.py": 32.0,
-    "tests/core/test_robot_bad_days.py": 30.0,
+    "tests/core/robots/test_robot_bad_days.py": 30.0,
     "tests/e2e/test_path_mouse.py": 26.0,
-    "tests/core/test_refused_stop.py": 25.0,
+    "tests/core/robots/test_refused_stop.py": 25.0,
     "tests/e2e/test_path_keys.py": 24.0,
-    "tests/core/test_no_network.py": 21.0,
-    "tests/blocks/test_expressions.py": 20.0,
+    "tests/core/network/test_no_network.py": 21.0,
+    "tests/blocks/compiler/test_expressions.py": 20.0,
     "tests/e2e/test_two_studios.py": 20.0,
     "tests/e2e/test_main_job.py": 18.0,
     "tests/e2e/test_robots.py": 17.0,
     "tests/e2e/test_layouts.py": 16.0,
-    "tests/robots/test_contract_of_any_file.py": 16.0,
+    "tests/robots/driver/test_contract_of_any_file.py": 16.0,
     "tests/e2e/test_headless.py": 15.0,
-    "tests/ui/test_high_dpi.py": 15.0,
+    "tests/ui/theme/test_high_dpi.py": 15.0,
     "tests/e2e/test_tabs.py": 13.0,
 }
 """... and files that take longer than so many tests would. Speed alone depends on it."""
@@ -76,7 +76,7 @@ class ByFile(LoadScopeScheduling):
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--driver FILE``: hold the contract of robots against the drivers of this file."""
-    told = "a driver of yours to hold tests/robots/test_contract.py against (may be given again)"
+    told = "a driver of yours to hold tests/robots/driver/test_contract.py against (may be given again)"
     parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
 
 

@@ -1,4 +1,4 @@
-"""A process that saves a behaviour again and again and is killed in the middle, for `test_bad_days`.
+"""A process that saves a behaviour again and again and is killed in the middle, for `test_bad_files`.
 
 Reads one line for each life: how often it saves, and how many milliseconds it lasts from then on. A child of
 it saves in a loop until it is killed with signal 9; then one line tells what is in the file: "whole N", or

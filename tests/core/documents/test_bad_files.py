@@ -1,0 +1,151 @@
+"""Bad days of a behaviour's file: no room, cut anywhere, of another version, killed while it is saved."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app import resources
+from app.core.documents.document import Document
+from app.core.documents.file_format import BehaviourFile, parse_file, read_file, write_file
+from app.core.documents.journal import Journal, left_behind
+from app.errors import DocumentError
+
+ROOT = Path(__file__).parents[3]
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of Unix")
+FULL = """
+import json, resource, signal, sys
+from pathlib import Path
+from app.core.documents.document import Document
+from app.core.documents.journal import Journal
+from app.errors import DocumentError
+path, journals = Path(sys.argv[1]), Path(sys.argv[2])
+document = Document(lambda: Journal(journals))
+document.open(path)
+document.edited({"blocks": {"blocks": [{"type": "events_started", "id": "x" * 200000}]}})
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+try:
+    document.save()
+    said = "saved"
+except DocumentError as error:
+    said = str(error)
+resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+print(json.dumps({"said": said, "dirty": document.dirty, "journal": document.journal}))
+"""
+
+
+def behaviour(path: Path, *blocks: dict[str, object], **others: object) -> Path:
+    workspace = {"blocks": {"languageVersion": 0, "blocks": list(blocks)}}
+    write_file(path, BehaviourFile(path.stem, workspace, {}, others))
+    return path
+
+
+@posix
+def test_without_room_the_old_file_is_whole_and_the_work_is_kept(tmp_path: Path) -> None:
+    path = behaviour(tmp_path / "Mine.nepb", {"type": "events_started", "id": "old"})
+    before = path.read_bytes()
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, path, tmp_path / "journal"],
+        capture_output=True, text=True, timeout=60, check=True, cwd=ROOT,
+    )  # fmt: skip
+    told = json.loads(done.stdout)
+    assert told["said"].startswith("'Mine.nepb': can't be written (")
+    assert told["said"].endswith("make room there or save it in another place")
+    assert told["dirty"] is True
+    assert path.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir() if each.suffix == ".part"] == [], "no half file is left"
+    (left,) = left_behind(tmp_path / "journal")
+    assert "x" * 200000 in json.dumps(left.workspace), "the journal has the work of before the limit"
+
+
+def test_a_file_cut_at_every_byte_is_a_sentence(tmp_path: Path) -> None:
+    example = json.loads((resources.path("examples") / "1-greeting.nepb").read_bytes())
+    example["robots"] = {"Päpper": {"title": "long"}}  # a long one would be JSON like the rest
+    whole = json.dumps(example, ensure_ascii=False).encode()
+    assert parse_file(whole, Path("x.nepb")).name == "Greeting"
+    for length in range(len(whole)):
+        with pytest.raises(DocumentError) as told:
+            parse_file(whole[:length], Path("x.nepb"))
+        assert told.value.reason == "is damaged or no behaviour; open a copy from before"
+
+
+def test_bytes_that_were_changed_are_a_sentence_or_open(tmp_path: Path) -> None:
+    whole = (resources.path("examples") / "1-greeting.nepb").read_bytes()
+    dice = random.Random(3)
+    path = tmp_path / "x.nepb"
+    for _ in range(300):
+        data = bytearray(whole)
+        for _ in range(dice.randint(1, 8)):
+            data[dice.randrange(len(data))] = dice.randrange(256)
+        path.write_bytes(data)
+        document = Document(lambda: Journal(tmp_path / "journal"))
+        try:
+            document.open(path)
+        except DocumentError:
+            continue
+        document.program()  # whatever came through: problems, never a traceback
+
+
+@pytest.mark.parametrize(("version", "reason"), [
+    (2, "newer NEP Studio (version 2) and is left as it is; update this one"),
+    (99, "newer NEP Studio"), (0, "does not say its version"), (-1, "does not say its version"),
+    (True, "does not say its version"), ("1", "does not say its version"), (None, "does not say its version"),
+])  # fmt: skip
+def test_another_version_is_refused_with_the_next_step_and_left_alone(tmp_path, version, reason) -> None:
+    path = tmp_path / "x.nepb"
+    path.write_text(json.dumps({"format": "nep-behaviour", "version": version, "workspace": {}}))
+    before = path.read_bytes()
+    with pytest.raises(DocumentError) as told:
+        read_file(path)
+    assert reason in told.value.reason
+    assert path.read_bytes() == before
+
+
+def test_what_studio_does_not_know_is_written_again_as_it_was(tmp_path: Path) -> None:
+    strange = {
+        "type": "later_block", "id": "s", "x": 1.5, "y": -2, "extraState": {"a": [None, {"ü": "\ud83d"}]},
+        "fields": {"F": {"deep": [1, 2.0, "x"]}}, "inputs": {"I": {"block": {"type": "other", "id": "o"}}},
+        "icons": {"comment": {"text": "keep me"}}, "later": True,
+    }  # fmt: skip
+    wait = {"type": "control_wait_until", "id": "w", "x": 0, "y": 0}
+    start = {"type": "events_started", "id": "go", "next": {"block": strange}}
+    path = behaviour(tmp_path / "x.nepb", start, wait, description="what it does", later={"z": 1})
+    before = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
+    document = Document(lambda: Journal(tmp_path / "journal"))
+    document.open(path)
+    assert "s" in {each.block_id for each in document.problems()}, "it is told that it will be skipped"
+    assert document.mend("limit:w")
+    document.save()
+    after = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
+    assert json.dumps(after["workspace"]["blocks"]["blocks"][0]) == json.dumps(start), "to the byte"
+    assert (after["description"], after["later"]) == (before["description"], before["later"])
+
+
+@posix
+@pytest.mark.timeout(240)
+def test_killed_100_times_while_saving_the_file_is_whole_every_time(tmp_path: Path) -> None:
+    path = tmp_path / "Mine.nepb"
+    behaviour(path, {"type": "events_started", "id": "first"})
+    dice = random.Random(9)
+    lives = "".join(f"{dice.randint(0, 2)} {dice.randint(0, 20)}\n" for _ in range(100))
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.core.saving", path, tmp_path / "journal"],
+        input=lives, capture_output=True, text=True, timeout=200, check=True, cwd=ROOT,
+    )  # fmt: skip
+    told = done.stdout.splitlines()
+    assert len(told) == 100
+    assert [line for line in told if not line.startswith("whole ")] == []
+    assert len(set(told)) > 5, "it was saved in between"
+    assert path.stat().st_size > 0
+    journals = list((tmp_path / "journal").glob("*.json"))
+    assert journals, "some died between an edit and its save"
+    left = left_behind(tmp_path / "journal")
+    assert {each.journal for each in left} == set(journals), "a journal is whole, too"
+    assert all(each.workspace["blocks"] for each in left)

@@ -1,0 +1,149 @@
+"""A disk that is really full: nothing that was there is lost, it is said, and then all goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+FULL = """
+import json, sys
+from pathlib import Path
+from app.core.messages import snapshots
+from app.core.documents.file_format import BehaviourFile, write_file
+from app.core.documents.document import Document
+from app.core.documents.versions import keep_earlier
+from app.core.documents.journal import Journal, left_behind
+from app.core.storage.settings import Settings
+from app.errors import AppError
+from nep.messages.message import Message
+
+disk = Path(sys.argv[1])
+
+def blocks(id):
+    return {"blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": id}]}}
+
+def said(work):
+    try:
+        work()
+    except (AppError, OSError) as error:
+        return f"{type(error).__name__}: {error}"
+    return "done"
+
+def parts():
+    return sorted(str(each.relative_to(disk)) for each in disk.rglob("*") if each.suffix == ".part")
+
+path = disk / "Mine.nepb"
+write_file(path, BehaviourFile("Mine", blocks("old"), {}))
+old = path.read_bytes()
+settings = Settings(disk / "home")
+settings.set("theme", "dark")
+document = Document(lambda: Journal(disk / "journal"))
+document.open(path)
+document.edited(blocks("first"))
+kept = [each.read_bytes() for each in (disk / "journal").glob("*.json")]
+shape = {"shape": [64, 64, 3], "encoding": "bgr8"}
+picture = Message("/cam", bytes(range(256)) * 48, "image", "image", stamp_ns=1, extension=shape)
+
+filler = disk / "filler"
+with filler.open("wb", buffering=0) as file:
+    try:
+        while True:
+            file.write(b"x" * 4096)
+    except OSError as error:
+        full = error.strerror
+
+told = {"full": full}
+document.edited(blocks("y" * 50_000))
+told["edit"] = document.journal_error
+told["save"] = said(document.save)
+told["setting"] = said(lambda: settings.set("theme", "x" * 20_000))
+told["earlier"] = said(lambda: keep_earlier(path, disk / "earlier"))
+told["snapshot"] = said(lambda: snapshots.save(picture, disk / "pictures"))
+told["dirty"] = document.dirty
+told["old"] = path.read_bytes() == old
+told["journal"] = [each.read_bytes() for each in (disk / "journal").glob("*.json")] == kept
+told["settings"] = Settings(disk / "home").get("theme", "")
+told["parts"] = parts()
+told["pictures"] = [each.name for each in (disk / "pictures").iterdir()]
+
+filler.unlink()
+document.edited(blocks("z" * 50_000))
+told["edit then"] = document.journal_error
+told["save then"] = said(document.save)
+again = Document(lambda: Journal(disk / "journal"))
+again.open(path)
+told["read then"] = again.workspace == blocks("z" * 50_000)
+told["setting then"] = said(lambda: settings.set("theme", "light"))
+told["theme then"] = Settings(disk / "home").get("theme", "")
+told["snapshot then"] = said(lambda: snapshots.save(picture, disk / "pictures"))
+told["parts then"] = parts()
+print(json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    """What happened on a disk of 256 kB."""
+    tmp_path = tmp_path_factory.mktemp("disk")
+    unshare = shutil.which("unshare")
+    if unshare is None:
+        pytest.skip("a disk of one's own needs Linux with unshare")
+    mount = f"mount -t tmpfs -o size=256k,mode=777 none '{tmp_path}'"
+    if subprocess.run([unshare, "-rm", "sh", "-c", mount], check=False, capture_output=True).returncode:
+        pytest.skip("this computer does not permit disks of one's own (unshare -rm)")
+    done = subprocess.run(
+        [
+            unshare,
+            "-rm",
+            "sh",
+            "-c",
+            f'{mount} && exec "$@"',
+            "sh",
+            sys.executable,
+            "-c",
+            FULL,
+            str(tmp_path),
+        ],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=50,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert isinstance(found, dict)
+    return found
+
+
+def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, object]) -> None:
+    full = told["full"]
+    assert told["edit"] == f"unsaved work can't be kept ({full}); save the file now"
+    assert told["save"] == (
+        f"DocumentError: 'Mine.nepb': can't be written ({full}); make room there or save it in another place"
+    )
+    assert str(told["setting"]).startswith("SettingsError: ")
+    assert str(told["earlier"]).startswith("DocumentError: 'Mine.nepb': was not saved: what it said before")
+    assert str(full) in str(told["snapshot"])
+    assert told["dirty"] is True
+    assert told["old"] is True, "the behaviour's file is what it was"
+    assert told["journal"] is True, "and so is what was kept of the unsaved work"
+    assert told["settings"] == "dark"
+    assert told["parts"] == []
+    assert told["pictures"] == [], "half a picture is none"
+
+
+def test_once_there_is_room_again_everything_goes_on(told: dict[str, object]) -> None:
+    assert told["edit then"] is None
+    assert told["save then"] == told["setting then"] == told["snapshot then"] == "done"
+    assert told["read then"] is True
+    assert told["theme then"] == "light"
+    assert told["parts then"] == []

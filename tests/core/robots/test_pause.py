@@ -1,0 +1,137 @@
+"""Pause while the robot drives: it stands still at once, its heartbeat goes on, and go on does the rest.
+
+Everything is real: the virtual robot's process, the program's process, the network between them.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import pytest
+
+import nep
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime.find_robots import find_robots
+from app.core.run.runner import Runner
+from nep.messages.message import Message
+from tests.blocks.samples import block, number, started, workspace
+from tests.core.run.test_runner import Heard
+
+pytestmark = pytest.mark.timeout(240)
+WAY_M = 0.7  # somebody stands 0.9 m ahead
+LONG_S = 30.0
+HELD_S = 1.6  # longer than the robot's patience with a program that says nothing (1 s)
+
+
+class Pose:
+    """Where the robot says that it is."""
+
+    def __init__(self, node: nep.Node) -> None:
+        self.changed = threading.Condition()
+        self.seen: list[tuple[float, float, float]] = []
+        node.new_sub("/Pepper/pose", sink=self._take)
+
+    def _take(self, messages: Sequence[Message]) -> None:
+        with self.changed:
+            for message in messages:
+                value = message.payload
+                assert isinstance(value, dict)
+                value = value.get("value", value)
+                self.seen.append((time.monotonic(), float(value["x"]), float(value["y"])))
+            self.changed.notify_all()
+
+    def until(self, ready: Callable[[], bool], within_s: float) -> None:
+        with self.changed:
+            assert self.changed.wait_for(ready, within_s), self.seen[-3:]
+
+    def until_still(self) -> None:
+        """Wait until it says the same place again and again; it tells it eight times a second."""
+        now = len(self.seen)
+        self.until(
+            lambda: (
+                len(self.seen) >= now + 5
+                and max(math.dist(each[1:], self.seen[-1][1:]) for each in self.seen[-4:]) < 0.002
+            ),
+            LONG_S,
+        )
+
+    def far(self) -> float:
+        """How far it is from where it was first."""
+        if not self.seen:
+            return 0.0
+        return math.dist(self.seen[0][1:], self.seen[-1][1:])
+
+
+@pytest.fixture
+def pepper(master) -> Iterator[None]:
+    command = [sys.executable, "-m", "app.robots.simulated", "--name", "Pepper"]
+    process = subprocess.Popen(
+        [*command, "--owner-pid", str(os.getpid())], env={**os.environ, "NEP_MASTER": master.address}
+    )
+    yield
+    process.terminate()
+    process.wait(LONG_S)
+
+
+@pytest.fixture
+def node(master) -> Iterator[nep.Node]:
+    with nep.node("looker", master=master.address) as made:
+        yield made
+
+
+def test_a_pause_in_the_middle_of_a_walk_and_the_rest_of_it(master, pepper, node) -> None:
+    (robot,) = find_robots(node, 30, wanted=("Pepper",)).robots
+    walk = block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(WAY_M))
+    program = compile_behaviour(workspace(started(walk)), (robot,), name="Walk")
+    assert not program.errors, program.problems
+    pose, heard = Pose(node), Heard()
+    pose.until(lambda: bool(pose.seen), LONG_S)
+    runner = Runner(heard)
+    try:
+        runner.start(program, [robot.source], master.address)
+        pose.until(lambda: pose.far() > 0.2, 30)
+        runner.pause()
+        held = heard.until("paused")
+        assert held.blocks, "the block at which it is held"
+        pose.until_still()
+        before = pose.far()
+        assert before < WAY_M - 0.05, "it stands still before it has arrived"
+        threading.Event().wait(HELD_S)  # what must not happen here is a movement
+        assert pose.far() == pytest.approx(before, abs=0.002), "it stands still"
+        runner.go_on()
+        ended = heard.until("ended")
+        assert ended.ok, [event.text for event in heard.events]
+        assert pose.far() == pytest.approx(WAY_M, abs=0.03), "no step more than asked for"
+    finally:
+        runner.close()
+
+
+def test_a_step_does_the_rest_of_what_was_held(master, pepper, node) -> None:
+    (robot,) = find_robots(node, 30, wanted=("Pepper",)).robots
+    walks = [block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(0.4)) for _ in range(2)]
+    program = compile_behaviour(workspace(started(*walks)), (robot,), name="Walk")
+    pose, heard = Pose(node), Heard()
+    pose.until(lambda: bool(pose.seen), LONG_S)
+    runner = Runner(heard)
+    try:
+        runner.start(program, [robot.source], master.address)
+        pose.until(lambda: pose.far() > 0.1, 30)
+        runner.pause()
+        heard.until("paused")
+        heard.events.clear()
+        runner.step()
+        pose.until(lambda: pose.far() > 0.39, LONG_S)
+        heard.until("paused")
+        pose.until_still()
+        before = pose.far()
+        threading.Event().wait(0.5)  # the second block must wait for its own step
+        assert pose.far() == pytest.approx(before, abs=0.002)
+        assert before == pytest.approx(0.4, abs=0.03)
+    finally:
+        runner.close()

@@ -1,0 +1,274 @@
+"""Robots that die, hang, lie and flood: the block says so within seconds, Stop tells the truth, all recover.
+
+The robots, the programs and the master are real processes and threads; only the window is missing.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import FrameType
+
+import pytest
+
+import nep
+from app.core.network.mailbox import MESSAGES_PER_TOPIC
+from app.core.robots.robot_link import Invocation, RobotLink
+from app.core.session import Session
+from app.robots.description.description import td_for
+from app.robots.turtle import ROBOT
+from nep.masters.master import Master
+from tests.blocks.samples import block, number, started, workspace
+from tests.core.waiting import tick_until
+
+ROOT = Path(__file__).parents[3]
+FOUND_S = 60.0
+SAID_S = 60.0  # silence is noticed after 2 s; the rest is for a machine with much to do
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes are frozen by signals of POSIX")
+
+
+class Turtles:
+    """Turtles as processes."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self._environment = {**os.environ, "NEP_MASTER": address, "PYTHONPATH": str(ROOT)}
+        self._processes: list[subprocess.Popen[bytes]] = []
+
+    def start(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle"]
+        made = subprocess.Popen(command, cwd=ROOT, env=self._environment, stderr=subprocess.DEVNULL)
+        self._processes.append(made)
+        return made
+
+    def close(self) -> None:
+        for process in self._processes:
+            process.kill()
+            process.wait(5)
+
+
+@pytest.fixture
+def turtles(master: Master) -> Iterator[Turtles]:
+    made = Turtles(master.address)
+    yield made
+    made.close()
+
+
+def there(session: Session) -> RobotLink:
+    def link() -> RobotLink | None:
+        found = session.fleet.link("Turtle")
+        ready = found is not None and found.connected and found.publisher is not None
+        return found if ready and session.stopper is not None and session.stopper.robots else None
+
+    tick_until(session, link, FOUND_S)
+    found = link()
+    assert found is not None
+    return found
+
+
+def turns_for_long(session: Session) -> None:
+    turn = block("robot_diffdrive_do_turn", "x", ROBOT="Turtle", ANGLE=number(360))
+    again = block("robot_diffdrive_do_turn", "y", ROBOT="Turtle", ANGLE=number(-360))
+    session.document.edited(workspace(started(turn, again)))
+
+
+def runs(session: Session, turtles: Turtles) -> None:
+    turns_for_long(session)
+    with nep.node("listener", master=turtles.address) as node:
+        answers = node.new_sub("/Turtle/answer", "robot/answer")
+        session.runs.run()
+        tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
+        tick_until(session, lambda: answers.listen()[0])  # one that never did "does not answer"
+    moving = lambda: "turns 360" in session.runs.view().detail  # noqa: E731
+    tick_until(session, moving)
+
+
+def says_so_at_the_block(session: Session) -> None:
+    tick_until(session, lambda: session.runs.block_errors, SAID_S)
+    assert session.runs.block_errors == {"x": "Turtle has stopped answering. Start the virtual robot again."}
+
+
+def well_again(session: Session, turtles: Turtles) -> None:
+    """A person says that it stands still; then it can be used as before."""
+    there(session)
+    session.runs.confirm_still()
+    runs(session, turtles)
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "proven")
+    assert session.runs.view().result_ok
+
+
+def test_a_robot_that_is_killed_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
+    process = turtles.start()
+    there(session)
+    runs(session, turtles)
+    process.kill()
+    says_so_at_the_block(session)
+    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+    assert session.runs.view().title == "Turtle did not answer"
+    assert "Switch Turtle off by hand." in session.runs.view().detail
+    tick_until(session, lambda: not session.fleet.connected, FOUND_S)
+    turtles.start()
+    well_again(session, turtles)
+
+
+def test_a_robot_that_hangs_in_the_middle_of_an_action(session: Session, turtles: Turtles) -> None:
+    process = turtles.start()
+    link = there(session)
+    runs(session, turtles)
+    process.send_signal(signal.SIGSTOP)
+    says_so_at_the_block(session)
+    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+    tried = session.fleet.invoke("Turtle", "light", {})  # the panel says it too
+    tick_until(session, lambda: not tried.running, SAID_S)
+    told = ("does not answer", "has gone", "can't be reached")  # as soon as the master knows, it is away
+    assert any(words in (tried.error or "") for words in told)
+    if link.connected:
+        assert link.chip == "virtual, does not answer"
+    process.send_signal(signal.SIGCONT)
+    tick_until(session, lambda: there(session).state == "ready", FOUND_S)
+    with session.fleet.look_at("Turtle"):  # what it was doing does not go on: it was told to stop
+        tick_until(session, lambda: link.drawing is not None and not link.drawing["moving"])
+    well_again(session, turtles)
+
+
+# ---- a robot that lies -----------------------------------------------------------------------------
+
+
+class Liar:
+    """Announces itself as a Turtle and answers as a test says."""
+
+    def __init__(self, address: str) -> None:
+        self.node = nep.node("liar", master=address)
+        self.answers = self.node.new_pub("/Turtle/answer", "robot/answer")
+        self._description = self.node.new_pub("/Turtle/description", "robot/description", latched=True)
+        self._description.publish(td_for(ROBOT.thing_model, "Turtle"))
+        self.commands: list[Mapping[str, object]] = []
+        self.node.new_sub("/Turtle/command", "robot/command", sink=self._take)
+
+    def _take(self, messages: Sequence[nep.Message]) -> None:
+        for message in messages:
+            command = message.payload
+            assert isinstance(command, dict)
+            if command["op"] in ("invoke", "cancel"):
+                self.commands.append(command)
+
+    def say(self, made: Invocation, state: object, **more: object) -> None:
+        told = {"id": made.id, "op": "invoke", "action": made.action, "state": state, "output": {}}
+        self.answers.publish({**told, "feedback": {}, "error": None, **more})
+
+
+@pytest.fixture
+def liar(master: Master) -> Iterator[Liar]:
+    made = Liar(master.address)
+    yield made
+    made.node.close()
+
+
+@pytest.fixture
+def tried(session: Session, liar: Liar) -> Invocation:
+    """A move that the liar has got."""
+    there(session)
+    made = session.fleet.invoke("Turtle", "move", {"distance": 0.5})
+    tick_until(session, lambda: liar.commands)
+    return made
+
+
+def test_it_answers_twice_and_for_others(session: Session, liar: Liar, tried: Invocation) -> None:
+    for other in ("somebody else's", "", None, 7):
+        liar.answers.publish({"id": other, "op": "invoke", "state": "succeeded", "output": {}})
+    for state in ("dancing", None, 7, ["succeeded"]):
+        liar.say(tried, state)
+    liar.say(tried, "running")
+    tick_until(session, lambda: tried.state == "running")
+    liar.say(tried, "succeeded", output={"moved": 0.5})
+    liar.say(tried, "failed", error="no, it did not")
+    liar.say(tried, "running")
+    tick_until(session, lambda: not tried.running)
+    again = session.fleet.invoke("Turtle", "light", {})
+    liar.say(again, "succeeded")
+    tick_until(session, lambda: again.state == "succeeded")  # so the second answer has been read
+    assert (tried.state, tried.error, tried.output) == ("succeeded", None, {"moved": 0.5})
+
+
+def test_it_sends_what_is_no_json(session: Session, liar: Liar, tried: Invocation) -> None:
+    for junk in (b"{not json", b"\xff\xfe", b"", b"[" * 5000):
+        liar.answers.publish_bytes(junk)
+    for odd in (None, 7, "text", [1, 2], {"id": tried.id}):
+        liar.answers.publish(odd)
+    liar.say(tried, "succeeded")
+    tick_until(session, lambda: tried.state == "succeeded")
+
+
+MOST_CALLS_A_TICK = 64 * MESSAGES_PER_TOPIC
+"""A full topic's answers, each taken in with some 46 calls; how long they take depends on what else runs."""
+
+
+def calls_of(function: Callable[[], object]) -> int:
+    """How many functions are called in this thread while ``function`` runs: work, whatever the time."""
+    count = 0
+
+    def called(_frame: FrameType, event: str, _argument: object) -> None:
+        nonlocal count
+        count += event in {"call", "c_call"}
+
+    sys.setprofile(called)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_it_floods_its_feedback(session: Session, liar: Liar, tried: Invocation) -> None:
+    liar.say(tried, "running")
+    tick_until(session, lambda: tried.state == "running")
+    ended = threading.Event()
+
+    def flood() -> None:
+        number = 0
+        while not ended.is_set():
+            for _ in range(200):
+                number += 1
+                liar.say(tried, "running", feedback={"moved": number, "to_go": "x" * 1000})
+            ended.wait(0.01)
+
+    thread = threading.Thread(target=flood)
+    thread.start()
+    most = 0
+    try:
+        for _ in range(60):
+            most = max(most, calls_of(session.tick))
+            ended.wait(0.02)
+        assert tried.running
+        assert tried.feedback
+    finally:
+        ended.set()
+        thread.join()
+    assert most < MOST_CALLS_A_TICK
+    liar.say(tried, "succeeded")
+    tick_until(session, lambda: not tried.running)
+
+
+def test_it_says_nothing_at_all(session: Session, liar: Liar, tried: Invocation) -> None:
+    tick_until(session, lambda: not tried.running, SAID_S)
+    assert tried.error == "Turtle does not answer. Check that it is on."
+    assert session.fleet.link("Turtle").state == "silent"  # type: ignore[union-attr]
+    tick_until(session, lambda: liar.commands[-1]["op"] == "cancel")
+    session.runs.stop()
+    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+    assert session.runs.view().title == "Turtle did not answer"
+
+
+def test_it_falls_silent_in_the_middle(session: Session, liar: Liar, tried: Invocation) -> None:
+    liar.say(tried, "running")
+    tick_until(session, lambda: tried.state == "running")
+    tick_until(session, lambda: not tried.running, SAID_S)
+    assert tried.error is not None
+    assert "has stopped answering" in tried.error

@@ -1,0 +1,408 @@
+"""``python -m app run FILE``: with a robot on a real network, and with the virtual one in its own process."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import nep
+from app import resources
+from app.robots import turtle
+from app.robots.driver.driver import Driver
+from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
+from tests.blocks.fakes import until
+from tests.blocks.samples import block, number, robot, say, started, text, workspace, write
+from tests.blocks.wire_robot import RizeRobot, WireRobot
+
+
+@pytest.fixture
+def pepper(master):
+    made = WireRobot(master.address)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def saved(tmp_path):
+    def write_file(content, name="Test"):
+        path = tmp_path / "test.nepb"
+        robots = {"Pepper": dict(robot().source)}
+        path.write_text(
+            json.dumps(
+                {
+                    "format": "nep-behaviour",
+                    "version": 1,
+                    "name": name,
+                    "workspace": content,
+                    "robots": robots,
+                }
+            )
+        )
+        return path
+
+    return write_file
+
+
+REAL = replace(turtle.ROBOT, virtual=False)
+
+
+def run(path, **more) -> tuple[int, str]:
+    out = io.StringIO()
+    return run_file(path, out=out, **more), out.getvalue()
+
+
+def test_a_file_runs_to_its_end_and_the_robot_has_stopped(pepper, saved):
+    code, out = run(saved(workspace(started(say("Hi"), write(text("done"))))))
+    assert code == OK
+    assert "“Test” runs" in out
+    assert "done" in out.splitlines()
+    assert "Pepper stopped (" in out
+    assert pepper.commands[-1]["op"] == "stop"
+
+
+def test_a_failing_block_is_told(pepper, saved):
+    pepper.refuses = {"say": "no voice"}
+    code, out = run(saved(workspace(started(say("Hi")))))
+    assert code == FAILED
+    assert "Pepper: no voice." in out
+    assert "Pepper stopped (" in out
+
+
+def test_an_interrupt_stops_it_and_proves_it(pepper, saved):
+    pepper.slow = {"say"}
+    interrupted = threading.Event()
+    found: list[tuple[int, str]] = []
+    path = saved(workspace(started(say("Hi"))))
+    thread = threading.Thread(target=lambda: found.append(run(path, interrupted=interrupted)))
+    thread.start()
+    until(lambda: bool(pepper.heard("invoke")))
+    interrupted.set()
+    thread.join(15)
+    assert found[0][0] == INTERRUPTED
+    assert "Pepper stopped (" in found[0][1]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+@pytest.mark.parametrize("how", ["a file of Studio", "a program file"])
+def test_ctrl_c_pressed_again_does_not_cut_the_stop_short(pepper, saved, master, tmp_path, how):
+    """The second one comes while the robots' answers are waited for; it is not a robot's answer."""
+    pepper.silent, pepper.slow = {"stop"}, {"say"}
+    path = saved(workspace(started(say("Hi"))))
+    command = [sys.executable, "-m", "app", "run", str(path)]
+    if how == "a program file":
+        path = tmp_path / "greeting.py"
+        path.write_text(SAYS, encoding="utf-8")
+        command = [sys.executable, str(path)]
+    root = str(Path(__file__).resolve().parents[3])
+    environ = {**os.environ, "PYTHONPATH": root, "NEP_MASTER": master.address}
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environ, text=True
+    )
+    until(lambda: bool(pepper.heard("invoke")))
+    process.send_signal(signal.SIGINT)
+    until(lambda: bool(pepper.heard("stop")))
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    assert "Pepper did not answer. Switch it off by hand." in out
+    assert "Traceback" not in out
+    assert process.returncode == (FAILED if how == "a file of Studio" else 0)
+
+
+def test_a_robot_that_does_not_stop_is_named(pepper, saved):
+    pepper.silent = {"stop"}
+    code, out = run(saved(workspace(started(say("Hi")))))
+    assert code == FAILED
+    assert "Pepper did not answer. Switch it off by hand." in out
+
+
+def test_a_robot_that_is_not_there(master, saved):
+    code, out = run(saved(workspace(started(say("Hi")))), robot_wait_s=0.2)
+    assert code == ROBOT_MISSING
+    assert "Pepper not found." in out
+
+
+def test_a_robot_that_the_file_names_but_does_not_describe_is_waited_for(master, saved):
+    path = saved(workspace(started(say("Hi"))))
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"robots": {}}))
+    code, out = run(path, robot_wait_s=0.2)
+    assert code == ROBOT_MISSING
+    assert "Pepper not found" in out
+
+
+def test_what_cannot_run(master, saved, tmp_path):
+    code, out = run(saved(workspace(started(block("control_wait")))))
+    assert (code, "error: wait needs a number." in out) == (UNUSABLE, True)
+    assert run(saved(workspace()))[0] == UNUSABLE
+    assert run(tmp_path / "missing.nepb")[0] == UNUSABLE
+    (tmp_path / "x.nepb").write_text("{")
+    assert run(tmp_path / "x.nepb")[0] == UNUSABLE
+    code, out = run(saved(workspace(started(say("Hi")))), master="127.0.0.1:1")
+    assert (code, "no master" in out) == (UNUSABLE, True)
+    assert run(saved(workspace(started(write(number(1))))), master="127.0.0.1:1")[0] == OK  # needs nobody
+
+
+def test_a_robot_of_rize_is_driven_too(master, tmp_path):
+    rosie = RizeRobot(master.address)
+    try:
+        hello = block("robot_rize_do_say", ROBOT="Rosie", TEXT=text("hello"))
+        robots = {"Rosie": dict(rosie.described.source)}
+        content = {"format": "nep-behaviour", "version": 1, "name": "RIZE", "robots": robots}
+        path = tmp_path / "rize.nepb"
+        path.write_text(json.dumps(content | {"workspace": workspace(started(hello))}))
+        code, out = run(path)
+        assert code == OK, out
+        assert "Rosie: stop sent; this robot cannot confirm" in out
+        first = rosie.commands[0]
+        assert (first["robots"], first["primitives"]["primitive"], first["primitives"]["input"]) == (
+            "Rosie", "say", "hello",
+        )  # fmt: skip
+    finally:
+        rosie.close()
+
+
+def test_a_real_robot_moves_only_when_it_may(master, tmp_path):
+    rosie = RizeRobot(master.address)
+    try:
+        walk = block("robot_rize_do_walk", ROBOT="Rosie", DIRECTION="forwards", METERS=number(0.5))
+        robots = {"Rosie": dict(rosie.described.source)}
+        content = {"format": "nep-behaviour", "version": 1, "name": "RIZE", "robots": robots}
+        path = tmp_path / "rize.nepb"
+        path.write_text(json.dumps(content | {"workspace": workspace(started(walk))}))
+        code, out = run(path)
+        assert code == MAY_NOT_MOVE, out
+        assert "Rosie would move (“walk”). Add --allow-moving if it may." in out
+        assert rosie.commands == []
+        code, out = run(path, allow_moving=True)
+        assert code == OK, out
+        assert rosie.commands[0]["primitives"]["primitive"] == "walk"
+    finally:
+        rosie.close()
+
+
+def test_publishing_on_a_robots_topic_is_moving_it(master, tmp_path):
+    with nep.node("rover", master=master.address) as node, Driver(REAL, "Rover", node):
+        publish = block("messages_publish", TOPIC="/Rover/command", VALUE=text("drive"))
+        content = {"format": "nep-behaviour", "version": 1, "name": "Sly", "robots": {}}
+        path = tmp_path / "sly.nepb"
+        path.write_text(json.dumps(content | {"workspace": workspace(started(publish))}))
+        code, out = run(path)
+        assert code == MAY_NOT_MOVE, out
+        assert "Rover would move (" in out
+        code, out = run(path, allow_moving=True)
+        assert code == OK, out
+        assert "Rover stopped (" in out
+
+
+def test_a_second_program_of_a_robots_name_is_told_and_changes_nothing(master, pepper, saved):
+    with nep.node("evil", master=master.address) as evil:
+        described = dict(robot().source)
+        announcement = evil.new_pub("/Pepper/description", "robot/description", latched=True)
+        announcement.publish(described | {"rb:topics": {"command": "/Evil/command"}})
+        code, out = run(saved(workspace(started(say("Hi")))))
+    assert code == OK, out
+    assert "warning: 2 programs say that they are Pepper" in out
+    assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
+
+
+@pytest.fixture
+def virtual_pepper(master):
+    environment = {**os.environ, "NEP_MASTER": master.address}
+    command = [
+        sys.executable,
+        "-m",
+        "app.robots.simulated",
+        "--name",
+        "Pepper",
+        "--owner-pid",
+        str(os.getpid()),
+    ]
+    process = subprocess.Popen(command, env=environment)
+    yield process
+    process.terminate()
+    process.wait(10)
+
+
+LAST = {
+    "Greeting": "Hello! I am Pepper.",
+    "Tour guide": "Thank you for coming.",
+    "The finder": "Hello! Did you lose a ball?",
+}
+
+
+@pytest.mark.parametrize("name", LAST)
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+def test_the_examples_run_on_the_virtual_robot(master, virtual_pepper, name):
+    files = sorted(resources.path("examples").glob("*.nepb"))
+    (path,) = [each for each in files if json.loads(each.read_text("utf-8"))["name"] == name]
+    code, out = run(path, robot_wait_s=100)
+    assert code == OK, out
+    assert f"Pepper says “{LAST[name]}”" in out
+    assert "Pepper stopped (" in out
+
+
+SAID = {
+    "Reaction to touch": ["Touch my head or my hands.", "Ha ha! That tickles."],
+    "A quiz": ["Is the sky blue?", "Is ice cold?", "Right answers: "],
+    "A dance": ["Let us dance.", "Thank you."],
+    "A careful walk": ["I go on while there is room."],
+    "Weather station": ["I am a weather station.", "It is cold, ", "It is warm, "],
+}
+STROKED = {"Reaction to touch", "A quiz"}
+
+
+@pytest.mark.parametrize("name", SAID)
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+def test_the_examples_that_listen_do_so_on_the_virtual_robot(master, virtual_pepper, name):
+    """Somebody strokes the robot where it asks for that and tells the weather; it ends when all was said."""
+    (path,) = [
+        each
+        for each in resources.path("examples").glob("*.nepb")
+        if json.loads(each.read_text("utf-8"))["name"] == name
+    ]
+    out, interrupted = io.StringIO(), threading.Event()
+    found: list[int] = []
+    run = threading.Thread(
+        target=lambda: found.append(run_file(path, out=out, robot_wait_s=100, interrupted=interrupted))
+    )
+    with nep.node("somebody", master=master.address) as node:
+        hand, weather = node.new_pub("/Pepper/world", "json"), node.new_pub("/weather", "json")
+        run.start()
+        pause = threading.Event()
+        for turn in range(1000):
+            if not run.is_alive() or all(f"Pepper says “{words}" in out.getvalue() for words in SAID[name]):
+                break
+            if name in STROKED:
+                hand.publish({"touch": "head", "down": turn % 2 == 0})
+            weather.publish({"temperature": 5 if turn % 40 < 20 else 25})
+            pause.wait(0.1)
+        interrupted.set()
+        run.join(30)
+    assert found[0] in {OK, INTERRUPTED}, out.getvalue()
+    for words in SAID[name]:
+        assert f"Pepper says “{words}" in out.getvalue()
+    assert "Pepper stopped (" in out.getvalue()
+
+
+@pytest.mark.timeout(240)
+def test_the_program_text_runs_as_a_file(master, pepper, tmp_path):
+    from app.blocks import compile_behaviour
+
+    saved = workspace(started(say("Hi"), write(text("done"))))
+    path = tmp_path / "program.py"
+    path.write_text(compile_behaviour(saved, [robot()], name="Test").source, "utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
+    done = subprocess.run(
+        [sys.executable, path], env=environment, capture_output=True, text=True, timeout=30, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+    assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
+    assert pepper.commands[-1]["op"] == "stop"
+
+
+class Lost(io.StringIO):
+    """An output that takes nothing any more after some lines."""
+
+    def __init__(self, number: int, lines: int) -> None:
+        super().__init__()
+        self._number, self._lines = number, lines
+
+    def write(self, text: str) -> int:
+        if self.getvalue().count("\n") >= self._lines:
+            raise OSError(self._number, os.strerror(self._number))
+        return super().write(text)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.EPIPE, ""),
+        (errno.ENOSPC, "the output cannot be written: no space left on device; the behaviour was stopped.\n"),
+    ],
+)
+def test_an_output_that_is_gone_stops_the_behaviour_and_its_robots(pepper, saved, capsys, number, said):
+    path = saved(workspace(started(say("Hi"), write(text("one")), write(text("two")), say("never"))))
+    assert run_file(path, out=Lost(number, 1)) == FAILED
+    assert capsys.readouterr().err == said
+    assert pepper.commands[-1]["op"] == "stop"
+    assert "never" not in [each.get("input") for each in pepper.commands]
+
+
+def test_what_a_behaviour_writes_cannot_steer_the_terminal(pepper, saved):
+    code, out = run(saved(workspace(started(write(text("a\x1b[2Jb"))))))
+    assert code == OK
+    assert "a\\x1b[2Jb" in out.splitlines()
+
+
+@pytest.mark.parametrize("page", ["cp437", "ascii"])
+def test_it_says_everything_in_every_code_page(master, saved, page):
+    path = saved(workspace(started(write(text("\u2013 “😀”")))))
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "run", str(path)],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": page, "PYTHONUTF8": "0"},
+        timeout=30,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (OK, b"")
+    assert b'- "?"' in done.stdout
+    assert b'"Test" runs' in done.stdout
+
+
+def test_a_master_whose_name_nobody_knows(saved):
+    code, out = run(saved(workspace(started(say("Hi")))), master="nosuchhost.invalid:7781")
+    assert code == UNUSABLE
+    assert out.startswith("no computer is called 'nosuchhost.invalid' here; ")
+
+
+PROGRAM = """
+from app.blocks.commands import on_start, run, write
+
+@on_start
+def greet():
+    write("\u2013 “😀”")
+
+run("greeting")
+"""
+
+
+SAYS = """
+from app.blocks.commands import on_start, robot, run
+
+@on_start
+def greet():
+    robot("Pepper").do("say", text="Hi")
+
+run("greeting")
+"""
+
+
+def test_a_program_file_writes_into_every_pipe(master, tmp_path):
+    file = tmp_path / "greeting.py"
+    file.write_text(PROGRAM, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, str(file)],
+        capture_output=True,
+        env={
+            **os.environ,
+            "PYTHONPATH": str(Path(__file__).resolve().parents[3]),
+            "PYTHONIOENCODING": "ascii",
+            "PYTHONUTF8": "0",
+        },
+        timeout=30,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.splitlines() == [b'- "?"']

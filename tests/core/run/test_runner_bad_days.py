@@ -1,0 +1,188 @@
+"""Programs that behave badly: memory, floods, no ends of lines, closed pipes, processes left behind."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+
+import psutil
+import pytest
+
+from app.core.run.child_process import MOST_BYTES
+from app.core.run.runner import EVENTS_PER_S, Runner
+from tests.core.run.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, stopping_s
+
+__all__ = ["heard"]
+ENDED = 'print(\'{"is": "ended", "ok": true, "elapsed_s": 1.0}\', flush=True)'
+GIGABYTE = "import os\nfor _ in range(1000):\n    os.write(1, b'y\\n' * 500_000)\n"
+PRINTS = 'import sys\nwhile True:\n    sys.stdout.write(\'{"is": "print", "text": "x"}\\n\')\n'
+NO_END = f"import os\nfor _ in range(20):\n    os.write(1, b'{{\"is\"' + b'x' * 500_000)\nprint()\n{ENDED}"
+CLOSES = "import os, threading\nos.close(1)\nthreading.Event().wait(60)"
+EATS = (
+    "held = [bytearray(b'x' * 20_000_000) for _ in range(40)]\nimport threading\nthreading.Event().wait(60)"
+)
+LETS_EAT = f"import subprocess, sys\nsubprocess.run([sys.executable, '-c', {EATS!r}])"
+FORKS = """
+import subprocess, sys, threading
+sleeps = "import threading; threading.Event().wait(120)"
+made = subprocess.Popen([sys.executable, "-c", sleeps], start_new_session={new})
+sys.stderr.write(f"child {{made.pid}}\\n")
+sys.stderr.flush()
+threading.Event().wait({wait})
+"""
+
+
+def python(text: str) -> tuple[str, ...]:
+    return (sys.executable, "-c", text)
+
+
+@pytest.fixture
+def started(heard: Heard):
+    made: list[Runner] = []
+
+    def start(text: str, **more: int) -> Runner:
+        made.append(Runner(heard, command=python(text), **more))
+        made[-1].start(program(), [], None)
+        return made[-1]
+
+    yield start
+    for each in made:
+        each.close()
+        assert each.pid is None or not psutil.pid_exists(each.pid)
+    assert [t.name for t in threading.enumerate() if t.name.startswith("runner ")] == []
+
+
+def printed(heard: Heard) -> list[str]:
+    return [event.text for event in heard.events if event.kind == "print"]
+
+
+# ---- memory ----------------------------------------------------------------------------------------
+
+
+def test_a_program_that_eats_memory_is_ended_and_says_so(started, heard) -> None:
+    started(EATS, most_bytes=200_000_000)
+    ended = heard.until("ended")
+    assert not ended.ok
+    assert ended.text == "The program used more than 0.2 GB of memory and was ended."
+
+
+def test_what_it_starts_counts_with_it(started, heard) -> None:
+    started(LETS_EAT, most_bytes=200_000_000)
+    assert heard.until("ended").text == "The program used more than 0.2 GB of memory and was ended."
+
+
+def test_a_behaviours_program_has_a_gigabyte() -> None:
+    assert Runner(lambda _event: None)._most_bytes == MOST_BYTES == 1_000_000_000
+
+
+# ---- floods ----------------------------------------------------------------------------------------
+
+
+def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) -> None:
+    me = psutil.Process()
+    before = me.memory_info().rss
+    shares: list[float] = []
+
+    def begin() -> Runner:
+        runner, pause = started(GIGABYTE), threading.Event()
+        began, worked = time.monotonic(), time.process_time()
+        for _ in range(100):  # as a window's timer
+            pause.wait(0.01)
+        shares.append((time.process_time() - worked) / (time.monotonic() - began))
+        assert runner.state == "running"  # it is not through: its pipe makes it wait
+        return runner
+
+    began = time.monotonic()
+    assert stopping_s(begin) < STOP_WITHIN_S
+    seconds = time.monotonic() - began
+    assert heard.until("ended").ok
+    assert shares[0] < 0.5  # reading the flood leaves the window more than half of a processor
+    assert me.memory_info().rss - before < 60_000_000
+    (told, *_) = printed(heard)
+    assert told.endswith(" MB that no block wrote were left out")
+    assert 1 < float(told.split()[0]) < 40 * (seconds + 1)  # MB: at 20 a second it waits for its turn
+
+
+def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:
+    def begin() -> Runner:
+        runner, pause = started(PRINTS), threading.Event()
+        heard.until("print", text="x", run=runner.run)
+        flooded = time.monotonic()
+        while time.monotonic() - flooded < 2.2:
+            pause.wait(0.05)
+        return runner
+
+    began = time.monotonic()
+    assert stopping_s(begin) < STOP_WITHIN_S
+    heard.until("ended")
+    seconds = time.monotonic() - began
+    assert printed(heard).count("x") <= EVENTS_PER_S * (seconds + 1)
+    left_out = [text for text in printed(heard) if text.endswith("lines were left out: too many at once")]
+    assert left_out
+    assert len(left_out) <= seconds + 2  # one in a second, and one at the end
+
+
+def test_a_line_without_end_is_left_out_and_what_follows_is_read(started, heard) -> None:
+    started(NO_END)
+    assert heard.until("ended").elapsed_s == 1.0
+    assert printed(heard) == ["10.0 MB that no block wrote were left out"]
+
+
+def test_errors_without_end_are_bounded(started, heard) -> None:
+    started(
+        "import os\nfor _ in range(50):\n    os.write(2, b'e' * 1_000_000)\nraise SystemExit('last words')"
+    )
+    assert "last words" in heard.until("ended").text
+
+
+# ---- pipes and processes ---------------------------------------------------------------------------
+
+
+def test_a_program_that_closes_its_output_is_ended(started, heard) -> None:
+    started(CLOSES)
+    assert heard.until("ended").text == "The program closed its line to Studio and was ended."
+
+
+def child_of(heard: Heard, runner: Runner) -> psutil.Process:
+    deadline = time.monotonic() + LONG_S
+    while not runner._errors:
+        assert time.monotonic() < deadline
+        threading.Event().wait(0.01)
+    return psutil.Process(int(runner._errors[0].split()[1]))
+
+
+def gone(process: psutil.Process) -> bool:
+    """Whether it has ended soon; in a container without an init nobody takes its last word from it."""
+
+    def has_ended() -> bool:
+        try:
+            return process.status() == psutil.STATUS_ZOMBIE
+        except psutil.NoSuchProcess:
+            return True
+
+    end = time.monotonic() + LONG_S
+    while not has_ended() and time.monotonic() < end:
+        threading.Event().wait(0.02)
+    return has_ended()
+
+
+@pytest.mark.parametrize("new", [False, True], ids=["in its group", "in a session of its own"])
+def test_processes_that_it_started_end_with_stop(started, heard, new) -> None:
+    left: list[psutil.Process] = []
+
+    def begin() -> Runner:
+        runner = started(FORKS.format(new=new and os.name == "posix", wait=60))
+        left.append(child_of(heard, runner))
+        return runner
+
+    assert stopping_s(begin) < STOP_WITHIN_S
+    heard.until("ended")  # although its child holds the pipe
+    assert all(gone(each) for each in left)
+
+
+def test_processes_that_it_left_behind_end_when_it_ends(started, heard) -> None:
+    left = child_of(heard, started(FORKS.format(new=False, wait=0.3)))
+    heard.until("ended")
+    assert gone(left)

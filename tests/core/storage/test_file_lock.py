@@ -1,0 +1,90 @@
+"""The lock that Studios share: one at a time, free when its process dies, never in the way for long."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.core.storage.file_lock import Turn, locked
+
+HOLDER = """
+import sys
+from pathlib import Path
+from app.core.storage.file_lock import locked
+with locked(Path(sys.argv[1])) as held:
+    print(held, flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def holder(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """Another process that holds the lock until its input ends."""
+    root = str(Path(__file__).parents[3])
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(tmp_path / "file")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": root},
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "True\n"
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_it_is_held_by_one_and_free_afterwards(tmp_path: Path) -> None:
+    for _ in range(2):
+        with locked(tmp_path / "file") as held:
+            assert held
+
+
+def test_who_can_not_have_it_goes_on_after_a_bounded_wait(
+    tmp_path: Path, holder: subprocess.Popen[str]
+) -> None:
+    began = time.monotonic()
+    with locked(tmp_path / "file", within_s=0.2) as held:
+        assert not held
+    assert 0.2 <= time.monotonic() - began < 5.0
+
+
+def test_it_is_free_when_its_process_is_killed(tmp_path: Path, holder: subprocess.Popen[str]) -> None:
+    holder.send_signal(signal.SIGKILL)
+    with locked(tmp_path / "file", within_s=10.0) as held:
+        assert held
+
+
+def test_a_folder_that_cant_be_made_is_no_reason_to_stop(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with locked(tmp_path / "file" / "below") as held:
+        assert not held
+
+
+def test_a_turn_is_one_process_s_until_it_leaves_or_dies(
+    holder: subprocess.Popen[str], tmp_path: Path
+) -> None:
+    turn, other = Turn(tmp_path / "file"), Turn(tmp_path / "file")
+    assert not turn.take()
+    holder.kill()
+    holder.wait(30)
+    assert turn.take()
+    assert turn.take()
+    assert not other.take()
+    turn.leave()
+    turn.leave()
+    assert other.take()
+    other.leave()
+
+
+def test_where_there_are_no_locks_everybody_has_the_turn(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    assert Turn(tmp_path / "file" / "starting").take()

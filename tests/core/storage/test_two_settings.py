@@ -1,0 +1,85 @@
+"""Two Studios with the same settings file: nothing that one keeps is lost by the other."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from app.core.storage.settings import Settings
+
+WRITER = """
+import sys
+from pathlib import Path
+from app.core.storage.settings import Settings
+settings = Settings(Path(sys.argv[1]))
+print("ready", flush=True)
+sys.stdin.readline()
+for number in range(50):
+    settings.set(f"{sys.argv[2]} {number}", number)
+"""
+
+
+def test_each_keeps_what_the_other_has_set(tmp_path: Path) -> None:
+    first, second = Settings(tmp_path), Settings(tmp_path)
+    first.set("theme", "dark")
+    second.set("text_percent", 150)
+    first.set("layout", "developer")
+    again = Settings(tmp_path)
+    assert (again.get("theme", ""), again.get("text_percent", 0), again.get("layout", "")) == (
+        "dark",
+        150,
+        "developer",
+    )
+    assert first.get("text_percent", 0) == 150
+
+
+def test_the_last_one_decides_about_the_same_key(tmp_path: Path) -> None:
+    first, second = Settings(tmp_path), Settings(tmp_path)
+    first.set("theme", "dark")
+    second.set("theme", "light")
+    assert Settings(tmp_path).get("theme", "") == "light"
+
+
+def test_recent_files_of_both_are_remembered(tmp_path: Path) -> None:
+    first, second = Settings(tmp_path), Settings(tmp_path)
+    for settings, name in ((first, "one"), (second, "two"), (first, "three")):
+        (tmp_path / name).write_text("x")
+        settings.add_recent(tmp_path / name)
+    assert [file.path.name for file in Settings(tmp_path).recent] == ["three", "two", "one"]
+
+
+def test_a_file_that_another_one_damaged_does_not_lose_what_is_known(tmp_path: Path) -> None:
+    settings = Settings(tmp_path)
+    settings.set("theme", "dark")
+    settings.path.write_text("{ half of")
+    settings.set("layout", "developer")
+    assert json.loads(settings.path.read_text()) == {"theme": "dark", "layout": "developer"}
+
+
+def test_two_processes_that_write_at_once_lose_nothing(tmp_path: Path) -> None:
+    environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    writers = [
+        subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(tmp_path), name],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environ,
+        )
+        for name in ("a", "b")
+    ]
+    for writer in writers:
+        assert writer.stdout is not None
+        assert writer.stdout.readline() == "ready\n"
+    for writer in writers:
+        assert writer.stdin is not None
+        writer.stdin.write("go\n")
+        writer.stdin.flush()
+    for writer in writers:
+        writer.communicate(timeout=30)
+        assert writer.returncode == 0
+    kept = Settings(tmp_path)
+    assert [kept.get(f"{name} {number}", -1) for name in "ab" for number in range(50)] == [*range(50)] * 2

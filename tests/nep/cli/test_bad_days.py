@@ -1,0 +1,165 @@
+"""Bad days of the command line: no network, the port taken, no port free, a folder that takes no file.
+
+Each ends in a sentence with the next step, never in a traceback.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from nep.cli.alert_printer import Changes
+from nep.errors import AddressInUseError
+from nep.protocol.graph_view import Alert, GraphView
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+LONG_S = 120
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8", "COLUMNS": "300"}
+UP = "ip link set lo up"
+
+
+def alone(script: str, *, up: bool) -> subprocess.CompletedProcess[str]:
+    """Run a shell script in a network of its own: nothing there but the loopback, up or down.
+
+    Skips when this computer does not permit that.
+    """
+    unshare = shutil.which("unshare")
+    if unshare is None or shutil.which("ip") is None:
+        pytest.skip("a network of one's own needs Linux with unshare and ip")
+    if subprocess.run([unshare, "-rn", "true"], check=False, capture_output=True).returncode:
+        pytest.skip("this computer does not permit networks of one's own (unshare -rn)")
+    lines = [UP if up else "true", "cd /", textwrap.dedent(script).replace("NEP", f"{sys.executable} -m nep")]
+    return subprocess.run(
+        [unshare, "-rn", "sh", "-c", "\n".join(lines)],
+        env={**ENVIRONMENT, "NEP_MASTER": "127.0.0.1:7780", "NEP_GATEWAY": "0"},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=LONG_S,
+        check=False,
+    )
+
+
+def test_without_any_network_but_the_loopback_everything_works():
+    done = alone(
+        """
+        NEP master 2>master.log & master=$!
+        until NEP node list >/dev/null 2>&1; do :; done
+        NEP topic pub words '"hello"' --latched >/dev/null 2>&1 & pub=$!
+        NEP topic echo words -n 1
+        NEP doctor; echo "doctor $?"
+        kill $pub $master
+        """.replace("master.log", os.devnull),
+        up=True,
+    )
+    assert "#1  hello" in done.stdout
+    assert "A master runs at 127.0.0.1:7780" in done.stdout
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_with_the_loopback_down_the_doctor_says_so_and_nobody_falls_over():
+    done = alone(
+        """
+        NEP doctor --json
+        NEP node list; echo "list $?" >&2
+        said=$(mktemp)
+        NEP master 2>$said & master=$!
+        until grep -q "cannot reach it" $said; do kill -0 $master || break; done
+        kill $master
+        cat $said >&2; rm $said
+        """,
+        up=False,
+    )
+    found = {each["id"]: each for each in json.loads(done.stdout.splitlines()[0])}
+    assert found["loopback"]["severity"] == "error"
+    assert found["loopback"]["command"] == "ip link set lo up"
+    assert "no master answers at '127.0.0.1:7780'" in done.stderr
+    assert "list 1" in done.stderr
+    assert "programs of this computer cannot reach it: network is unreachable; 'nep doctor'" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_with_no_port_free_a_node_says_so():
+    code = """
+import nep
+with nep.Master("127.0.0.1:7780", learn_s=0.0), nep.node("many") as node:
+    try:
+        for number in range(10):
+            node.new_pub(f"t{number}")
+    except nep.NepError as error:
+        print(error)
+"""
+    done = alone(
+        f"""
+        echo "40000 40003" > /proc/sys/net/ipv4/ip_local_port_range || exit 77
+        {sys.executable} -c '{code}'
+        """,
+        up=True,
+    )
+    if done.returncode == 77:
+        pytest.skip("the range of ports cannot be made small here")
+    assert done.stdout.strip() == "no port of '127.0.0.1' is free; end programs that have many connections"
+    assert "Traceback" not in done.stderr
+
+
+def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "nep", *arguments],
+        env={**ENVIRONMENT, **environment},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=LONG_S,
+        check=False,
+    )
+
+
+def test_a_master_names_the_foreign_program_that_holds_its_port():
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        held.listen(8)
+        port = held.getsockname()[1]
+        done = run("master", "--no-gateway", NEP_MASTER=f"127.0.0.1:{port}")
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"nep: port {port} is held by “")
+    assert (
+        f"(process {os.getpid()}), which is no master; end that program, or start the master" in done.stderr
+    )
+    assert f"NEP_MASTER=127.0.0.1:{port + 1}" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way")
+def test_the_doctor_names_the_state_folder_that_takes_no_file(tmp_path):
+    (tmp_path / "file").touch()
+    done = run("doctor", "--json", NEP_STATE_DIR=str(tmp_path / "file" / "state"), NEP_MASTER="127.0.0.1:1")
+    (found,) = [each for each in json.loads(done.stdout) if each["id"].startswith("folder:")]
+    assert found["severity"] == "error"
+    assert "not a directory" in found["sentence"]
+    assert done.returncode == 2
+
+
+def test_an_address_that_is_none_is_a_sentence():
+    done = run("node", "list", NEP_MASTER="no address at all")
+    assert done.returncode == 1
+    assert done.stderr.startswith("nep: 'no address at all:7780' is no address of a master; write it as")
+
+
+def test_the_sentence_for_any_port_names_the_computer():
+    assert str(AddressInUseError("127.0.0.1:*")).startswith("no port of '127.0.0.1' is free; ")
+    assert str(AddressInUseError("127.0.0.1:5")).startswith("'127.0.0.1:5' is in use by another program; ")
+
+
+def test_alerts_are_told_when_they_come_change_and_go():
+    changes = Changes()
+    first, other = Alert("a", "one"), Alert("a", "two")
+    assert changes.take(GraphView(1, 1, alerts=(first,))) == ([first], [])
+    assert changes.take(GraphView(1, 2, alerts=(first,))) == ([], [])
+    assert changes.take(GraphView(1, 3, alerts=(other,))) == ([other], [])
+    assert changes.take(GraphView(1, 4)) == ([], [other])

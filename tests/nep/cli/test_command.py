@@ -1,0 +1,343 @@
+"""The command `nep` as a person uses it: processes, exit codes, both streams."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+import nep
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+LONG_S = 60
+
+
+def environment():
+    return {**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONUNBUFFERED": "1", "COLUMNS": "120"}
+
+
+def run(*arguments, given=""):
+    return subprocess.run(
+        [sys.executable, "-m", "nep", *arguments],
+        input=given,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=LONG_S,
+        env=environment(),
+        check=False,
+    )
+
+
+class Running:
+    """A command that goes on, with what it says."""
+
+    def __init__(self, *arguments):
+        own_group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP} if sys.platform == "win32" else {}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "nep", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            env=environment(),
+            **own_group,
+        )
+
+    def wait_says(self, word):
+        """The line of the error stream that holds `word`."""
+        for line in self.process.stderr:
+            if word in line:
+                return line
+        raise AssertionError(f"it ended with {self.process.wait(LONG_S)} and never said '{word}'")
+
+    def interrupt(self):
+        """Ctrl+C; its exit code and what else it wrote on both streams."""
+        self.process.send_signal(signal.CTRL_BREAK_EVENT if sys.platform == "win32" else signal.SIGINT)
+        out, err = self.process.communicate(timeout=LONG_S)
+        return self.process.returncode, out, err
+
+    def close(self):
+        self.process.kill()
+        self.process.wait(LONG_S)
+        for pipe in (self.process.stdout, self.process.stderr):
+            pipe.close()
+
+
+@pytest.fixture
+def start():
+    running = []
+
+    def make(*arguments):
+        running.append(Running(*arguments))
+        return running[-1]
+
+    yield make
+    for each in running:
+        each.close()
+
+
+@pytest.fixture
+def address(monkeypatch):
+    """A free address for a master; no master is there yet."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        chosen = f"127.0.0.1:{probe.getsockname()[1]}"
+    monkeypatch.setenv("NEP_MASTER", chosen)
+    return chosen
+
+
+@pytest.fixture
+def running_master(address):
+    with nep.Master(address, learn_s=0.0) as master:
+        yield master
+
+
+def test_help_is_in_plain_words_and_names_all_commands():
+    shown = run("--help").stdout
+    assert all(word in shown for word in ("master", "node", "topic"))
+    assert all(word in run("topic", "--help").stdout for word in ("list", "echo", "pub"))
+
+
+def test_the_version_is_that_of_the_package():
+    assert run("--version").stdout == f"nep {nep.__version__}\n"
+    told = re.search(r'^__version__ = "(.+)"$', (REPOSITORY / "nep" / "version.py").read_text(), re.MULTILINE)
+    assert told is not None
+    assert nep.__version__ == told[1]
+
+
+def test_the_master_can_be_named_before_and_behind_the_command(running_master, monkeypatch):
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
+    for words in (
+        ("--master", running_master.address, "topic", "list"),
+        ("topic", "list", "--master", running_master.address),
+    ):
+        assert run(*words).returncode == 0
+    assert run("master", "--master", running_master.address).stderr.startswith(
+        "nep: a master already runs at"
+    )
+
+
+def test_a_name_that_no_computer_has_is_the_right_sentence():
+    done = run("--master", "nosuchhost.invalid:7781", "topic", "list")
+    assert done.returncode == 1
+    assert done.stderr.startswith("nep: no computer is called 'nosuchhost.invalid' here; ")
+    doctor = run("doctor", "--master", "nosuchhost.invalid:7781")
+    assert "No computer is called" in doctor.stdout
+    assert "Start one" not in doctor.stdout
+    assert run("--master", "not an address", "topic", "list").stderr.startswith(
+        "nep: 'not an address:7780' is no"
+    )
+
+
+def test_a_type_that_is_wrong_is_warned_of(running_master):
+    with nep.node("talker") as node:
+        node.new_pub("/odom")
+        done = run("topic", "pub", "/odom", "text", "--type", "string")
+        assert done.returncode == 0
+        assert "'/odom' is published with the type 'json'; yours is 'string'" in done.stderr
+    assert "did you mean 'string'?" in run("topic", "pub", "new", "1", "--type", "strng").stderr
+
+
+def test_lines_that_are_no_utf8_are_a_sentence(running_master):
+    done = subprocess.run(
+        [sys.executable, "-m", "nep", "topic", "pub", "t", "-"],
+        input=b'{"n": 1}\n\xff\xfe\n',
+        capture_output=True,
+        timeout=LONG_S,
+        env=environment(),
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith(b"nep: byte 1 of line 2 is no UTF-8; ")
+
+
+def test_a_wrong_command_is_a_sentence_and_code_2():
+    done = run("topic", "frobnicate")
+    assert done.returncode == 2
+    assert "frobnicate" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_without_a_master_each_command_says_how_to_start_one(address):
+    for command in (("node", "list"), ("topic", "list"), ("topic", "echo", "t"), ("topic", "pub", "t", "1")):
+        done = run(*command)
+        assert done.returncode == 1
+        assert (
+            done.stderr
+            == f"nep: no master answers at '{address}' (waited 2 s); start one with 'nep master'\n"
+        )
+        assert not done.stdout
+
+
+def test_lists_are_tables_for_people_and_json_for_programs(running_master):
+    with nep.node("Pepper") as node, nep.node("page") as other:
+        pub = node.new_pub("/Pepper/battery")
+        with other.new_sub("/Pepper/battery"):
+            shown = run("topic", "list").stdout
+            topics = json.loads(run("topic", "list", "--json").stdout)
+            nodes = json.loads(run("node", "list", "--json").stdout)
+            assert "Pepper" in run("node", "list").stdout
+        assert pub.topic in shown
+        assert [topic["name"] for topic in topics] == ["/Pepper/battery"]
+        assert topics[0]["publishers"][0]["id"] == str(pub.id), "readers with floats alone would lose digits"
+        assert {(each["name"], *each["publishes"], *each["subscribes"]) for each in nodes} == {
+            ("Pepper", "/Pepper/battery"),
+            ("page", "/Pepper/battery"),
+        }
+
+
+def test_empty_lists_say_what_will_fill_them(running_master):
+    assert "no topics yet" in run("topic", "list").stderr
+    assert "no nodes yet" in run("node", "list").stderr
+    assert json.loads(run("topic", "list", "--json").stdout) == []
+
+
+def test_what_is_published_by_hand_arrives(running_master):
+    with nep.node("listener") as node, node.new_sub("t") as sub:
+        done = run("topic", "pub", "t", '{"message": "Grüße"}')
+        assert done.returncode == 0
+        assert "to 1 subscriber" in done.stderr
+        assert sub.listen(timeout_s=LONG_S) == (True, {"message": "Grüße"})
+        run("topic", "pub", "t", "-", given='{"n": 1}\n{"n": 2}\n')
+        assert [sub.listen(timeout_s=LONG_S)[1]["n"] for _ in range(2)] == [1, 2]
+        run("topic", "pub", "t", "7", "--rate", "200", "--count", "5")
+        assert [sub.listen(timeout_s=LONG_S)[1] for _ in range(5)] == [7] * 5
+
+
+def test_the_type_is_the_one_that_the_topic_has(running_master):
+    with nep.node("listener") as node, node.new_sub("words", "string") as sub:
+        assert run("topic", "pub", "words", "no JSON at all").returncode == 0
+        assert sub.listen(timeout_s=LONG_S) == (True, "no JSON at all")
+
+
+def test_bad_input_is_a_sentence_and_code_1(running_master):
+    done = run("topic", "pub", "t", "no JSON at all")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("nep: 'no JSON at all' is no JSON; ")
+    assert run("topic", "pub", "bad topic", "1").returncode == 1
+    assert "'bad topic'" in run("topic", "pub", "bad topic", "1").stderr
+    assert run("topic", "pub", "t", "1", "--rate", "0").returncode == 2
+
+
+def test_echo_writes_one_json_object_a_line(running_master):
+    with nep.node("talker") as node:
+        node.new_pub("t", latched=True).publish({"n": 1})
+        record = json.loads(run("topic", "echo", "t", "--count", "1", "--json").stdout)
+        assert (record["topic"], record["seq"], record["payload"]) == ("t", 1, {"n": 1})
+        assert '{"n":1}' in run("topic", "echo", "t", "-n", "1").stdout
+
+
+def test_echo_ends_when_nothing_comes_for_so_long(running_master):
+    done = run("topic", "echo", "t", "--timeout", "0.2")
+    assert done.returncode == 1
+    assert "did not come within 0.2 s" in done.stderr
+
+
+def test_ctrl_c_ends_everything_at_once_with_130_and_no_traceback(running_master, start):
+    with nep.node("talker") as node:
+        pub = node.new_pub("t")
+        echo = start("topic", "echo", "t", "--json")
+        for _ in iter(lambda: pub.subscribers, 1):
+            threading.Event().wait(0.02)
+        pub.publish({"n": 1})
+        assert json.loads(echo.process.stdout.readline())["payload"] == {"n": 1}
+        latched = start("topic", "pub", "late", "1", "--latched")
+        latched.wait_says("Ctrl+C")
+        for each in (echo, latched):
+            code, out, err = each.interrupt()
+            assert (code, out) == (130, "")
+            assert "Traceback" not in err
+            assert "bort" not in err
+
+
+def test_a_latched_message_reaches_who_comes_later(running_master, start):
+    start("topic", "pub", "late", '{"n": 1}', "--latched").wait_says("Ctrl+C")
+    with nep.node("listener") as node, node.new_sub("late") as sub:
+        assert sub.listen(timeout_s=LONG_S) == (True, {"n": 1})
+
+
+def test_a_reader_that_has_enough_is_no_error(running_master, start):
+    with nep.node("talker") as node:
+        pub = node.new_pub("t")
+        echo = start("topic", "echo", "t", "--json")
+        for _ in iter(lambda: pub.subscribers, 1):
+            threading.Event().wait(0.02)
+        echo.process.stdout.close()
+        for _ in iter(echo.process.poll, 1):
+            pub.publish({"n": 1})
+            threading.Event().wait(0.02)
+        assert "Traceback" not in echo.process.stderr.read()
+
+
+def test_a_master_runs_until_ctrl_c_and_a_second_one_is_refused(address, start):
+    port = address.rpartition(":")[2]
+    first = start("master", "--port", port, "--no-gateway")
+    assert address in first.wait_says("master at")
+    assert nep.is_running(address, LONG_S)
+    second = run("master", "--no-gateway")
+    assert second.returncode == 1
+    assert "already runs" in second.stderr
+    code, _, err = first.interrupt()
+    assert code == 130
+    assert "Traceback" not in err
+    assert not nep.is_running(address, 0.3)
+
+
+def test_a_master_ends_when_its_owner_is_gone_and_nobody_needs_it(address, start):
+    owner = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    master = start("master", "--no-gateway", "--owner-pid", str(owner.pid))
+    master.wait_says("master at")
+    with nep.node("foreign") as node, node.new_sub("t"):
+        owner.communicate(b"\n")
+        with pytest.raises(subprocess.TimeoutExpired):
+            master.process.wait(1.0)
+    assert master.process.wait(LONG_S) == 0
+
+
+def test_a_master_serves_this_computer_only_unless_it_is_told(monkeypatch):
+    monkeypatch.setenv("NEP_MASTER", "192.168.1.7:7780")
+    done = run("master", "--no-gateway")
+    assert done.returncode == 1
+    assert "add --listen 192.168.1.7" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
+def test_a_master_that_listens_says_what_others_type_and_warns(address, start):
+    port = address.rpartition(":")[2]
+    master = start("master", "--port", port, "--no-gateway", "--listen", "127.0.0.2")
+    assert address in master.wait_says("master at")
+    assert nep.is_running(f"127.0.0.2:{port}", LONG_S)
+    assert f"NEP_MASTER=127.0.0.2:{port}" in master.wait_says("other computers connect with")
+    assert master.wait_says("no password")
+    master.interrupt()
+    refused = run("master", "--port", port, "--no-gateway", "--listen", "203.0.113.77")
+    assert refused.returncode == 1
+    assert "no address of this computer" in refused.stderr
+
+
+def test_the_command_starts_without_loading_rich():
+    code = "import sys, nep.cli.app; sys.exit(any(name.split('.')[0] == 'rich' for name in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], env=environment(), check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("topic", "echo", "t", "--timeout", "nan"), "nan is no time; give seconds, 0 or more"),
+        (("topic", "hz", "t", "--timeout", "-1"), "-1 is no time; give seconds, 0 or more"),
+        (("topic", "pub", "t", "1", "--type", "a\x01"), "it is 'a\\x01'; use 200 letters at most"),
+        (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use 200"),
+    ],
+)
+def test_what_cannot_be_is_told_before_a_master_is_looked_for(words, sentence):
+    done = run(*words)
+    assert done.returncode == 2
+    assert sentence in done.stderr

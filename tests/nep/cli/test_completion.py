@@ -1,0 +1,89 @@
+"""Tab in the shell: what is there now, within a moment, and never a word of an error."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import nep
+from nep.cli.complete import _master
+from tests.nep.programs import eventually
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+NEP = "import sys; sys.argv[0] = 'nep'; from nep.cli import main; main()"
+
+
+def complete(shell: str, line: str) -> list[str]:
+    """What the shell is offered for the last word of `line`."""
+    words = {
+        "bash": {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)},
+        "zsh": {"_TYPER_COMPLETE_ARGS": line},
+        "fish": {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
+    }[shell]
+    done = subprocess.run(
+        [sys.executable, "-c", NEP],
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "_NEP_COMPLETE": f"complete_{shell}", **words},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=60,
+        check=False,
+    )
+    assert done.stderr == ""
+    if shell == "zsh":
+        return re.findall(r'"([^"]+)"', done.stdout)
+    return [word.split("\t")[0] for word in done.stdout.split()]
+
+
+@pytest.fixture
+def robot(master):
+    with nep.node("Pepper") as node:
+        pubs = [node.new_pub("/odom", latched=True), node.new_pub("/odd"), node.new_pub("words", "string")]
+        pubs[0].publish({"pose": {"x": 1, "y": 2}, "joints": [1, 2]})
+        eventually(lambda: "/odd" in node.graph().topics)
+        yield
+
+
+@pytest.mark.parametrize("shell", ["bash", "fish"])
+def test_topics_are_offered(robot, shell):
+    assert complete(shell, "nep topic echo /o") == ["/odd", "/odom"]
+
+
+def test_zsh_too(robot):
+    assert complete("zsh", "nep topic hz /o") == ["/odd", "/odom"]
+
+
+def test_a_topic_that_stands_there_already_is_not_offered_again(robot):
+    assert complete("bash", "nep topic hz /odom /o") == ["/odd"]
+
+
+def test_fields_of_the_topic_are_offered(robot):
+    assert complete("bash", "nep topic echo /odom po") == ["pose.x", "pose.y"]
+    assert complete("bash", "nep topic echo /odom j") == ["joints[0]", "joints[1]"]
+
+
+def test_nodes_and_levels_are_offered(robot):
+    assert complete("bash", "nep log --node P") == ["Pepper"]
+    assert complete("bash", "nep log --level w") == ["warning"]
+
+
+def test_without_a_master_nothing_is_offered_and_soon(monkeypatch):
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
+    assert complete("bash", "nep topic echo /o") == []
+    line = SimpleNamespace(params={}, find_root=lambda: SimpleNamespace(params={}))
+    with pytest.raises(OSError, match=r"refused|timed out"):  # at once: nobody is asked, and waited for
+        _master(line)
+    for wrong in ("no address at all", "a..b:7780", f"{'x' * 70}.invalid"):
+        monkeypatch.setenv("NEP_MASTER", wrong)
+        assert complete("bash", "nep topic echo /o") == []
+
+
+def test_more_topics_are_offered_behind_the_first_and_asking_leaves_no_trace(robot, master):
+    assert complete("bash", "nep topic echo /odom /o") == ["/odd"]
+    assert complete("bash", "nep topic echo /odom po") == ["pose.x", "pose.y"]
+    assert not master.view().alerts

@@ -1,0 +1,157 @@
+"""Ctrl+C at any moment of a command: it ends quietly, with 130."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import nep
+from nep import public
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+LONG_S = 60
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="a program of Windows cannot be sent Ctrl+C alone"
+)
+
+AT = """
+import os, runpy, signal, sys
+left = int(sys.argv.pop(1))
+
+def looking(event, _arguments):
+    global left
+    if event == "import" and is_ours():
+        left -= 1
+        if left == 0:
+            os.kill(os.getpid(), signal.SIGINT)
+
+def is_ours():  # before that line of `main` it is Python's time, not ours
+    return "nep.cli.interrupts" in sys.modules and "ask_first" in vars(sys.modules["nep.cli.interrupts"])
+
+sys.addaudithook(looking)
+sys.argv[0] = "nep"
+try:
+    from nep.cli import main
+    main()
+finally:
+    os.write(1, f"left {left}".encode())
+"""
+
+
+def python(code, *words, **more):
+    env = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    return subprocess.run(
+        [sys.executable, "-c", code, *words],
+        capture_output=True,
+        env=env,
+        timeout=LONG_S,
+        check=False,
+        **more,
+    )
+
+
+def imports_of(*words):
+    """How many there are while the command begins."""
+    done = python(AT, "1000000", *words)
+    return 1_000_000 - int(done.stdout.rpartition(b"left ")[2])
+
+
+@pytest.mark.parametrize("words", [("--version",), ("topic", "hz", "--help")])
+def test_while_it_begins(words):
+    many = imports_of(*words)
+    assert many > 100, "it shows what happens while much is imported"
+    for at in (1, 2, 5, many // 4, many // 2, 3 * many // 4, many):
+        done = python(AT, str(at), *words)
+        assert done.stderr == b"", at
+        assert done.returncode == 130, at
+
+
+def test_the_package_is_no_time_in_which_a_traceback_can_come():
+    loaded = "import sys; old = set(sys.modules); import nep.cli; print(*set(sys.modules) - old)"
+    new = {name for name in python(loaded).stdout.decode().split() if not name.startswith("importlib")}
+    assert new <= {"nep", "nep.cli", "__future__", "warnings"}
+
+
+def test_while_the_interpreter_ends():
+    done = python(
+        "import atexit, os, signal, sys; from nep.cli import main\n"
+        "atexit.register(os.kill, os.getpid(), signal.SIGINT)\n"
+        "sys.argv[1:] = ['--version']; main()"
+    )
+    assert (done.returncode, done.stderr) == (130, b"")
+    assert done.stdout.decode().strip() == f"nep {nep.__version__}"
+
+
+def test_once_more_ends_what_is_still_saying_goodbye():
+    done = python(
+        "import os, signal; from nep.cli.interrupts import ask_first\n"
+        "ask_first()\n"
+        "try: os.kill(os.getpid(), signal.SIGINT)\n"
+        "except KeyboardInterrupt: print('bye', flush=True); os.kill(os.getpid(), signal.SIGINT)\n"
+        "print('never')"
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"bye\n", b"")
+
+
+@pytest.mark.parametrize("kept", ["SIG_IGN", "SIG_DFL"])
+def test_who_started_it_decides(kept):
+    done = python(
+        f"import os, signal; from nep.cli.interrupts import ask_first, end_at_once\n"
+        f"signal.signal(signal.SIGINT, signal.{kept})\n"
+        f"ask_first(); assert signal.getsignal(signal.SIGINT) is signal.{kept}\n"
+        f"end_at_once(); assert signal.getsignal(signal.SIGINT) is signal.{kept}\n"
+    )
+    assert done.returncode == 0, done.stderr
+
+
+# ---- the package, which is imported before anything can be said of Ctrl+C
+
+
+def test_every_name_of_the_package_is_there_and_is_the_one_that_checkers_see():
+    tree = ast.parse(Path(nep.__file__).read_text(encoding="utf-8"))
+    seen = {
+        (each.name, statement.module)
+        for statement in ast.walk(tree)
+        if isinstance(statement, ast.ImportFrom)
+        for each in statement.names
+    }
+    assert seen == {("*", "nep.public"), ("__version__", "nep.version")}
+    names = {name for name in vars(public) if not name.startswith("_")}
+    assert names | {"__version__"} == set(nep.__all__)
+    assert "Node" in names
+    assert all(getattr(nep, name) is getattr(public, name) for name in names)
+    assert nep.node is nep.Node
+    assert nep.master is nep.Master
+
+
+def test_what_import_nep_alone_always_gave():
+    done = python(
+        "import nep\n"
+        "assert 'errors' not in vars(nep)\n"
+        "assert issubclass(nep.errors.ClosedError, nep.NepError)\n"
+        "assert not hasattr(nep, 'frobnicate') and not hasattr(nep, '__wrapped__')\n"
+        "from nep import *\n"
+        "assert Publisher is nep.Publisher and node is Node\n"
+        "assert {'Node', 'errors', '__version__'} <= set(dir(nep))\n"
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_all_is_there_at_the_end_of_python_where_nothing_can_be_imported():
+    done = python(
+        "import sys, nep; node = nep.Node\n"
+        "class Last:\n"
+        "    def __del__(self, nep=nep): print(nep.ClosedError.__name__, flush=True)\n"
+        "sys.modules['last'] = Last()\n"
+    )
+    assert (done.stdout, done.stderr) == (b"ClosedError\n", b"")
+
+
+def test_a_package_that_is_missing_is_named():
+    done = python("import sys; sys.modules['zmq'] = None\nimport nep\nnep.node")
+    assert b"ModuleNotFoundError: " in done.stderr

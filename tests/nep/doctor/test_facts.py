@@ -1,0 +1,228 @@
+"""Gathering facts on the real computer, and `nep doctor` itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import typer
+
+import nep
+from nep.cli.doctor import doctor
+from nep.doctor import gather, hindrance, installs, processes
+from nep.doctor.collect import loopback_problem
+from tests.nep.programs import running
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def foreign():
+    """A port that this program holds and that is no master's."""
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        held.listen(1)
+        yield held.getsockname()[1]
+
+
+def test_a_master_of_this_computer_is_found_with_its_process(master):
+    with nep.node("Pepper") as node:
+        node.new_pub("/odom")
+        began = time.monotonic()
+        facts = gather(master.address)
+        took_s = time.monotonic() - began
+    assert {each.name for each in facts.view.nodes.values()} == {"Pepper"}
+    assert 0.0 < facts.answered_s < took_s  # it is a part of the look
+    assert facts.master_port.is_taken
+    assert facts.master_port.holder.pid == os.getpid()
+    assert facts.loopback == ""
+    assert facts.versions["Python"].startswith("3.")
+    assert Path(facts.nep_file) == Path(nep.__file__).parent
+
+
+def test_who_holds_the_port_is_found(foreign):
+    facts = gather(f"127.0.0.1:{foreign}")
+    assert facts.view is None
+    assert facts.master_port.holder.pid == os.getpid()
+    assert not facts.master_port.holder.is_master
+    assert not processes.is_free(foreign)
+
+
+def test_a_free_port_is_free():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    facts = gather(f"127.0.0.1:{port}")
+    assert not facts.master_port.is_taken
+    assert processes.is_free(port)
+
+
+def installed(environment: Path, version: str, place: str = "lib/python3.11/site-packages") -> Path:
+    info = environment / place / f"nep_studio-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: nep-studio\nVersion: {version}\n")
+    return info
+
+
+@pytest.mark.parametrize("place", ["lib/python3.11/site-packages", "Lib/site-packages"])
+def test_a_version_is_read_from_the_environment_of_a_program(tmp_path, place):
+    info = installed(tmp_path, "0.0.9", place)
+    os.utime(info / "METADATA", (1000, 1000))
+    assert installs.install_in(tmp_path) == installs.Install("0.0.9", 1000.0, str(tmp_path))
+    (info / "METADATA").unlink()
+    assert installs.install_in(tmp_path) is None
+
+
+def test_an_environment_without_or_with_two_tells_no_version(tmp_path):
+    assert installs.install_in(tmp_path) is None
+    installed(tmp_path, "0.0.9")
+    installed(tmp_path, "0.1.0")
+    assert installs.install_in(tmp_path) is None
+
+
+@pytest.mark.parametrize(
+    ("command", "active", "environment"),
+    [
+        (["/x/.venv/bin/python3", "-m", "nep", "master"], "", "/x/.venv"),
+        ([".venv/bin/python", "/x/.venv/bin/nep", "master"], "", "/home/me/.venv"),
+        (["python3", "-m", "nep", "master"], "/y/env", "/y/env"),
+        (["python3", "-m", "nep", "master"], "", "/usr"),
+        (["nep", "master"], "", "/usr"),
+        ([], "", "/usr"),
+    ],
+)
+def test_the_environment_of_a_program_is_found(command, active, environment):
+    found = installs.environment_of(command, "/usr/bin/python3.11", "/home/me", active)
+    assert found == Path(environment)
+
+
+def test_a_program_of_an_installer_tells_no_environment():
+    assert installs.environment_of(["nep-studio"], "/opt/nep-studio", "/") is None
+
+
+def test_the_version_of_a_running_master_is_gathered(tmp_path, master, monkeypatch):
+    asked = []
+    known = installs.Install("0.0.9", 1000.0, str(tmp_path))
+    monkeypatch.setattr(installs, "install_of", lambda pid: asked.append(pid) or known)
+    assert gather(master.address).master_install == known
+    assert asked == [os.getpid()]
+    assert gather("127.0.0.1:1").master_install is None
+
+
+def test_a_program_that_has_ended_tells_no_version():
+    done = subprocess.Popen([sys.executable, "-c", ""])
+    done.wait()
+    assert installs.install_of(done.pid) is None
+
+
+def test_a_far_masters_port_is_not_looked_for_here():
+    assert gather("192.0.2.1:7780").master_port is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way")
+def test_folders_that_take_no_files_say_why(tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    facts = gather("127.0.0.1:1", folders=[("Settings", tmp_path / "new"), ("Work", file / "below")])
+    problems = {fact.purpose: fact.problem for fact in facts.folders}
+    assert problems["Settings"] == ""
+    assert problems["Work"] == "not a directory"
+    assert not (tmp_path / "new").exists()
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_file_that_hides_the_package_is_found(tmp_path):
+    assert gather("127.0.0.1:1", here=tmp_path).shadow == ""
+    (tmp_path / "nep.py").touch()
+    assert gather("127.0.0.1:1", here=tmp_path).shadow == str(tmp_path / "nep.py")
+    assert gather("127.0.0.1:1", here=REPOSITORY).shadow == ""
+
+
+def test_loopback_works_here():
+    assert loopback_problem() == ""
+
+
+@pytest.mark.parametrize(
+    ("command", "is_master"),
+    [
+        (["/usr/bin/python3", "-m", "nep", "master"], True),
+        (["/x/bin/nep", "master", "--port", "1"], True),
+        (["nep-studio", "--module", "nep", "master"], True),
+        (["nep", "topic", "pub", "master", "1"], False),
+        (["git", "checkout", "master"], False),
+        ([], False),
+    ],
+)
+def test_a_master_is_known_by_its_command(command, is_master):
+    assert processes.is_master_command(command) is is_master
+
+
+def test_the_command_ends_with_its_verdict(foreign, capfdbinary):
+    with pytest.raises(typer.Exit) as ended:
+        doctor(f"127.0.0.1:{foreign}", as_json=True)
+    assert ended.value.exit_code == 2
+    (first, *_) = json.loads(capfdbinary.readouterr().out)
+    assert (first["id"], first["severity"]) == ("master:foreign", "error")
+
+
+def test_people_see_a_sentence_and_the_next_step(foreign):
+    done = subprocess.run(
+        [sys.executable, "-m", "nep", "doctor", "--master", f"127.0.0.1:{foreign}"],
+        capture_output=True,
+        encoding="utf-8",
+        timeout=30,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8"},
+    )
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("✗ Port")
+    assert lines[2].strip() == f"nep master --port {foreign + 1}"
+
+
+def test_what_hinders_a_master_is_one_finding(foreign, master):
+    one = hindrance(f"127.0.0.1:{foreign}")
+    assert one is not None
+    assert one.id == "master:foreign"
+    assert one.as_error.startswith(f"port {foreign} is held by ")
+    assert "; end that program" in one.as_error
+    assert not one.as_error.endswith(".")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        free = probe.getsockname()[1]
+    assert hindrance(f"127.0.0.1:{free}") is None
+
+
+def test_connections_that_a_killed_program_left_do_not_hold_its_port():
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.socket() as client:
+        address = server.getsockname()
+        client.connect(address)
+        accepted, _ = server.accept()
+        accepted.close()  # from here on its end of the connection waits for the other to close
+        server.close()
+        assert processes.is_free(address[1])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
+def test_programs_with_nodes_are_looked_at_for_their_files(master):
+    code = """
+    import resource, sys, nep
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
+    node = nep.node("Pepper")
+    pub = node.new_pub("topic")
+    print("ready")
+    sys.stdin.readline()
+    """
+    with running(code, NEP_MASTER=master.address) as program:
+        program.line()
+        (found,) = gather(master.address).programs
+        assert (found.pid, found.name) == (program.process.pid, "Pepper")
+        assert 5 < found.opened < 100
+        assert found.limit == 256 or sys.platform == "darwin"

@@ -1,0 +1,172 @@
+"""Picture files are judged before anything decodes them: by their bytes, with one limit for all."""
+
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nep.errors import DecodeError, EncodeError
+from nep.messages import image_codec
+from nep.messages.codecs import codec
+from nep.messages.image_files import MOST_PIXELS, check_size, examine
+from tests.nep import bad_pictures as bad
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+
+
+@pytest.mark.parametrize("name", sorted(bad.BOMBS))
+def test_a_bomb_never_reaches_the_decoder(name: str) -> None:
+    data = bad.BOMBS[name]
+    with pytest.raises(DecodeError) as caught:
+        examine(data)
+    assert caught.value.size_bytes == len(data)
+    assert image_codec.picture_info(data) is None
+    with pytest.raises(EncodeError):
+        codec("image").encode(data)
+
+
+CHILD = """
+import json, resource, sys, time
+import cv2, numpy
+from app.core.messages.picture import decode, png_of
+from nep.errors import NepError
+from nep.messages.message import Message
+from tests.nep.bad_pictures import BOMBS
+
+used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + 300_000_000,) * 2)
+said = {}
+for name, data in BOMBS.items():
+    for told in ({}, {"encoding": "jpeg", "shape": [8, 8, 3]}, {"encoding": "png", "shape": [8, 8, 3]}):
+        message = Message("/c", data, "image", "image", extension=told)
+        for read in (lambda: message.payload, lambda: png_of(message)):
+            try:
+                read()
+                said[name] = "was read"
+            except NepError:
+                pass
+        if decode(message, 0.0, (320, 240))[0] is not None or decode(message, 0.0)[0] is not None:
+            said[name] = "was shown"
+print(json.dumps(said))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_AS is kept by Linux alone")
+def test_no_bomb_takes_memory_in_the_library_or_in_studio() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD],
+        capture_output=True,
+        text=True,
+        cwd=REPOSITORY,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert json.loads(done.stdout) == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("bmp", "it is BMP, and only JPEG and PNG are read"),
+        ("gif", "it is GIF, and only JPEG and PNG are read"),
+        ("png of many pixels", "48000 × 48000 pixels are too many, 120 million are read"),  # noqa: RUF001
+        ("png of 16 bits", "9500 × 12000 pixels take 1824 MB, 750 are given"),  # noqa: RUF001
+        ("jpeg of many passes", "4000 × 4000 pixels in 90 passes take too long"),  # noqa: RUF001
+        ("png with two heads", "a broken PNG: it has two heads"),
+        ("jpeg of 12 bits", "a JPEG of 12 bits for a colour is not read"),
+        ("nothing", "there is nothing in it"),
+        ("a word", "they are no picture: neither JPEG nor PNG"),
+    ],
+)
+def test_the_sentence_says_what_was_refused_and_why(name: str, words: str) -> None:
+    with pytest.raises(DecodeError) as caught:
+        examine(bad.BOMBS[name])
+    assert words in str(caught.value)
+
+
+def test_one_limit() -> None:
+    check_size(MOST_PIXELS // 1000, 1000, 3, 0)
+    with pytest.raises(DecodeError):
+        check_size(MOST_PIXELS // 1000 + 1, 1000, 3, 0)
+    with pytest.raises(EncodeError, match="too many"):
+        codec("image").encode(np.broadcast_to(np.uint8(0), (12_000, 12_000)))
+
+
+def scene() -> np.ndarray:
+    frame = np.zeros((20, 40, 3), np.uint8)
+    frame[:, :20] = (10, 20, 200)
+    frame[:6, :6] = (200, 180, 40)
+    return frame
+
+
+def test_text_profiles_and_animations_of_a_png_are_left_out() -> None:
+    plain = cv2.imencode(".png", scene())[1].tobytes()
+    bomb = zlib.compress(bytes(1_000_000))
+    more = (
+        bad.chunk(b"zTXt", b"a\0\0" + bomb), bad.chunk(b"iTXt", b"x" * 1_000_000),
+        bad.chunk(b"iCCP", b"p\0\0" + bomb),
+        bad.chunk(b"acTL", struct.pack(">II", 1_000_000, 0)), bad.chunk(b"fcTL", bytes(26)),
+    )  # fmt: skip
+    file = examine(plain[:33] + b"".join(more) + plain[33:] + b"rubbish behind its end")
+    assert bytes(file.data) == plain
+    assert file.extension == {"shape": [20, 40, 3], "encoding": "png"}
+    assert examine(plain).data is plain, "what has nothing to be left out is not copied"
+
+
+@pytest.mark.parametrize("order", [">", "<"])
+@pytest.mark.parametrize("kind", ["jpeg", "png"])
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_camera_that_was_turned(kind: str, orientation: int, order: str) -> None:
+    made = cv2.imencode(f".{kind}", scene())[1].tobytes()
+    told = bad.exif(orientation, order)
+    if kind == "jpeg":
+        made = made[:2] + bad.segment(0xE1, told) + made[2:]
+    else:
+        made = made[:33] + bad.chunk(b"eXIf", told[6:]) + made[33:]
+    read = codec("image").decode(memoryview(made), {})
+    assert isinstance(read, np.ndarray)
+    assert np.array_equal(read, cv2.imdecode(np.frombuffer(made, np.uint8), cv2.IMREAD_COLOR))
+    assert image_codec.picture_info(made) == {"shape": list(read.shape), "encoding": kind}
+
+
+def test_a_jpeg_in_refinements_and_one_with_restarts_are_read() -> None:
+    for option in ([cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_RST_INTERVAL, 1]):
+        data = cv2.imencode(".jpg", scene(), option)[1].tobytes()
+        read = codec("image").decode(memoryview(data), {"encoding": "png", "shape": [999_999, 999_999, 3]})
+        assert np.array_equal(read, cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR))
+
+
+JPEG = cv2.imencode(".jpg", scene())[1].tobytes()
+FILE_PNG = cv2.imencode(".png", scene())[1].tobytes()
+
+
+@given(
+    st.sampled_from([JPEG, FILE_PNG, *bad.BOMBS.values()]),
+    st.lists(st.tuples(st.integers(0, 700), st.integers(0, 255)), max_size=4),
+    st.integers(0, 2000),
+)
+@settings(max_examples=300, deadline=None)
+def test_what_is_let_through_is_as_large_as_was_said(
+    data: bytes, changes: list[tuple[int, int]], end: int
+) -> None:
+    changed = bytearray(data[:2000])
+    for at, byte in changes:
+        changed[at : at + 1] = bytes([byte])
+    try:
+        file = examine(bytes(changed[:end]))
+        read = image_codec.read_file(file)
+    except DecodeError:
+        return
+    assert read.shape[:2] == (file.height, file.width)
+    assert read.size <= 3 * MOST_PIXELS

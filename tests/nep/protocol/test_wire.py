@@ -1,0 +1,172 @@
+"""The native wire: what is joined is split again, and nothing else is taken for a message."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nep.errors import BadTopicError, WireError
+from nep.protocol import wire
+from nep.protocol.requests import id_from, node_id_from
+
+VECTORS = json.loads((Path(__file__).parents[2] / "data" / "wire" / "messages.json").read_text("utf-8"))
+
+U64 = st.integers(0, 2**64 - 1)
+TOPICS = st.text(
+    st.characters(exclude_categories=["C", "Z"], exclude_characters="{"), min_size=1, max_size=40
+).filter(lambda topic: len(topic.encode()) <= 200 and not any(letter.isspace() for letter in topic))
+HEADERS = st.builds(wire.Header, st.integers(0, 255), st.sampled_from([0, 1]), U64, U64, U64, st.just(0))
+EXTENSIONS = st.dictionaries(
+    st.text(max_size=8), st.integers() | st.text(max_size=8) | st.binary(max_size=8)
+).map(
+    lambda map_: {
+        key: value for key, value in map_.items() if not isinstance(value, int) or abs(value) < 2**63
+    }
+)
+
+
+@given(TOPICS, HEADERS, st.binary(max_size=100), EXTENSIONS)
+def test_what_is_joined_is_split_again(
+    topic: str, header: wire.Header, payload: bytes, extension: dict[str, object]
+) -> None:
+    parts = wire.join(topic, header, payload, extension)
+    assert len(parts) == (4 if extension else 3)
+    assert len(parts[1]) == wire.HEADER_BYTES
+    back = wire.split(parts)
+    assert (back.topic, back.payload, back.extension) == (topic, payload, extension)
+    assert back.header._replace(flags=header.flags) == header
+
+
+@given(st.binary(max_size=60), st.integers(1, 2**32 - 1))
+def test_a_payload_of_another_size_than_told_is_refused(payload: bytes, told: int) -> None:
+    parts = wire.join("t", wire.Header(3, 0, 1, 2, 3, told), payload)
+    if told == len(payload):
+        assert wire.split(parts).payload == payload
+    else:
+        with pytest.raises(WireError, match=f"tells of {told} bytes, its payload has {len(payload)}"):
+            wire.split(parts)
+
+
+def test_the_quick_ways_read_and_write_the_same_header() -> None:
+    head = wire.pack_quickly(wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
+    assert head == wire.Header(3, wire.LATCHED, 5, 6, 7, 17).pack()
+    assert wire.read_header(head) == wire.Header(3, wire.LATCHED, 5, 6, 7, 17)
+    assert wire.unpack_quickly(head) == (wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
+
+
+@given(st.lists(st.binary(max_size=60), max_size=5))
+def test_anything_else_is_refused_with_a_sentence(parts: list[bytes]) -> None:
+    with contextlib.suppress(WireError):
+        wire.split(parts)
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=lambda vector: vector["name"])
+def test_the_shared_vectors(vector: dict[str, object]) -> None:
+    parts = [bytes.fromhex(part) for part in vector["parts"]]  # type: ignore[attr-defined]
+    if "error" in vector:
+        with pytest.raises(WireError, match=str(vector["error"])):
+            wire.split(parts)
+        return
+    read = wire.split(parts)
+    said = vector["means"]
+    assert isinstance(said, dict)
+    assert read.topic == said["topic"]
+    assert read.header == wire.Header(
+        said["codec"], said["flags"], said["seq"], said["stamp_ns"], said["publisher"], said.get("size", 0)
+    )
+    assert bytes(read.payload).hex() == said["payload"]
+    assert read.extension == said["extension"]
+    joined = wire.join(read.topic, read.header, read.payload, read.extension or None)
+    assert list(joined) == parts or [b"".join(joined)] == parts
+
+
+@given(TOPICS, HEADERS, st.binary(max_size=100))
+def test_one_part_is_split_like_three(topic: str, header: wire.Header, payload: bytes) -> None:
+    parts = wire.join(topic, header, payload)
+    assert wire.split([b"".join(parts)]) == wire.split(parts)
+
+
+@given(st.integers(0, 2**64 - 1), TOPICS, st.booleans(), st.booleans())
+def test_a_hello_is_read_back(subscriber: int, topic: str, one_part: bool, tells: bool) -> None:
+    part = wire.hello_part(subscriber, topic, one_part=one_part, tells=tells)
+    assert wire.parse_hello(part) == (subscriber, topic, one_part or tells, tells)
+    assert part > wire.topic_part(topic)  # libzmq sends filters in byte order
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        b"",
+        b"topic\0",
+        b"\xffhello/",
+        b"\xffhello/12/t",
+        b"\xffhello/zzzzzzzzzzzzzzzz/t",
+        b"\xffhello/" + b"0" * 16,
+    ],
+)
+def test_what_is_no_hello(part: bytes) -> None:
+    assert wire.parse_hello(part) is None
+
+
+@given(st.builds(wire.Read, *[st.integers(0, 2**64 - 1)] * 4))
+def test_what_was_read_is_read_back(read: wire.Read) -> None:
+    assert wire.parse_read(wire.read_part(read)) == read
+    assert wire.parse_hello(wire.read_part(read)) is None
+
+
+@given(st.binary(max_size=80) | st.text("0123456789abcdef/-", max_size=70).map(str.encode))
+def test_what_is_no_such_answer(junk: bytes) -> None:
+    read = wire.parse_read(b"\xffread/" + junk)
+    assert read is None or wire.read_part(read) == b"\xffread/" + junk.lower()
+    assert wire.parse_read(junk) is None
+
+
+@pytest.mark.parametrize("topic", ["a", "/Pepper/camera", "ü/ä", "x" * 200, "a=b,c", "機器人"])
+def test_topics_that_are_allowed(topic: str) -> None:
+    assert wire.check_topic(topic) == topic
+
+
+@pytest.mark.parametrize(
+    ("topic", "reason"),
+    [
+        ("", "it has 0 bytes"),
+        ("x" * 201, "it has 201 bytes"),
+        ("ü" * 101, "it has 202 bytes"),
+        ("a b", "the character ' ' is not allowed"),
+        ("a\tb", r"the character '\\t'"),
+        ("a{b", "the character '{'"),
+        ("a\0", r"the character '\\x00'"),
+        ("a\u2028", r"the character '\\u2028'"),
+        ("a\x85", r"the character '\\x85'"),
+        ("\ud800", "no Unicode text"),
+        (7, "a topic is a 'str'"),
+    ],
+)
+def test_topics_that_are_not(topic: str, reason: str) -> None:
+    with pytest.raises(BadTopicError, match=reason):
+        wire.check_topic(topic)
+
+
+def test_an_unknown_version_is_named() -> None:
+    header = bytearray(wire.Header(1, 0, 1, 2, 3).pack())
+    header[0] = 9
+    with pytest.raises(WireError, match="its version is 9, this nep reads version 1; update nep"):
+        wire.read_header(bytes(header))
+
+
+def test_an_extension_that_msgpack_cannot_hold() -> None:
+    with pytest.raises(WireError, match="an extension holds what msgpack cannot"):
+        wire.extension_part({"a": object()})
+
+
+def test_ids_come_from_the_key_as_the_vectors_say() -> None:
+    vectors = json.loads((Path(__file__).parents[2] / "data" / "wire" / "ids.json").read_text("utf-8"))
+    assert len(vectors["nodes"]) == 3
+    for each in vectors["nodes"]:
+        assert node_id_from(each["key"]) == each["node_id"]
+        assert {number: str(id_from(each["key"], int(number))) for number in each["ids"]} == each["ids"]

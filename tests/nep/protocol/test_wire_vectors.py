@@ -1,0 +1,182 @@
+"""The vectors of the wire, through the sockets: what is sent and read here is what they say, byte by byte.
+
+`tests/data/wire` is what other implementations are written against; `test_wire.py` holds the pure functions
+against it. Here a plain ZeroMQ socket stands for the other implementation.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zmq
+
+import nep
+from nep.masters.master import Master
+from nep.messages.codecs import codec_numbered
+from nep.messages.encoded import Encoded
+from nep.messages.packing import pack, unpack
+from nep.protocol import wire
+from tests.nep.programs import eventually
+
+DATA = Path(__file__).parents[2] / "data" / "wire"
+VECTORS: list[dict[str, Any]] = json.loads((DATA / "messages.json").read_text("utf-8"))
+GOOD = [each for each in VECTORS if "means" in each]
+BAD = [each for each in VECTORS if "error" in each]
+MASTER: dict[str, Any] = json.loads((DATA / "master.json").read_text("utf-8"))
+LONG_MS = 30_000
+
+
+def name_of(vector: dict[str, Any]) -> str:
+    return str(vector["name"])
+
+
+def parts_of(vector: dict[str, Any]) -> list[bytes]:
+    return [bytes.fromhex(part) for part in vector["parts"]]
+
+
+def type_of(vector: dict[str, Any]) -> str:
+    codec = codec_numbered(vector["means"]["codec"])
+    assert codec is not None
+    return codec.name
+
+
+@pytest.fixture
+def their() -> Iterator[Callable[[int], zmq.Socket[bytes]]]:
+    """Makes plain sockets of a kind, and closes them."""
+    with contextlib.ExitStack() as ended:
+        context = ended.enter_context(zmq.Context())
+
+        def make(kind: int) -> zmq.Socket[bytes]:
+            made = ended.enter_context(context.socket(kind))
+            made.linger, made.rcvtimeo = 0, LONG_MS
+            return made
+
+        yield make
+
+
+@pytest.fixture
+def node() -> Iterator[nep.Node]:
+    with nep.node("ours") as made:
+        yield made
+
+
+# ---- messages
+
+
+@pytest.mark.parametrize("vector", GOOD, ids=name_of)
+def test_a_publisher_sends_what_the_vector_says(
+    vector: dict[str, Any],
+    master: Master,
+    node: nep.Node,
+    their: Callable[[int], zmq.Socket[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said, parts = vector["means"], parts_of(vector)
+    theirs = their(zmq.SUB)
+    is_latched = bool(said["flags"] & wire.LATCHED)
+    publisher = node.new_pub(said["topic"], type_of(vector), latched=is_latched)
+    (known,) = node.graph().topics[said["topic"]].publishers
+    sends = publisher._transport
+    monkeypatch.setattr(sends, "_id", said["publisher"])
+    monkeypatch.setattr(sends, "count", said["seq"] - 1)
+    if len(parts) == 1:  # as when it has just been seen that all is read
+        monkeypatch.setattr(sends, "_settle_at", 2**20)
+    monkeypatch.setattr("nep.backends.zeromq.publisher._time_ns", lambda: said["stamp_ns"])
+    theirs.subscribe(wire.topic_part(said["topic"]))
+    if len(parts) == 1:  # only to those who say that they read it
+        theirs.subscribe(wire.hello_part(7, said["topic"], one_part=True))
+    theirs.connect(known.endpoints[0])
+    eventually(lambda: publisher.subscribers if len(parts) == 1 else sends.is_heard)
+    if len(parts) == 1:
+        assert theirs.recv_multipart()[0] == wire.hello_part(7, said["topic"], one_part=True)
+    payload = bytes.fromhex(said["payload"])
+    sends.send(Encoded(payload, said["extension"] or None))
+    got = theirs.recv_multipart()
+    sized = wire.Header(
+        said["codec"], said["flags"], said["seq"], said["stamp_ns"], said["publisher"], len(payload)
+    ).pack()
+    untold = wire.read_header(sized)._replace(size=0).pack()
+    whole = [b"".join(parts)] if len(parts) == 1 else parts
+    assert [part.replace(sized, untold) if said.get("size") is None else part for part in got] == whole
+
+
+@pytest.mark.parametrize("vector", GOOD, ids=name_of)
+def test_a_subscriber_reads_what_the_vector_means(
+    vector: dict[str, Any], node: nep.Node, their: Callable[[int], zmq.Socket[bytes]]
+) -> None:
+    said = vector["means"]
+    theirs = their(zmq.XPUB)
+    port = theirs.bind_to_random_port("tcp://127.0.0.1")
+    direct = node.direct(port=port, mode="one2many", wire="native")
+    subscriber = node.new_sub(said["topic"], type_of(vector), direct)
+    assert theirs.recv() == b"\1" + wire.topic_part(said["topic"])
+    theirs.send_multipart(parts_of(vector))
+    message = subscriber.receive(LONG_MS / 1000)
+    assert message is not None
+    assert (message.topic, message.codec) == (said["topic"], type_of(vector))
+    assert (message.seq, message.stamp_ns, message.publisher) == (
+        said["seq"],
+        said["stamp_ns"],
+        said["publisher"],
+    )
+    assert bytes(message.data).hex() == said["payload"]
+    assert dict(message.extension) == said["extension"]
+    assert message.is_latched == bool(said["flags"] & wire.LATCHED)
+
+
+@pytest.mark.parametrize("vector", BAD, ids=name_of)
+def test_a_subscriber_refuses_what_is_none_and_reads_on(
+    vector: dict[str, Any], node: nep.Node, their: Callable[[int], zmq.Socket[bytes]]
+) -> None:
+    theirs = their(zmq.XPUB)
+    port = theirs.bind_to_random_port("tcp://127.0.0.1")
+    direct = node.direct(port=port, mode="one2many", wire="native")
+    subscriber = node.new_sub("example", "json", direct)
+    assert theirs.recv() == b"\1" + wire.topic_part("example")
+    # A topic that is none never passes the subscriber's own filter.
+    passes = parts_of(vector)[0].startswith(wire.topic_part("example"))
+    theirs.send_multipart(parts_of(vector))
+    theirs.send_multipart(parts_of(GOOD[0]))
+    message = subscriber.receive(LONG_MS / 1000)
+    assert message is not None
+    assert bytes(message.data).hex() == GOOD[0]["means"]["payload"]
+    assert subscriber.refused == int(passes)
+
+
+# ---- the master
+
+
+@pytest.mark.parametrize("vector", MASTER["asked"], ids=name_of)
+def test_a_master_answers_what_the_vector_says(
+    vector: dict[str, Any], master: Master, their: Callable[[int], zmq.Socket[bytes]]
+) -> None:
+    theirs = their(zmq.DEALER)
+    theirs.connect(f"tcp://{master.address}")
+    for request in vector["before"]:
+        theirs.send(bytes.fromhex(request))
+        theirs.recv()
+    theirs.send(bytes.fromhex(vector["request"]))
+    answer = unpack(theirs.recv())
+    assert isinstance(answer, dict)
+    epoch = answer["what"].pop("epoch")
+    assert isinstance(epoch, int)
+    assert pack(answer).hex() == vector["answer"]
+
+
+def test_whoever_asks_sends_what_the_vector_says(their: Callable[[int], zmq.Socket[bytes]]) -> None:
+    theirs = their(zmq.ROUTER)
+    port = theirs.bind_to_random_port("tcp://127.0.0.1")
+    found: list[bool] = []
+    asks = threading.Thread(target=lambda: found.append(nep.is_running(f"127.0.0.1:{port}")))
+    asks.start()
+    who, body = theirs.recv_multipart()
+    assert body.hex() == MASTER["ping"]["request"]
+    theirs.send_multipart([who, bytes.fromhex(MASTER["ping"]["answer"])])
+    asks.join(LONG_MS / 1000)
+    assert found == [True]

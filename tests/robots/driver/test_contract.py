@@ -1,0 +1,446 @@
+"""What every driver owes to the people who rely on it: one contract, over each robot and each example.
+
+With ``--driver FILE`` it is held against the robots of that file instead, wherever it lies.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+import nep
+from app import resources
+from app.robots import simulated, turtle
+from app.robots.description.description import Action, Parameter, Robot, parse, validate
+from app.robots.driver.driver import Driver
+from app.robots.identity import program_of
+from app.robots.kit import Kind
+from tests.robots.conftest import Ears, FakeClock, eventually
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+FINAL = {"succeeded", "failed", "canceled"}
+PATIENCE_S = 3.0  # a loaded machine; what stops on its own within its `within` is measured in bench/stop.py
+
+
+def kinds_in(path: Path) -> list[Kind]:
+    """The robots that a file declares; what lies beside it can be imported, as when it is run."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None, f"{path} is no file of Python"
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module  # where dataclasses and type hints look a file's names up
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
+    found = [each for each in vars(module).values() if isinstance(each, Kind)]
+    assert found, f"{path} declares no robot; write ROBOT = Kind(...)"
+    return found
+
+
+def kinds(drivers: Sequence[str]) -> Iterator[Kind]:
+    """The robots of those files; without any those of Studio, and whatever in examples/ declares one."""
+    if drivers:
+        for driver in drivers:
+            yield from kinds_in(Path(driver).resolve())
+        return
+    yield simulated.ROBOT
+    yield turtle.ROBOT
+    for path in sorted(EXAMPLES.glob("*.py")):
+        if "app.robots.kit" in path.read_text(encoding="utf-8"):
+            yield from kinds_in(path)
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Each robot is a parameter of its own."""
+    if "kind" in metafunc.fixturenames:
+        found = list(kinds(metafunc.config.getoption("--driver")))
+        metafunc.parametrize("kind", found, ids=[each.model for each in found], scope="module")
+
+
+@dataclass
+class Bench:
+    """A driver whose time a test holds in its hand, and ears on its topics."""
+
+    kind: Kind
+    driver: Driver
+    ears: Ears
+    clock: FakeClock
+    count: int = 0
+    times: dict[str, bool] = field(default_factory=dict)
+
+    @property
+    def robot(self) -> Robot:
+        return self.driver.robot
+
+    def new_id(self) -> str:
+        self.count += 1
+        return f"{self.kind.model}-{self.count}"
+
+    def actions(self) -> list[Action]:
+        stop = self.robot.safe_stop.action
+        return [action for action in self.robot.actions if action.name != stop]
+
+    def long(self) -> list[Action]:
+        """The actions that can be ended: with a clock that stands, those that take time run until then."""
+        return [action for action in self.actions() if action.cancellable]
+
+    def invoke(self, action: Action, program: str | None = None) -> str:
+        wanted = self.new_id()
+        self.ears.invoke(wanted, action.name, program, **required(action))
+        return wanted
+
+    def any_action(self, *, long: bool = False) -> Action:
+        """One of its actions; with `long` one that runs until it is ended. A robot without is skipped."""
+        found = [action for action in self.long() if takes_time(self, action)] if long else self.actions()
+        if not found:
+            pytest.skip("this robot has no such action")
+        return found[0]
+
+    def begun(self, program: str | None = None) -> str:
+        """The id of an action that runs until it is ended."""
+        wanted = self.invoke(self.any_action(long=True), program)
+        self.running(wanted)
+        return wanted
+
+    def running(self, wanted: str) -> None:
+        eventually(lambda: "running" in self.ears.states(wanted))
+
+    def stop(self, **more: object) -> dict[str, object]:
+        wanted = self.new_id()
+        self.ears.command(id=wanted, op="stop", **more)
+        return self.ears.final(wanted, "stop", PATIENCE_S + self.robot.safe_stop.within_s)
+
+    def finals(self, wanted: str) -> list[dict[str, object]]:
+        answers = self.ears.answers(wanted)
+        return [answer for answer in answers if answer["state"] in FINAL and answer["op"] == "invoke"]
+
+
+def required(action: Action) -> dict[str, object]:
+    """An input with what must be given."""
+    return {p.name: good_for(p) for p in action.parameters if p.required}
+
+
+def good_for(parameter: Parameter) -> object:
+    """A value that the parameter takes."""
+    if parameter.default is not None:
+        return parameter.default
+    if parameter.choices:
+        return parameter.choices[0].value
+    if parameter.kind in {"number", "integer", "angle"}:
+        low, high = parameter.minimum, parameter.maximum
+        return low if low is not None and low > 0 else min(0, 0 if high is None else high)
+    if parameter.kind == "list":
+        held = parameter.each or Parameter("value", "value", "text")
+        return [good_for(each) for each in parameter.places] or [good_for(held)] * parameter.min_length
+    if parameter.kind == "object":
+        return {each.name: good_for(each) for each in parameter.fields if each.required}
+    return {"boolean": False, "colour": "#20c0e0"}.get(parameter.kind, "x" * max(1, parameter.min_length))
+
+
+def takes_time(bench: Bench, action: Action) -> bool:
+    """Whether an action, begun in the world as it is now, goes on until it is ended.
+
+    Three times, as on a busy computer a cancel may overtake an action that ends at once.
+    """
+    if action.name not in bench.times:
+        bench.times[action.name] = all(_goes_on(bench, action) for _ in range(3))
+    return bench.times[action.name]
+
+
+def _goes_on(bench: Bench, action: Action) -> bool:
+    wanted = bench.invoke(action)
+    bench.running(wanted)
+    bench.ears.command(id=wanted, op="cancel")
+    ended = bench.ears.final(wanted)["state"]
+    bench.stop()
+    return ended == "canceled"
+
+
+def wrong_for(kind: str) -> object:
+    """A value that no parameter of this kind takes."""
+    return "many" if kind in {"number", "integer", "angle", "object"} else {"x": 1}
+
+
+@contextmanager
+def at_its_start(kind: Kind, name: str) -> Iterator[Bench]:
+    """A driver of its own, in the world as it is when the robot starts."""
+    clock = FakeClock()
+    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
+        ears = Ears(other, name.replace(" ", "_"))
+        with Driver(kind, name, node, clock=clock) as driver:
+            yield Bench(kind, driver, ears, clock)
+
+
+@pytest.fixture(scope="module")
+def shared(kind: Kind) -> Iterator[Bench]:
+    with at_its_start(kind, f"The {kind.model}") as bench:
+        bench.stop()  # an async one begins the robot's event loop, which lasts as long as the robot
+        yield bench
+
+
+@pytest.fixture
+def bench(shared: Bench) -> Iterator[Bench]:
+    yield shared
+    shared.stop()  # whatever a test left running
+
+
+# ---- what it says about itself ---------------------------------------------------------------------
+
+
+def test_its_description_is_valid_and_every_action_is_there(bench, request) -> None:
+    ours = not request.config.getoption("--driver")  # what we ask of our own robots, for the look of them
+    assert validate(bench.kind.thing_model) == ()
+    described = json.loads(json.dumps(bench.driver.description))
+    assert parse(described) == bench.robot
+    for action in bench.robot.actions:
+        assert callable(getattr(bench.driver.body, action.name))
+        assert not (action.risk and not action.uses), f"{action.name} moves something, so it uses it"
+        if not ours:
+            continue
+        assert f"\n{action.icon}\t" in resources.path("icons", "lucide.txt").read_text("utf-8")
+    assert bench.robot.beat_s is not None
+    assert bench.robot.safe_stop.confirmed
+    assert bench.robot.safe_stop.watchdog_s is not None
+
+
+# ---- stop ------------------------------------------------------------------------------------------
+
+
+def test_a_stop_at_rest_is_answered(bench) -> None:
+    assert bench.stop()["state"] == "succeeded"
+    assert bench.stop()["state"] == "succeeded"
+
+
+def test_a_stop_ends_whatever_runs_and_whatever_waits(bench) -> None:
+    ended = []
+    for action in bench.long():
+        first = bench.invoke(action)
+        bench.running(first)
+        second = bench.invoke(action)
+        eventually(lambda second=second: bench.ears.states(second))
+        assert bench.stop()["state"] == "succeeded", action.name
+        for wanted in (first, second):
+            (final,) = bench.finals(wanted)  # one that has nothing to do may have been quicker than the stop
+            ended.append(final["state"])
+    assert "canceled" in ended or not any(takes_time(bench, action) for action in bench.long())
+    assert set(ended) <= FINAL
+
+
+def test_many_stops_at_once_are_all_answered(bench) -> None:
+    bench.begun()
+    ids = [bench.new_id() for _ in range(5)]
+    for wanted in ids:
+        bench.ears.command(id=wanted, op="stop")
+    assert {bench.ears.final(wanted, "stop")["state"] for wanted in ids} == {"succeeded"}
+
+
+def test_the_stop_action_is_a_stop_too(bench) -> None:
+    started = bench.begun()
+    wanted = bench.new_id()
+    bench.ears.invoke(wanted, bench.robot.safe_stop.action)
+    assert bench.ears.final(wanted)["state"] == "succeeded"
+    assert bench.ears.final(started)["state"] == "canceled"
+
+
+def test_a_stop_that_ends_a_program_refuses_what_it_sent_before(bench) -> None:
+    bench.ears.command(id=bench.new_id(), op="stop", ends="the key of a program")
+    late = bench.invoke(bench.any_action(), program_of("the key of a program"))
+    assert bench.ears.final(late)["state"] == "canceled"
+    assert "running" not in bench.ears.states(late)
+
+
+def test_nobody_else_ends_a_program(bench) -> None:
+    """Its name can be read by everybody: a stop that only names it stops the robot, and no more."""
+    assert bench.stop(ends="studio")["state"] == "succeeded"
+    asked = bench.invoke(bench.any_action(), "studio")
+    bench.running(asked)
+
+
+# ---- actions ---------------------------------------------------------------------------------------
+
+
+def test_each_action_is_answered_exactly_once_and_can_be_canceled(shared) -> None:
+    canceled = []
+    for action in shared.actions():
+        # What turned a robot away would take the face from its next action.
+        with at_its_start(shared.kind, f"Another {shared.kind.model}") as bench:
+            wanted = bench.invoke(action)
+            if action.cancellable:
+                bench.running(wanted)
+                bench.ears.command(id=wanted, op="cancel")
+            ended = bench.ears.final(wanted)["state"]
+            bench.stop()  # all answers have been given by now
+            assert len(bench.finals(wanted)) == 1
+            assert bench.ears.states(wanted)[:2] == ["accepted", "running"]
+            # one that has nothing to do (to stand straight when it does) may be quicker than its cancel,
+            # and one that gets a made up value may have its own reason to refuse it
+            made_up = any(p.required and p.default is None for p in action.parameters)
+            allowed = ["succeeded", *["canceled"] * action.cancellable, *["failed"] * made_up]
+            assert ended in allowed, (action.name, bench.finals(wanted))
+            canceled += [action.name] * (ended == "canceled")
+    assert canceled or not any(takes_time(shared, action) for action in shared.long())
+
+
+def test_a_cancel_that_finds_nothing_says_so(bench) -> None:
+    wanted = bench.new_id()
+    bench.ears.command(id=wanted, op="cancel")
+    answer = bench.ears.final(wanted, "cancel")
+    assert (answer["state"], answer["error"]) == ("failed", "nothing with this id runs")
+
+
+def test_what_takes_too_long_fails_with_its_limit(bench) -> None:
+    late = []
+    for action in (each for each in bench.long() if each.timeout_s):
+        wanted = bench.invoke(action)
+        bench.running(wanted)
+        bench.clock.advance(action.timeout_s + 0.1)
+        ended = bench.ears.final(wanted)
+        if ended["state"] == "succeeded":
+            continue  # one that only lets time pass was done in that moment
+        assert ended["state"] == "failed"
+        assert ended["error"] == f"{action.name} took longer than {action.timeout_s:g} s"
+        late.append(action.name)
+    assert late or not any(takes_time(bench, action) for action in bench.long() if action.timeout_s)
+
+
+def test_busy_is_handled_as_the_description_says(bench) -> None:
+    for action in (each for each in bench.long() if each.uses):
+        first = bench.invoke(action)
+        bench.running(first)
+        second = bench.invoke(action)
+        eventually(lambda second=second: bench.ears.states(second))
+        if bench.finals(first) and bench.finals(first)[0]["state"] == "succeeded":
+            continue  # it had nothing to do
+        told = bench.ears.answers(second)[0]
+        if action.on_busy == "queue":
+            assert told["waits_for"] == [action.name]
+            bench.ears.command(id=first, op="cancel")
+        elif action.on_busy == "replace":
+            assert told["replaces"] == [action.name]
+        else:
+            assert (told["state"], "is busy with" in str(told["error"])) == ("failed", True)
+            bench.stop()
+            continue
+        assert bench.ears.final(first)["state"] == "canceled"
+        bench.running(second)
+        bench.stop()
+
+
+def test_it_stops_when_the_program_that_moves_it_falls_silent(bench) -> None:
+    wanted = bench.begun("silent")
+    bench.clock.advance((bench.robot.safe_stop.watchdog_s or 0) + 0.05)
+    ended = bench.ears.final(wanted)
+    assert ended["state"] == "canceled"
+    assert "no sign of life" in str(ended["error"])
+
+
+def test_it_tells_that_it_lives_while_it_does_something(bench) -> None:
+    def beats() -> int:
+        return sum(1 for answer in list(bench.ears.heard["answer"]) if answer["op"] == "alive")
+
+    bench.begun()
+    told = beats()
+    bench.clock.advance((bench.robot.beat_s or 0) + 0.01)
+    eventually(lambda: beats() > told)
+
+
+# ---- what is wrong ---------------------------------------------------------------------------------
+
+
+def test_wrong_inputs_are_refused_with_a_sentence_and_nothing_runs(bench) -> None:
+    for action in bench.actions():
+        inputs: list[object] = [{"no such thing": 1}, "text", [1, 2]]
+        inputs += [{**required(action), p.name: wrong_for(p.kind)} for p in action.parameters]
+        inputs += [{**required(action), p.name: None} for p in action.parameters if not p.nullable]
+        limited = [p for p in action.parameters if p.maximum is not None]
+        inputs += [{**required(action), p.name: (p.maximum or 0) + 1} for p in limited]
+        for given in inputs:
+            wanted = bench.new_id()
+            bench.ears.command(id=wanted, op="invoke", action=action.name, input=given)
+            answer = bench.ears.final(wanted)
+            assert answer["state"] == "failed", (action.name, given)
+            assert str(answer["error"]).startswith(f"{action.name}: ")
+            assert bench.ears.states(wanted) == ["failed"]
+
+
+def test_an_action_that_it_has_not_is_refused(bench) -> None:
+    wanted = bench.new_id()
+    bench.ears.invoke(wanted, "fly to the moon")
+    assert "can't “fly to the moon”" in str(bench.ears.final(wanted)["error"])
+
+
+@pytest.mark.parametrize(
+    "message",
+    [None, 7, "stop", [], {}, {"op": "invoke"}, {"id": 7, "op": "stop"}, {"id": "x" * 500, "op": "stop"},
+     {"id": "", "op": "invoke"}, {"id": None, "op": None}],
+    ids=repr,
+)  # fmt: skip
+def test_messages_that_are_no_commands_change_nothing(bench, message) -> None:
+    before = len(bench.ears.heard["answer"])
+    bench.ears._command.publish(message)
+    wanted = bench.new_id()
+    bench.ears.command(id=wanted, op="dance")
+    answer = bench.ears.final(wanted, "dance")
+    assert "a command is invoke, cancel, stop or alive" in str(answer["error"])
+    assert [a["id"] for a in bench.ears.heard["answer"][before:]] == [wanted]
+
+
+def test_the_same_command_twice_runs_once(bench) -> None:
+    action = bench.any_action(long=True)
+    wanted = bench.invoke(action)
+    bench.running(wanted)
+    bench.ears.invoke(wanted, action.name, **required(action))
+    bench.ears.command(id=wanted, op="cancel")
+    bench.ears.final(wanted)
+    bench.stop()
+    assert bench.ears.states(wanted).count("accepted") == 1
+    assert len(bench.finals(wanted)) == 1
+
+
+# ---- its life --------------------------------------------------------------------------------------
+
+
+def test_closing_answers_what_is_open_and_leaves_no_thread(kind) -> None:
+    name = f"Closing {kind.model}"
+    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
+        ears = Ears(other, name.replace(" ", "_"))
+        clock = FakeClock()
+        with Driver(kind, name, node, clock=clock) as driver:  # closes it once more
+            bench = Bench(kind, driver, ears, clock)
+            long = bench.any_action(long=True)
+            ears.invoke("1", long.name, **required(long))
+            eventually(lambda: "running" in ears.states("1"))
+            driver.close()
+            assert ears.final("1")["state"] == "canceled"
+            ears.invoke("2", long.name)
+            assert ears.answers("2") == []
+    assert [t.name for t in threading.enumerate() if t.name.startswith(name)] == []
+
+
+def test_what_its_description_suggests_can_be_done(kind) -> None:
+    """With the computer's own clock, all at once where they use different things."""
+    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
+        name = f"Real_{kind.model}"
+        ears = Ears(other, name)
+        with Driver(kind, name, node) as driver:
+            taken: set[str] = set()
+            asked: dict[str, Mapping[str, object]] = {}
+            for action in driver.robot.actions:
+                made_up = any(p.required and p.default is None for p in action.parameters)
+                if taken & set(action.uses) or action.name == driver.robot.safe_stop.action or made_up:
+                    continue
+                taken |= set(action.uses)
+                asked[action.name] = required(action)
+                ears.invoke(action.name, action.name, **required(action))
+            for wanted in asked:
+                assert ears.final(wanted)["state"] == "succeeded", wanted

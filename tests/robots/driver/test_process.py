@@ -1,0 +1,274 @@
+"""Drivers as processes: they end with their owner, and a driver of RIZE is driven over the network."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+import nep
+from app.robots.description.description import parse
+from tests.robots.conftest import Ears, eventually
+
+ROOT = Path(__file__).resolve().parents[3]
+SLEEPER = "import sys; sys.stdin.read()"
+
+
+@pytest.fixture
+def network() -> Iterator[str]:
+    with nep.Master("127.0.0.1:0") as master:
+        yield master.address
+
+
+def start(*arguments: str, network: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "NEP_MASTER": network, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        [sys.executable, *arguments], cwd=ROOT, env=environment, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def ended(process: subprocess.Popen[str], timeout_s: float = 5.0) -> tuple[int, str]:
+    """Its exit code and what it complained about; it is killed when it did not end."""
+    try:
+        _, errors = process.communicate(timeout=timeout_s)
+    finally:
+        process.kill()
+        process.wait()
+    return process.returncode, errors
+
+
+def found(network: str) -> nep.GraphView:
+    with nep.node("looker", master=network) as node:
+        return node.graph()
+
+
+def has_robot(network: str) -> bool:
+    return any(topic.msg_type == "robot/description" for topic in found(network).topics.values())
+
+
+def test_the_virtual_robot_runs_and_leaves_when_told(network):
+    process = start("-m", "app.robots.simulated", "--name", "Miss Pepper", "--seed", "3", network=network)
+    try:
+        with nep.node("me", master=network) as node:
+            message = node.new_sub("/Miss_Pepper/description", "robot/description").receive(15.0)
+            assert message is not None
+            assert parse(message.payload).name == "Miss Pepper"
+            picture = node.new_sub("/Miss_Pepper/camera", "image").receive(30.0)
+            assert picture is not None
+            assert picture.codec == "image"
+            ears = Ears(node, "Miss_Pepper")
+            ears.invoke("1", "turn", angle=360, speed=20)
+            eventually(lambda: "running" in ears.states("1"))
+            process.send_signal(signal.SIGTERM)
+            assert ears.final("1")["state"] == "canceled"
+    finally:
+        code, errors = ended(process)
+    assert (code, errors) == (0, "")
+    eventually(lambda: not has_robot(network))
+
+
+def test_it_ends_with_its_owner(network):
+    owner = subprocess.Popen([sys.executable, "-c", SLEEPER], stdin=subprocess.PIPE)
+    robot = start("-m", "app.robots.simulated", "--owner-pid", str(owner.pid), network=network)
+    try:
+        eventually(lambda: has_robot(network))
+        assert robot.poll() is None
+        owner.kill()
+        owner.wait()
+        code, errors = ended(robot)
+    finally:
+        owner.kill()
+        owner.communicate()
+        ended(robot)
+    assert (code, errors) == (0, "")
+    eventually(lambda: not has_robot(network))
+
+
+def test_it_does_not_begin_without_its_owner(network):
+    gone = max(psutil.pids()) + 100_000
+    assert ended(start("-m", "app.robots.simulated", "--owner-pid", str(gone), network=network), 15) == (
+        0,
+        "",
+    )
+
+
+def test_it_says_what_it_is_that_it_waits_and_when_the_master_is_there():
+    with nep.Master("127.0.0.1:0") as gone:
+        address = gone.address
+    process = start("examples/thirty_line_driver.py", "--name", "Table", network=address)
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "Table: a robot, model turntable; its topics are /Table/...\n"
+        assert process.stdout.readline() == (
+            f"Table: no master answers at {address}; waiting for one, start Studio or `nep master`\n"
+        )
+        with nep.Master(address):
+            said = process.stdout.readline()
+            assert said == f"Table: found the master at {address}; the robot is ready, Ctrl+C ends it\n"
+            assert has_robot(address)
+            process.send_signal(signal.SIGTERM)
+            code, errors = ended(process)
+    finally:
+        ended(process)
+    assert (code, errors) == (0, "")
+
+
+def test_it_can_be_ended_while_it_waits_for_a_master():
+    process = start("-m", "app.robots.simulated", network="127.0.0.1:1")
+    assert process.stdout is not None
+    try:
+        said = [process.stdout.readline() for _ in range(2)]
+        assert "waiting for one" in said[1]
+        process.send_signal(signal.SIGTERM)
+    finally:
+        code, errors = ended(process)
+    assert (code, errors) == (0, "")
+
+
+@pytest.mark.parametrize("given", [("--master", "127.0.0.1:x"), ("--name", "x" * 65)], ids=str)
+def test_what_can_not_be_used_is_one_sentence(given, network):
+    code, errors = ended(start("examples/thirty_line_driver.py", *given, network=network), 15)
+    assert code == 1
+    assert "Traceback" not in errors
+    assert errors.count("\n") == 1
+
+
+def test_wrong_arguments_are_told(network):
+    code, errors = ended(start("-m", "app.robots.simulated", "--color", "red", network=network), 15)
+    assert code == 2
+    assert "--color" in errors
+
+
+CHATTERBOX = """
+import logging
+from app.robots.kit import Call, Kind, Link, action, main, safe_stop
+
+class Chatterbox:
+    def __init__(self, link: Link) -> None:
+        pass
+
+    @action("chatter", "Speech", "message-circle")
+    def chatter(self, call: Call) -> None:
+        for n in range(500):
+            logging.getLogger("chatter").warning("%d %s", n, "x" * 1000)
+
+    @safe_stop(watchdog_s=1.0, within_s=0.2)
+    def stop(self) -> None:
+        logging.getLogger("chatter").warning("stopped")
+
+if __name__ == "__main__":
+    raise SystemExit(main(Kind(model="box", title="Chatterbox", body=Chatterbox)))
+"""
+
+
+def test_a_driver_whose_terminal_takes_nothing_answers_and_ends(network, tmp_path):
+    """Nobody reads its pipe, which has room for 64 kB; a terminal with Ctrl+S has less."""
+    (tmp_path / "box.py").write_text(CHATTERBOX, encoding="utf-8")
+    process = start(str(tmp_path / "box.py"), network=network)
+    try:
+        with nep.node("me", master=network) as node:
+            assert node.new_sub("/Chatterbox/description", "robot/description").receive(15.0) is not None
+            ears = Ears(node, "Chatterbox")
+            for number in ("1", "2"):
+                ears.invoke(number, "chatter")
+                assert ears.final(number)["state"] == "succeeded"
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(60.0) == 0
+    finally:
+        ended(process)
+
+
+HONEST = '''
+import asyncio, enum, sys
+from typing import Literal, Optional
+from app.robots.kit import Call, Kind, Link, action, main, safe_stop, sensor
+
+class Room(enum.Enum):
+    HALL = "hall"
+
+class Robot:
+    heat = sensor(float, title="heat")
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+
+    @safe_stop(within_s=0.2)
+    def stop(self) -> None:
+        """Still."""
+'''
+DO = '    @action("do %given", "Movement", "move", timeout_s=9)\n'
+MAIN = (
+    'if __name__ == "__main__":\n    raise SystemExit(main(Kind(model="robot", title="Robot", body=Robot)))\n'
+)
+WORKS = {
+    "later": (
+        "async def later(self, call: Call, given: int) -> int",
+        "await asyncio.sleep(0); return given + 1",
+    ),
+    "ends": ("def ends(self, call: Call, given: int) -> None", "sys.exit(given)"),
+    "numbers": ("def numbers(self, call: Call, given: list[float]) -> None", "pass"),
+    "senses": ("def senses(self, call: Call, given: str) -> None", 'self.link.sense("heat", given)'),
+    "returns": ("def returns(self, call: Call, given: str) -> int", "return given"),
+}
+TYPES = {
+    "pair": ("def pair(self, call: Call, given: tuple[float, int]) -> str", "return repr(given)"),
+    "map": ("def map(self, call: Call, given: dict[str, int]) -> str", "return repr(given)"),
+    "perhaps": ("def perhaps(self, call: Call, given: Optional[int] = 1) -> str", "return repr(given)"),
+    "choice": ("def choice(self, call: Call, given: Literal[1, 2]) -> str", "return repr(given)"),
+    "room": ("def room(self, call: Call, given: Room) -> Room", "assert given is Room.HALL; return given"),
+}
+
+
+@pytest.mark.parametrize(
+    ("functions", "given", "answers"),
+    [
+        (
+            WORKS,
+            {"later": 6, "ends": 3, "numbers": ["a"], "senses": "warm", "returns": "x"},
+            {"later": ("succeeded", 7)}
+            | dict.fromkeys(("ends", "numbers", "senses", "returns"), ("failed", None)),
+        ),
+        (
+            TYPES,
+            {"pair": [1.5, 2], "map": {"a": 1}, "perhaps": None, "choice": 2, "room": "hall"},
+            {
+                "pair": ("succeeded", "(1.5, 2)"),
+                "map": ("succeeded", "{'a': 1}"),
+                "perhaps": ("succeeded", "None"),
+                "choice": ("succeeded", "2"),
+                "room": ("succeeded", "hall"),
+            },
+        ),
+    ],
+    ids=["works", "types"],
+)
+def test_what_a_driver_declares_is_what_happens(network, tmp_path, functions, given, answers):
+    """Over the network, as another program sees it; a Stop behind it is answered in any case."""
+    actions = "".join(
+        f'{DO}    {head}:\n        """What the test says."""\n        {body}\n'
+        for head, body in functions.values()
+    )
+    (tmp_path / "robot.py").write_text(HONEST + actions + MAIN, encoding="utf-8")
+    process = start(str(tmp_path / "robot.py"), network=network)
+    try:
+        with nep.node("me", master=network) as node:
+            described = node.new_sub("/Robot/description", "robot/description").receive(30.0)
+            assert described is not None, ended(process, 0.1)
+            ears = Ears(node, "Robot")
+            got = {}
+            for name, value in given.items():
+                ears.invoke(name, name, given=value)
+                final = ears.final(name)
+                got[name] = (final["state"], final["output"].get("value"))
+            ears.command(id="stop", op="stop")
+            assert (got, ears.final("stop", "stop")["state"]) == (answers, "succeeded")
+    finally:
+        process.kill()
+        process.communicate()

@@ -1,0 +1,106 @@
+"""The committed bundle is what its sources build."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from app import resources
+
+ROOT = Path(__file__).resolve().parents[3]
+EDITOR = ROOT / "app" / "blocks" / "editor"
+
+node, npm = shutil.which("node"), shutil.which("npm")
+built = pytest.mark.skipif(
+    node is None or npm is None, reason="needs node and npm, which this computer does not have"
+)
+
+
+@pytest.fixture(scope="module")
+def tools() -> None:
+    """What the sources are built with, brought once for each checkout."""
+    if (EDITOR / "node_modules" / "esbuild").is_dir():
+        return
+    command = [npm, "ci", "--no-audit", "--no-fund", "--silent"]
+    done = subprocess.run(command, cwd=EDITOR, capture_output=True, text=True, timeout=240, check=False)
+    if done.returncode:
+        lines = (done.stderr or done.stdout).strip().splitlines() or ["no reason given"]
+        pytest.skip(f"npm could not bring what the editor is built with: {lines[-1]}")
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        file.relative_to(folder).as_posix(): file.read_bytes() for file in folder.rglob("*") if file.is_file()
+    }
+
+
+@built
+@pytest.mark.timeout(300)
+def test_building_again_gives_the_committed_bundle(tools, tmp_path):
+    subprocess.run([node, "build.mjs", str(tmp_path / "out")], cwd=EDITOR, check=True, timeout=280)
+    assert files(tmp_path / "out") == files(resources.path("blockly"))
+
+
+@built
+@pytest.mark.timeout(300)
+def test_a_build_that_fails_leaves_the_bundle_as_it_was(tools, tmp_path):
+    here, out = tmp_path / "editor", tmp_path / "out"
+    shutil.copytree(EDITOR / "src", here / "src")
+    shutil.copy(EDITOR / "build.mjs", here)
+    (here / "node_modules").symlink_to(EDITOR / "node_modules", target_is_directory=True)
+    (here / "src" / "index.html").unlink()  # is needed last, after the script was built
+    out.mkdir()
+    (out / "editor.js").write_text("the one before")
+    done = subprocess.run(
+        [node, "build.mjs", str(out)], cwd=here, capture_output=True, text=True, timeout=280, check=False
+    )
+    assert done.returncode != 0
+    assert "index.html" in done.stderr
+    assert files(out) == {"editor.js": b"the one before"}
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["editor", "out"]
+
+
+@built
+@pytest.mark.timeout(300)
+def test_the_sources_are_strictly_typed(tools):
+    tsc = EDITOR / "node_modules" / "typescript" / "bin" / "tsc"
+    done = subprocess.run(
+        [node, str(tsc), "--noEmit"], cwd=EDITOR, capture_output=True, text=True, timeout=280, check=False
+    )
+    assert done.stdout == ""
+    assert done.returncode == 0
+
+
+def test_the_lock_file_names_no_registry():
+    lock = json.loads((EDITOR / "package-lock.json").read_text())
+    assert lock["packages"]
+    assert all("resolved" not in package for package in lock["packages"].values())
+
+
+def test_nothing_is_loaded_from_elsewhere():
+    bundle = resources.path("blockly", "editor.js").read_text()
+    addresses = set(re.findall(r"https?://[a-z0-9.-]+", bundle))
+    # Names of XML formats, a comment, help texts, and Blockly's default media folder, which the page
+    # replaces; none is ever fetched (the page's own rules forbid it too, and the fence blocks it).
+    assert addresses <= {
+        "http://www.w3.org",
+        "https://bugzilla.mozilla.org",
+        "https://developers.google.com",
+        "https://static.blockly.com",
+    }
+    assert "url(http" not in resources.path("blockly", "style.css").read_text()
+
+
+def test_every_token_icon_and_licence_is_there():
+    bundle = resources.path("blockly", "editor.js").read_text()
+    tokens = json.loads(resources.path("theme", "tokens.json").read_text())
+    for category in tokens["block"].values():
+        assert re.search(rf"""['"]?\b{category["icon"]}['"]?:['"`]<""", bundle)
+    legal = resources.path("blockly", "LEGAL.txt").read_text()
+    assert "Apache License" in legal
+    assert "ISC License" in legal

@@ -1,0 +1,225 @@
+"""The block editor while robots come and go, and when its process dies."""
+
+from __future__ import annotations
+
+import copy
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QColor
+from PySide6.QtTest import QTest
+
+from app.core.documents.workspace_json import WorkspaceJson
+from app.ui.blockly.view import BlocklyView
+from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, Person, outlined, workspace
+
+pytest_plugins = ["tests.ui.blockly_fixtures"]
+pytestmark = pytest.mark.web
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def with_rover() -> dict:
+    more = copy.deepcopy(DEFINITIONS)
+    more["toolbox"]["contents"][-1:] = [
+        {"kind": "robotHeading", "name": "Rover", "connected": True},
+        {"kind": "category", "name": "Wheels", "categorystyle": "robot", "icon": "car",
+         "contents": [{"kind": "block", "type": "control_wait"}]},
+    ]  # fmt: skip
+    for block in more["blocks"]:
+        for arg in block.get("args0", []):
+            if arg.get("source") == "robots:pepper":
+                arg["options"].append(["Pepper two", "Pepper two"])
+    more["topics"] = ["/new"]
+    return more
+
+
+WHEELS = "document.querySelector('.blocklyToolbox').textContent.includes('Wheels')"
+
+
+def test_a_robot_that_connects_during_a_drag_does_not_break_it(qtbot, view, person):
+    them = person(START)
+    hat = them.box("[data-id=start] > .blocklyPath")
+    them.open_category("Control")
+    start = them.hold(".blocklyFlyout .control_wait")
+    them.move(start, QPoint(700, 300))
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    view.set_definitions(with_rover())
+    qtbot.wait(200)
+    assert them.ask(WHEELS) is False
+    end = QPoint(round(hat["left"] + 16), round(hat["bottom"] + 22))
+    them.move(QPoint(700, 300), end)
+    them.drop(end)
+    them.wait_for(WHEELS)
+    (top,) = them.tops()
+    assert top["next"]["block"]["type"] == "control_wait"
+
+
+def test_an_open_category_stays_open_when_robots_come(qtbot, view, person):
+    them = person(START)
+    them.open_category("Control")
+    them.ask("document.querySelector('.blocklyFlyout .control_wait').setAttribute('data-same', 'yes')")
+    view.set_definitions(with_rover())
+    them.wait_for(WHEELS)
+    assert them.ask("!!document.querySelector('.blocklyFlyout [data-same=yes]')")
+    assert them.ask("document.querySelector('.blocklyToolboxSelected').textContent") == "Control"
+    them.drag(".blocklyFlyout .control_wait", QPoint(700, 400))
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
+
+
+def test_equal_definitions_touch_nothing(qtbot, view, person):
+    them = person(START)
+    them.ask("document.querySelector('.nepHeading').setAttribute('data-same', 'yes')")
+    view.set_definitions(copy.deepcopy(DEFINITIONS))
+    topics = copy.deepcopy(DEFINITIONS)
+    topics["topics"].append("/more")
+    view.set_definitions(topics)
+    qtbot.wait(200)
+    assert them.ask("!!document.querySelector('.nepHeading[data-same=yes]')")
+
+
+DOTS = """Object.fromEntries([...document.querySelectorAll('.nepHeading.robot')].map(
+    each => [each.textContent, each.querySelector('i').className])
+    .filter(([name]) => name.startsWith('Rover')))"""
+
+
+def test_a_robot_that_may_still_move_has_no_green_dot_also_while_a_block_is_in_the_hand(view, person):
+    them = person(START)
+    view.set_definitions(with_rover())
+    them.wait_for(DOTS, {"Rover": "on"})
+    them.open_category("Control")
+    start = them.hold(".blocklyFlyout .control_wait")
+    them.move(start, QPoint(700, 300))
+    them.wait_for("!!document.querySelector('.blocklyDragging')")
+    view.set_alarms({"Rover": ("running", "stopping")})
+    them.wait_for(DOTS, {"Roverstopping": "running"})
+    view.set_alarms({"Rover": ("error", "may still move"), "__proto__": ("error", "not stopped")})
+    them.wait_for(DOTS, {"Rovermay still move": "error"})
+    them.drop(QPoint(700, 300))
+    more = with_rover()
+    more["toolbox"]["contents"][-2]["connected"] = False  # it goes away, and may move all the same
+    view.set_definitions(more)
+    them.wait_for(DOTS, {"Rovermay still move": "error"})
+    view.set_alarms({})
+    them.wait_for(DOTS, {"Rovernot connected": "off"})
+
+
+def test_a_page_that_comes_back_knows_which_robots_may_still_move(qtbot, view, person):
+    them = person(START)
+    view.set_definitions(with_rover())
+    view.set_alarms({"Rover": ("error", "may still move")})
+    with qtbot.waitSignal(view.ready, timeout=60_000):
+        os.kill(view.web.page.renderProcessPid(), signal.SIGKILL)
+    them.wait_for(DOTS, {"Rovermay still move": "error"})
+
+
+def test_a_block_whose_definition_changes_keeps_its_place_and_undo(qtbot, view, person):
+    wait = {"type": "control_wait", "id": "w", "x": 140, "y": 140}
+    them = person(wait, START)
+    them.click("[data-id=start] > .blocklyPath", dy=30)
+    them.press(Qt.Key_Delete)
+    qtbot.waitUntil(lambda: len(them.tops()) == 1, timeout=WAIT_MS)
+    changed = copy.deepcopy(DEFINITIONS)
+    next(each for each in changed["blocks"] if each["type"] == "control_wait")["message0"] = "%1 pause %2 s"
+    view.set_definitions(changed)
+    them.wait_for("document.querySelector('[data-id=w]').textContent.includes('pause')")
+    view.undo()
+    qtbot.waitUntil(lambda: sorted(top["id"] for top in them.tops()) == ["start", "w"], timeout=WAIT_MS)
+    assert next(top for top in them.tops() if top["id"] == "w") == wait
+
+
+def test_new_robots_are_offered_and_unknown_ones_stay(view, person):
+    say = {"type": "robot_pepper_do_say", "id": "say", "x": 28, "y": 28, "fields": {"ROBOT": "Old one"}}
+    them = person(say)
+    view.set_definitions(with_rover())
+    them.wait_for(WHEELS)
+    them.click("[data-id=say] .blocklyDropdownField", dx=10, dy=10)
+    them.wait_for("[...document.querySelectorAll('.blocklyMenuItemContent')].map(e => e.textContent)",
+                  ["Pepper", "Pepper two", "Old one"])  # fmt: skip
+    assert them.tops() == [say]
+
+
+def test_a_killed_web_process_loses_nothing(qtbot, view, person, caplog):
+    them = person(START)
+    them.open_category("Control")
+    with qtbot.waitSignal(view.changed, timeout=WAIT_MS):
+        them.drag(".blocklyFlyout .control_wait", QPoint(700, 400))
+    before = them.newest()
+    view.set_theme(TOKENS, dark=True)
+    view.highlight(["start"])
+    got: list[WorkspaceJson] = []
+    with qtbot.waitSignal(view.ready, timeout=60_000):
+        os.kill(view.web.page.renderProcessPid(), signal.SIGKILL)
+        view.flush(got.append)
+    qtbot.waitUntil(lambda: [each.blocks for each in got] == [before], timeout=WAIT_MS)
+    assert them.newest() == before
+    them.wait_for(outlined("running"), ["start"])
+    dark = QColor(TOKENS["colour"]["dark"]["workspace"]).getRgb()[:3]
+    assert them.ask("getComputedStyle(document.body).backgroundColor") == "rgb({}, {}, {})".format(*dark)
+    with qtbot.waitSignal(view.key_pressed, timeout=WAIT_MS):
+        them.press(Qt.Key_F12)
+    assert "ended" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("language", "words"), [("de", "Kopieren"), ("pt-BR", "Duplicar"), ("xx", "Duplicate")]
+)
+def test_blockly_speaks_the_language_or_english(qtbot, language, words):
+    view = BlocklyView(language=language)
+    qtbot.addWidget(view)
+    view.set_definitions(DEFINITIONS)
+    view.resize(1031, 586)
+    view.load(workspace(START))
+    with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+        view.show()
+    them = Person(qtbot, view)
+    box = them.box("[data-id=start] > .blocklyPath")
+    at = QPoint(round(box["left"] + 14), round(box["top"] + 30))
+    QTest.mouseClick(them.target, Qt.RightButton, pos=at)
+    them.wait_for(f"!!document.querySelector('.blocklyContextMenu')?.textContent.includes({words!r})")
+
+
+def test_the_pages_own_words_come_from_the_window(qtbot, monkeypatch):
+    monkeypatch.setattr(
+        "nep.i18n.editor_words", lambda: {"Find a block": "Buscar un bloque", "Duplicate": "Otra vez"}
+    )
+    view = BlocklyView(language="es")
+    qtbot.addWidget(view)
+    view.set_definitions(DEFINITIONS)
+    view.resize(1031, 586)
+    view.load(workspace(START))
+    with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+        view.show()
+    them = Person(qtbot, view)
+    them.wait_for("document.querySelector('.nepSearch input')?.placeholder === 'Buscar un bloque'")
+    assert (
+        them.ask("document.querySelector('.nepZoom button').title") == "Zoom in"
+    )  # nobody has translated it
+    assert them.ask("document.querySelector('.nepFind input').placeholder") == "Find in the blocks"
+
+
+ENDING = """
+import sys
+from PySide6.QtWidgets import QApplication
+from app.ui.blockly.view import BlocklyView, register_scheme
+
+register_scheme()
+application = QApplication([])
+view = BlocklyView()
+view.ready.connect(application.quit)
+view.show()
+sys.exit(application.exec())
+"""
+
+
+def test_the_application_ends_in_order():
+    done = subprocess.run(
+        [sys.executable, "-c", ENDING], cwd=ROOT, capture_output=True, text=True, timeout=140, check=False
+    )
+    assert done.returncode == 0
+    assert "Release of profile" not in done.stderr

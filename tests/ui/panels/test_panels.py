@@ -1,0 +1,130 @@
+"""Every panel that there is, with nothing and with everything, in both densities and both themes."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
+
+import app.ui.panels
+import app.ui.panels.behaviour
+from app.ui.panels.base import Panel
+from app.ui.panels.behaviour import panel as behaviour
+from app.ui.theme import icons
+from tests.ui.fakes import Session
+from tests.ui.panel_case import Window, ticks
+from tests.ui.panels.test_behaviour import Editor
+
+BASES = {
+    "base",
+    "registry",
+    "one_robot_panel",
+    "table_panel",
+}  # no panels themselves
+NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES)
+
+
+@pytest.fixture(autouse=True)
+def without_web(monkeypatch) -> None:
+    """The block editor has tests of its own."""
+    made = lambda context: behaviour.BehaviourPanel(context, Editor)  # noqa: E731
+    monkeypatch.setattr(app.ui.panels.behaviour, "PANEL", Panel("behaviour", "Behaviour", "blocks", (), made))
+
+
+def description(name: str) -> Panel:
+    panel = importlib.import_module(f"app.ui.panels.{name}").PANEL
+    assert isinstance(panel, Panel)
+    return panel
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_module_binds_one_panel_of_its_name_with_a_known_icon(name) -> None:
+    panel = description(name)
+    assert panel.name == name
+    assert panel.icon in icons.names()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("session", [Session, Session.full], ids=["empty", "full"])
+def test_each_panel_lives_through_everything(qtbot, qapp, name, session) -> None:
+    window = Window(session())
+    panel = window.make(description(name), (500, 400))
+    qtbot.addWidget(panel)
+    for widget in [*panel.header_widgets(), *([panel.replaces_title()] if panel.replaces_title() else [])]:
+        qtbot.addWidget(widget)
+    for density in ("compact", "comfortable"):
+        panel.set_density(density)  # type: ignore[arg-type]
+        for mode in ("light", "dark"):
+            window.theme.set_mode(mode)  # type: ignore[arg-type]
+            ticks(window, panel, 7)
+            assert not panel.grab().isNull()
+    for topic in list(window.session.topics):
+        panel.show_topic(topic.name)
+        ticks(window, panel, 2)
+        window.session.topics.remove(topic.name)
+    for link in window.session.fleet.links:
+        link.connected = False
+    window.session.fleet.revision += 1
+    ticks(window, panel, 3)
+    panel.restore_state(panel.save_state())
+    panel.shut()
+    panel.shut()
+    assert window.session.watched == []
+    assert window.session.fleet.looked_at == []
+    assert all(stream.closed for stream in window.session.images.streams)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_everything_that_can_be_pressed_or_typed_into_has_a_name(qtbot, qapp, name) -> None:
+    window = Window(Session.full())
+    panel = window.make(description(name), (1000, 700))
+    qtbot.addWidget(panel)
+    outside = [*panel.header_widgets(), *([panel.replaces_title()] if panel.replaces_title() else [])]
+    for widget in outside:
+        qtbot.addWidget(widget)
+    assert panel.accessibleName()
+    for place in (panel, *outside):
+        for kind in (QAbstractButton, QLineEdit):
+            controls: list[QWidget] = [*place.findChildren(kind)]
+            for control in controls:
+                if control.isVisibleTo(place):
+                    assert control.accessibleName(), control
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_panel_with_nothing_says_what_to_do_next(qtbot, qapp, name) -> None:
+    from PySide6.QtWidgets import QLabel
+
+    window = Window(Session())
+    panel = window.make(description(name))
+    qtbot.addWidget(panel)
+    for widget in [*panel.header_widgets(), *([panel.replaces_title()] if panel.replaces_title() else [])]:
+        qtbot.addWidget(widget)
+    said = " ".join(shown.text() for shown in panel.findChildren(QLabel) if shown.isVisible())
+    assert len(said.split()) >= 5
+
+
+def imported_panels(folder: Path) -> Iterator[tuple[str, str]]:
+    """Of each panel, a file or a folder, which other modules beside it it imports."""
+    for path in folder.rglob("*.py"):
+        own = path.relative_to(folder).with_suffix("").parts[0]
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("app.ui.panels"):
+                other = (node.module or "").removeprefix("app.ui.panels").strip(".").partition(".")[0]
+                yield from ((own, each or alias.name) for alias in node.names for each in [other])
+
+
+def test_panels_do_not_import_panels() -> None:
+    found = list(imported_panels(Path(app.ui.panels.__path__[0])))
+    assert ("inspector", "inspector") in found, "panels that are folders are read, too"
+    assert [(own, other) for own, other in found if other not in {own, *BASES}] == []
+
+
+@pytest.mark.parametrize("name", sorted(BASES))
+def test_what_panels_derive_from_is_no_panel(name) -> None:
+    assert not hasattr(importlib.import_module(f"app.ui.panels.{name}"), "PANEL")

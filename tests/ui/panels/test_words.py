@@ -1,0 +1,235 @@
+"""Every panel in the pseudo-language: each word is a translated one, and longer words have their room."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+
+import pytest
+from PySide6.QtCore import QAbstractItemModel, QAbstractListModel, QModelIndex, Qt
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
+
+from app.robots.description.inputs import Parameter
+from app.robots.description.model import Robot
+from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.behaviour import panel as behaviour
+from app.ui.panels.inspector.tree_view import TreeView
+from app.ui.shell.docking.dock import Dock
+from app.ui.theme.theme import Theme
+from app.ui.widgets.table.cells import head_width
+from tests.pseudo import ROOT, texts_of, untranslated
+from tests.ui.clipping import clipped
+from tests.ui.fakes import Session
+from tests.ui.panels.test_behaviour import Editor
+from tests.ui.show_panels import SIZES, prepare
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+Show = Callable[[str, Session], AbstractContextManager[tuple[Dock, PanelWidget]]]
+CHOSEN = "robots.Pepper.pose.y"  # in the inspector
+SHOWING = frozenset({
+    "Button", "EmptyAction", "EmptyState", "FilterField", "IconButton", "LinkButton", "Menu", "Panel",
+    "QAction", "QLabel", "SearchField", "addAction", "label", "say", "set", "setAccessibleDescription",
+    "setAccessibleName", "setPlaceholderText", "setText", "setTitle", "setToolTip", "setWindowTitle",
+    "set_name", "set_title", "set_word", "tip", "toast",
+})  # fmt: skip
+NOT_SHOWN = frozenset({"icon", "kind", "role", "size", "status"})
+NO_WORDS = (
+    "Ctrl", "Esc", "NEP Studio", "Return", "Shift", "Space", "bodyLarge", "font-weight", "textSecondary",
+    "textTertiary",
+)  # fmt: skip
+"""Keys, our name, roles and styles."""
+SAID = (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole)
+
+
+def panel_of(name: str) -> Panel:
+    """The panel; the page of the block editor has tests of its own."""
+    if name != "behaviour":
+        return SIZES[name][0]
+    make = lambda context: behaviour.BehaviourPanel(context, Editor)  # noqa: E731
+    return Panel("behaviour", behaviour.PANEL.title, "blocks", (), make)
+
+
+def rows_of(model: QAbstractItemModel, above: QModelIndex | None = None) -> Iterator[str]:
+    """What all cells of a model say, and those below them."""
+    above = QModelIndex() if above is None else above
+    for row in range(model.rowCount(above)):
+        # a list model does not tell its one column
+        for column in range(1 if isinstance(model, QAbstractListModel) else model.columnCount(above)):
+            index = model.index(row, column, above)
+            yield from (text for role in SAID if isinstance(text := index.data(role), str))
+            yield from rows_of(model, index)
+
+
+def said_by(widget: QWidget) -> Iterator[tuple[str, str]]:
+    """(where, words) of all that a widget, its lists and its menus say."""
+    yield from texts_of(widget)
+    for view in widget.findChildren(QAbstractItemView):
+        is_message = isinstance(view, TreeView)  # whose keys and values are its own
+        if view.model() is not None and not is_message and not isinstance(view, QHeaderView):
+            yield from ((f"{type(view).__name__} row", text) for text in rows_of(view.model()))
+
+
+def said_in(panel: PanelWidget) -> Iterator[tuple[str, str]]:
+    """All that a panel says, its title and its menus."""
+    yield "title", panel.title()
+    for action in panel.more_actions():
+        yield "more", action.text().partition("\t")[0]
+        menu = action.menu()
+        if isinstance(menu, QMenu):
+            yield from (("more", each.text()) for each in menu.actions())
+    for outside in (panel, *panel.header_widgets(), *filter(None, [panel.replaces_title()])):
+        yield from said_by(outside)
+
+
+def cased(title: str) -> tuple[str, str]:
+    """A title, and as it stands at the beginning."""
+    return title, title[:1].upper() + title[1:]
+
+
+def texts_in(value: object) -> Iterator[str]:
+    """All texts of a value that a robot told."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for below in value.values():
+            yield from texts_in(below)
+    elif isinstance(value, (list, tuple)):
+        for below in value:
+            yield from texts_in(below)
+
+
+def words_of(robot: Robot) -> Iterator[str]:
+    """A robot's own words: they are those of its description."""
+
+    def of(parameters: Iterable[Parameter]) -> Iterator[str]:
+        for one in parameters:
+            yield from (one.name, *cased(one.title), one.unit or "", str(one.default))
+            yield from (word for choice in one.choices for word in (str(choice.value), *cased(choice.title)))
+
+    yield from (robot.title, robot.name)
+    for sensor in robot.sensors:
+        yield from (sensor.name, *cased(sensor.title), sensor.unit or "")
+        yield from (choice.title for choice in sensor.choices)
+        yield from (word for field in sensor.fields for word in (field.name, field.title))
+    for action in robot.actions:
+        yield from (action.name, *cased(action.title), action.category or "")
+        yield from of(action.parameters)
+        yield from (field.title for field in (*action.feedback, *action.output))
+
+
+def data_of(session: Session) -> Iterator[str]:
+    """What comes from elsewhere, in whatever language it is."""
+    for topic in session.topics:
+        yield from (topic.name, topic.msg_type, topic.msg_type.rpartition("/")[2], *topic.publisher_nodes)
+    for node in session.nodes:
+        yield from (node.name, node.host, node.language)
+    for link in session.fleet.links:
+        yield from (link.name, *words_of(link.robot), *texts_in((link.values, link.drawing)))
+        yield link.last_stop or ""
+        yield from (text for made in link.tried for text in texts_in((made.given, made.output)))
+    for record in session.console.records:
+        yield from (record.text, record.origin, record.logger, record.place, record.logger.rpartition(".")[2])
+    for alert in session.alerts.active:
+        yield from (alert.title, alert.detail, alert.button or "")
+    for finding in session.doctor.findings:
+        yield from (finding.sentence, finding.mend, finding.command)
+    for document in session.documents:
+        yield from (document.name, "NAO")
+        for problem in document.program().problems:
+            yield from (problem.sentence, problem.subject, problem.mend or "")
+
+
+@pytest.fixture
+def shown(qtbot, theme: Theme) -> Show:
+    """Shows a panel in its dock, at its usual size."""
+    theme.apply()
+
+    @contextmanager
+    def show(name: str, session: Session) -> Iterator[tuple[Dock, PanelWidget]]:
+        _panel, width, height, density = SIZES[name]
+        panel = panel_of(name)
+        context = PanelContext(session, theme, str, str, str)  # type: ignore[arg-type]
+        widget = panel.make(context)
+        dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
+        qtbot.addWidget(dock)
+        dock.resize(width, height)
+        with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
+            dock.show()
+        dock.front = True
+        qtbot.waitUntil(dock.shown)
+        if session.fleet.links:
+            prepare(name, widget)
+        for _each in range(3):
+            session.tick()
+            dock.refresh()
+        for _each in range(2):  # layouts come to rest
+            qtbot.wait(20)
+        yield dock, widget
+        widget.shut()
+
+    return show
+
+
+@pytest.mark.parametrize("name", sorted(SIZES))
+@pytest.mark.parametrize("session", [Session, Session.full], ids=["empty", "full"])
+def test_a_panel_says_every_word_in_the_chosen_language(pseudo, shown, name, session) -> None:
+    there = session()
+    with shown(name, there) as (_dock, panel):
+        data = {each for each in (*data_of(there), "#33aaff", CHOSEN) if each}
+        forgotten = {f"{place}: {text}" for place, text in said_in(panel) if untranslated(text, *data)}
+    assert "\n".join(sorted(forgotten)) == ""
+
+
+@pytest.mark.parametrize("session", [Session, Session.full], ids=["empty", "full"])
+def test_a_panel_has_room_for_longer_words(pseudo, shown, session) -> None:
+    faults = []
+    for name in SIZES:
+        with shown(name, session()) as (dock, _panel):
+            faults += [f"{name}: {fault}" for fault in clipped(dock)]
+    assert faults == []
+
+
+@pytest.mark.parametrize("name", ["nodes", "topics"])
+def test_the_head_of_a_table_takes_the_room_that_is_left(pseudo, shown, name) -> None:
+    with shown(name, Session.full()) as (dock, panel):
+        dock.resize(1400, 500)
+        panel.refresh()
+        table = panel.table
+        for place, column in enumerate(table.columns):
+            assert table.columnWidth(place) >= head_width(table.theme, column) or table.isColumnHidden(place)
+            assert table.model().headerData(place, Qt.Orientation.Horizontal, Qt.ItemDataRole.ToolTipRole)
+
+
+def bare_words(folder: str) -> Iterator[str]:
+    """Each call that shows a person words that stand in the source and are not given to a translator."""
+    for path in sorted((ROOT / "app" / "ui" / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Call) and _name_of(node.func) in SHOWING:
+                given = [*node.args, *(each.value for each in node.keywords if each.arg not in NOT_SHOWN)]
+                for each in given:
+                    if any(" " in text or text[:1].isupper() for text in _constants(each) if len(text) > 1):
+                        yield f"{path.name}:{each.lineno}: {ast.unparse(each)}"
+
+
+def _name_of(called: ast.expr) -> str:
+    return called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
+
+
+def _constants(given: ast.expr) -> Iterator[str]:
+    """The words of a text, of an f-string, and of both sides of a choice."""
+    if isinstance(given, ast.Constant) and isinstance(given.value, str):
+        yield "".join(re.findall(r"[A-Za-z ]+", given.value)).strip()
+    elif isinstance(given, ast.JoinedStr):
+        for each in given.values:
+            yield from _constants(each)
+    elif isinstance(given, ast.IfExp):
+        yield from _constants(given.body)
+        yield from _constants(given.orelse)
+
+
+@pytest.mark.parametrize("folder", ["panels", "pictures", "shell", "startup", "text", "widgets"])
+def test_no_words_are_shown_that_nobody_can_translate(folder) -> None:
+    found = [each for each in bare_words(folder) if not any(known in each for known in NO_WORDS)]
+    assert "\n".join(found) == ""

@@ -1,0 +1,227 @@
+"""Whatever is opened and closed fifty times leaves nothing behind: no menus, actions, timers or widgets."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPoint
+from PySide6.QtGui import QAction, QContextMenuEvent
+from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QWidget
+
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from app.robots import simulated
+from app.robots.description.description import parse, td_for
+from app.ui.panels.base import Panel
+from app.ui.panels.behaviour.panel import BehaviourPanel
+from app.ui.panels.registry import PanelShelf
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.shell.docking.dock import Dock
+from app.ui.shell.main_window import MainWindow
+from app.ui.theme.theme import Theme
+from tests.ui.panels.test_behaviour import Editor
+from tests.ui.shell_parts import Answers, free_address
+
+# without a screen nothing can grab the keyboard, which every popup asks for
+pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+TIMES = 50
+PANELS = [
+    "alerts", "behaviour", "camera", "console", "doctor", "health", "image", "inspector", "nodes", "problems",
+    "robot", "robots", "sensors", "topics",
+]  # fmt: skip
+COMMANDS = [
+    "file.earlier", "settings.open", "palette.open", "layout.keep", "help.shortcuts", "help.about",
+    "network.others",
+]  # fmt: skip
+
+
+@pytest.fixture
+def window(qtbot, theme: Theme, home: Path) -> Iterator[MainWindow]:
+    session = Session(
+        Settings(home), address=free_address(), journal_folder=home / "journal", start_companions=False
+    )
+    session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
+    session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Anna")), "/Anna/description")
+    shelf = PanelShelf()
+    behaviour = Panel("behaviour", "Behaviour", "blocks", (), lambda ctx: BehaviourPanel(ctx, Editor))
+    made = MainWindow(session, theme, {**shelf, "behaviour": behaviour}, asks=Answers())
+    qtbot.addWidget(made)
+    theme.apply()
+    theme.set_motion(True)
+    made.resize(1440, 900)
+    yield made
+    made.close()
+
+
+def settle() -> None:
+    QCoreApplication.processEvents()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+    QCoreApplication.processEvents()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+
+
+def counted(window: QWidget) -> Counter[str]:
+    """Every object by its class: those of the window, and widgets that have no parent."""
+    found: Counter[str] = Counter(type(each).__name__ for each in window.findChildren(QObject))
+    found.update(type(each).__name__ for each in QApplication.topLevelWidgets() if each is not window)
+    return found
+
+
+def close_what_is_open(window: QWidget) -> None:
+    for _ in range(10):
+        popup = QApplication.activePopupWidget()
+        if popup is None:
+            break
+        popup.close()
+    for menu in [each for each in window.findChildren(QMenu) if each.isVisible()]:
+        menu.close()
+    for overlay in [each for each in window.findChildren(Overlay) if each.isVisible()]:
+        overlay.shut()
+
+
+def leaves_nothing(window: QWidget, open_it: Callable[[], object], times: int = TIMES) -> None:
+    for _ in range(2):  # what is made once may stay
+        open_it()
+        settle()
+        close_what_is_open(window)
+        settle()
+    before = counted(window)
+    for _ in range(times):
+        open_it()
+        close_what_is_open(window)
+        settle()
+    assert counted(window) - before == Counter()
+
+
+def opened(window: MainWindow, panel: str) -> Dock:
+    bench = window.show_layout("behaviour" if panel == "behaviour" else "developer")
+    dock = bench.open(panel)
+    assert dock is not None
+    QCoreApplication.processEvents()
+    window.tick()
+    return dock
+
+
+@pytest.mark.parametrize("panel", PANELS)
+def test_more_and_every_menu_of_a_panel(qtbot, window: MainWindow, panel: str) -> None:
+    window.show()
+    dock = opened(window, panel)
+    shown: list[QMenu] = []
+
+    def open_more() -> None:
+        dock.title.menu_wanted.emit(dock.title.more)
+        shown.append(QApplication.activePopupWidget())  # type: ignore[arg-type]
+
+    def open_the_others() -> None:
+        for widget in dock.panel.findChildren(QWidget):
+            if widget.isVisible() and isinstance(widget, (QLineEdit, QPlainTextEdit)):
+                widget.customContextMenuRequested.emit(QPoint(3, 3))
+            elif widget.isVisible():
+                at = QPoint(3, 3)
+                QApplication.sendEvent(
+                    widget, QContextMenuEvent(QContextMenuEvent.Reason.Mouse, at, widget.mapToGlobal(at))
+                )
+            close_what_is_open(window)
+
+    leaves_nothing(window, open_more)
+    assert isinstance(shown[0], QMenu), "more did open"
+    leaves_nothing(window, open_the_others, times=4)
+
+
+@pytest.mark.parametrize(
+    ("panel", "opener"),
+    [
+        ("image", "_show_menu"),
+        ("robot", "_show_menu"),
+        ("console", "_show_menu"),
+    ],
+)
+def test_the_menu_in_a_title(window: MainWindow, panel: str, opener: str) -> None:
+    window.show()
+    dock = opened(window, panel)
+    leaves_nothing(window, getattr(dock.panel, opener))
+
+
+@pytest.mark.parametrize(
+    ("panel", "opener"),
+    [("image", "_show_actions"), ("console", "_show_actions"), ("inspector", "_show_menu")],
+)
+def test_the_menu_under_the_mouse(window: MainWindow, panel: str, opener: str) -> None:
+    window.show()
+    dock = opened(window, panel)
+    leaves_nothing(window, lambda: getattr(dock.panel, opener)(QPoint(5, 5)))
+
+
+def test_the_columns_of_a_table(window: MainWindow) -> None:
+    window.show()
+    dock = opened(window, "topics")
+    table = dock.panel.table  # type: ignore[attr-defined]
+    leaves_nothing(window, lambda: table._show_columns(QPoint(5, 5)))
+
+
+def test_the_menus_of_the_bar_and_what_they_list(window: MainWindow) -> None:
+    window.show()
+    opened(window, "topics")
+
+    def open_all() -> None:
+        for action in window.bar.findChildren(QAction):
+            menu = action.menu()
+            if isinstance(menu, QMenu):
+                menu.popup(QPoint(10, 10))
+                for entry in menu.actions():
+                    inner = entry.menu()
+                    if isinstance(inner, QMenu):
+                        inner.popup(QPoint(30, 30))
+            close_what_is_open(window)
+        for button in window.tool_bar.findChildren(QPushButton):
+            if button.isVisible() and not button.property("command"):
+                button.click()
+            close_what_is_open(window)
+
+    leaves_nothing(window, open_all)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_a_command_opens(window: MainWindow, name: str) -> None:
+    window.show()
+    opened(window, "behaviour")
+    leaves_nothing(window, lambda: window.commands.run(name))
+
+
+def test_toasts_and_banners(window: MainWindow) -> None:
+    window.show()
+    opened(window, "topics")
+
+    def say() -> None:
+        window.toast.say("Done", "Undo", lambda: None)
+        window.session.alerts.put(
+            "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
+        )
+        window.tick()
+        window.session.alerts.cure("x")
+        window.tick()
+
+    leaves_nothing(window, say)
+
+
+def test_layouts_and_panels_that_come_and_go(qtbot, window: MainWindow) -> None:
+    window.show()
+
+    def go_round() -> None:
+        for layout in ("behaviour", "developer"):
+            bench = window.show_layout(layout)
+            for name in ("camera", "console", "health"):
+                dock = bench.open(name)
+                assert dock is not None
+                dock.setFloating(True)
+                window.tick()
+                dock.setFloating(False)
+                dock.close()
+        window.show_start()
+
+    leaves_nothing(window, go_round, times=5)

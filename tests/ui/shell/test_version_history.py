@@ -1,0 +1,173 @@
+"""The list of earlier versions: what it says of each, and that opening one writes over nothing."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from app.core.documents.diff import Difference
+from app.core.documents.versions import keep_earlier
+from app.ui.shell.commands.commands import Commands
+from app.ui.shell.dialogs.version_history import VersionHistorySheet, difference_words
+from app.ui.shell.main_window import MainWindow
+from app.ui.text.dates import when_words
+from app.ui.widgets import Button
+from app.ui.widgets.lists.entry_list import Heading
+from app.ui.widgets.lists.fuzzy import Found
+from tests.ui.shell.test_files import BLOCKS, changed, saved
+
+pytest_plugins = ["tests.ui.shell_fixtures"]
+
+
+@pytest.fixture
+def shown(qtbot, window: MainWindow) -> MainWindow:
+    window.theme.set_motion("on")
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    return window
+
+
+def opened(qtbot, commands: Commands, window: MainWindow) -> VersionHistorySheet:
+    commands.run("file.earlier")
+    (sheet,) = window.findChildren(VersionHistorySheet)
+    qtbot.waitUntil(lambda: sheet.read)
+    return sheet
+
+
+def rows(sheet: VersionHistorySheet) -> list[tuple[str, str]]:
+    told = []
+    for line in sheet.rows.lines.lines:
+        if isinstance(line, Found):
+            told.append((line.entry.words.partition(",")[0], line.entry.note or line.entry.reason))
+        else:
+            assert isinstance(line, Heading)
+            told.append((line.words, ""))
+    return told
+
+
+def test_each_save_makes_a_version_that_says_what_is_different(
+    qtbot, commands, shown, tmp_path: Path
+) -> None:
+    commands.files.open(saved(tmp_path / "Mine.nepb"))
+    for id in "xy":
+        shown.session.document.edited(changed(id))
+        commands.run("file.save")
+    sheet = opened(qtbot, commands, shown)
+    assert sheet.heading.text() == "Earlier versions of Mine"
+    other = "1 block; since then 1 added, 1 removed"
+    assert rows(sheet) == [("Today", other), ("Today", other)]
+    assert sheet.rows.hasFocus()
+
+
+def test_enter_opens_the_chosen_one_as_a_copy(qtbot, commands, shown, tmp_path: Path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    commands.files.open(path)
+    for id in "xy":
+        shown.session.document.edited(changed(id))
+        commands.run("file.save")
+    before = path.read_bytes()
+    sheet = opened(qtbot, commands, shown)
+    oldest = Path(sheet.rows.lines.lines[1].entry.name)
+    QTest.keyClick(sheet.rows, Qt.Key.Key_Down)
+    QTest.keyClick(sheet.rows, Qt.Key.Key_Return)
+    assert not sheet.isVisible()
+    document = shown.session.document
+    assert (document.workspace, document.path) == (BLOCKS, None)
+    assert document.name.startswith("Mine, ")
+    assert ":" not in document.name
+    assert len(shown.session.documents) == 2
+    assert shown.toast.text == f"Opened {document.name} as a copy"
+    document.edited(changed("mine now"))
+    assert (path.read_bytes(), oldest.is_file()) == (before, True)
+
+
+def test_the_button_and_a_double_click_open_too(qtbot, commands, shown, tmp_path: Path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    keep_earlier(path)
+    commands.files.open(path)
+    sheet = opened(qtbot, commands, shown)
+    QTest.mouseClick(sheet.button, Qt.MouseButton.LeftButton)
+    assert len(shown.session.documents) == 2
+    commands.files.open(path)
+    sheet = opened(qtbot, commands, shown)
+    middle = sheet.rows.visualRect(sheet.rows.currentIndex()).center()
+    QTest.mouseClick(sheet.rows.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    assert sheet.isVisible(), "one click only chooses"
+    QTest.mouseDClick(sheet.rows.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    assert len(shown.session.documents) == 3
+
+
+def test_one_that_can_not_be_read_says_so_and_does_not_open(qtbot, commands, shown, tmp_path: Path) -> None:
+    path = saved(tmp_path / "Mine.nepb")
+    path.write_text("not json", "utf-8")
+    keep_earlier(path)
+    commands.files.open(saved(path))
+    sheet = opened(qtbot, commands, shown)
+    assert rows(sheet) == [("Today", "It is damaged or no behaviour")]
+    QTest.keyClick(sheet.rows, Qt.Key.Key_Return)
+    assert sheet.isVisible()
+
+
+def test_versions_of_other_files_of_that_name_stand_below(qtbot, commands, shown, tmp_path: Path) -> None:
+    for folder in ("here", "there"):
+        (tmp_path / folder).mkdir()
+        keep_earlier(saved(tmp_path / folder / "Mine.nepb"))
+    commands.files.open(tmp_path / "here" / "Mine.nepb")
+    sheet = opened(qtbot, commands, shown)
+    same = ("Today", "1 block, the same as now")
+    assert rows(sheet) == [same, ("Of other files called Mine", ""), same]
+
+
+def test_with_none_it_says_what_makes_one(qtbot, commands, shown, tmp_path: Path) -> None:
+    commands.files.open(saved(tmp_path / "Mine.nepb"))
+    sheet = opened(qtbot, commands, shown)
+    assert not sheet.rows.isVisible()
+    assert sheet.empty.isVisible()
+    sheet.shut()
+
+
+def test_a_behaviour_without_a_file_is_saved_from_here(qtbot, commands, shown, answers, tmp_path) -> None:
+    answers.path = tmp_path / "New.nepb"
+    shown.session.document.edited(BLOCKS)
+    sheet = opened(qtbot, commands, shown)
+    save = next(each for each in sheet.empty.findChildren(Button) if each.accessibleName() == "Save")
+    assert save.hasFocus()
+    QTest.keyClick(save, Qt.Key.Key_Space)
+    assert answers.path.is_file()
+    assert not sheet.isVisible()
+
+
+def test_when_in_plain_words() -> None:
+    now = dt.datetime(2026, 11, 20, 15, 0, tzinfo=dt.timezone.utc)
+    told = [when_words(now - dt.timedelta(days=days, hours=1), now) for days in (0, 1, 3, 400)]
+    assert told == ["Today, 14:00", "Yesterday, 14:00", "17 November, 14:00", "16 October 2025, 14:00"]
+
+
+def test_what_is_different_in_plain_words() -> None:
+    assert difference_words(Difference(14)) == "14 blocks, the same as now"
+    assert difference_words(Difference(1, moved=True)) == "1 block, put in another order"
+    found = Difference(14, added=3, removed=1, changed=2)
+    assert difference_words(found) == "14 blocks; since then 3 added, 1 removed, 2 changed"
+
+
+def test_many_versions_stay_inside_the_window(qtbot, commands, shown, tmp_path: Path) -> None:
+    path = tmp_path / "Mine.nepb"
+    for number in range(25):
+        saved(path)
+        path.write_bytes(path.read_bytes() + b" " * number)
+        os.utime(path, (number * 1000, number * 1000))
+        keep_earlier(path)
+    commands.files.open(path)
+    shown.theme.set_text_percent(200)
+    try:
+        sheet = opened(qtbot, commands, shown)
+        assert shown.rect().contains(sheet.geometry())
+        assert sheet.rows.height() > 100
+    finally:
+        shown.theme.set_text_percent(100)

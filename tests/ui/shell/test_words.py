@@ -1,0 +1,378 @@
+"""The window in the pseudo-language: each word is a translated one, and longer words have their room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QKeyCombination, Qt
+from PySide6.QtWidgets import QMenu, QWidget
+
+from app import resources
+from app.core.alerts import Alerts
+from app.core.messages import snapshots
+from app.core.network.remote_access import Reach
+from app.core.robots.motion_permission import Moving
+from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.run.view import RunState, RunView, view_of
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from app.ui.application import translate_qt, why_not
+from app.ui.shell.actions.shortcuts import FIXED
+from app.ui.shell.bars.app_bar import robots_chip
+from app.ui.shell.bars.status_bar import StatusFacts
+from app.ui.shell.commands.table import COMMANDS
+from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.dialogs.motion_permission import MotionQuestion
+from app.ui.shell.dialogs.name import NameSheet
+from app.ui.shell.dialogs.network_access import NetworkAccessSheet
+from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.shell.dialogs.shortcuts import ShortcutSheet
+from app.ui.shell.dialogs.version_history import VersionHistorySheet
+from app.ui.shell.documents import strange_words
+from app.ui.shell.main_window import MainWindow, Placeholder
+from app.ui.shell.start_page.page import all_words, read_examples
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
+from app.ui.widgets import StatusItem
+from app.ui.widgets.lists.entry_list import EntryList, Heading
+from nep import i18n
+from nep.i18n import _
+from nep.system.addresses import OwnAddress
+from tests.pseudo import texts_of, untranslated
+from tests.ui import fakes
+from tests.ui.clipping import clipped
+from tests.ui.shell.test_files import changed, saved
+from tests.ui.shell.test_motion_permission import ROVER
+from tests.ui.shell_parts import NAMES, PANELS, Answers
+
+# without a screen nothing can grab the keyboard, which every popup asks for
+pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
+pytest_plugins = ["tests.ui.shell_fixtures"]
+SETTLE_MS = 20
+EXAMPLES = read_examples(resources.folder() / "examples")
+DATA = (
+    *(text for each in EXAMPLES for text in (each.name, each.text)),
+    *(title for title, _accepts in NAMES.values()),
+    "Greeting", "Mine", "Rover", "Turtle", "topic list", "NEP_MASTER", "wlan0", "tun0", "lo",
+)  # fmt: skip
+"""What comes from elsewhere: plain panels, which nobody translates, files and robots."""
+KEYS = ("Delete", "PgUp", "PgDown")
+ANSWERED, SILENT = RobotStop("Rover", True, 41.4), RobotStop("Turtle", False, None)
+RUNS = (
+    RunState(),
+    RunState(nothing_in=object()),
+    RunState("running", "Greeting", last_words="Rover"),
+    RunState("paused", "Greeting"),
+    RunState("stopping", "Greeting", asked=("Rover", "Turtle"), answered=(ANSWERED,), elapsed_s=3.0),
+    RunState("proven", "Greeting", report=StopReport((ANSWERED,), 41.4), elapsed_s=3.0, dashed=True),
+    RunState("proven", "Greeting", report=StopReport((ANSWERED,), 41.4), finished=True),
+    RunState("unanswered", "Greeting", report=StopReport((ANSWERED, SILENT), 41.4)),
+)
+OF_QT = ("#qt_dockwidget_", "#ScrollLeftButton", "#ScrollRightButton")
+"""Buttons that Qt makes itself, with its own words: in a title that we replace, at the ends of tabs."""
+OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about", "file.earlier")
+
+
+def views() -> Iterator[RunView]:
+    """Every state of Run and Stop, also of a behaviour whose tab does not show."""
+    for run in RUNS:
+        for elsewhere in (False, True):
+            yield view_of(run, ["Rover", "Turtle"], 3.0, elsewhere=elsewhere)
+
+
+def said_by(root: QWidget) -> Iterator[tuple[str, str]]:
+    """(where, words) of all that a widget, its lists and the facts of its status bar say."""
+    for place, text in texts_of(root):
+        if not any(name in place for name in OF_QT):
+            yield place, text
+    for item in root.findChildren(StatusItem):
+        yield "StatusItem", item.text
+    for rows in root.findChildren(EntryList):
+        for line in rows.lines.lines:
+            if isinstance(line, Heading):
+                yield "heading", line.words
+            else:
+                yield from ((f"row {line.entry.id}", t) for t in (line.entry.words, line.entry.reason))
+                if line.entry.kind not in {"topic", "robot"}:
+                    yield f"note {line.entry.id}", line.entry.note
+
+
+def forgotten(root: QWidget, *data: str) -> list[str]:
+    """What of it is in no language but English."""
+    return [f"{place}: {text}" for place, text in said_by(root) if untranslated(text, *DATA, *KEYS, *data)]
+
+
+def settle(qtbot) -> None:
+    for _each in range(2):
+        qtbot.wait(SETTLE_MS)
+
+
+@pytest.fixture
+def whole(qtbot, pseudo, session: Session, theme: Theme, tmp_path: Path) -> Iterator[MainWindow]:
+    """The window with an example of everything that it can show around the panels."""
+    session.settings.add_recent(saved(tmp_path / "Mine.nepb"))
+    window = MainWindow(session, theme, PANELS, EXAMPLES, asks=Answers())
+    qtbot.addWidget(window)
+    theme.set_motion("on")
+    window.show()
+    yield window
+    window.close()
+
+
+Look = Callable[[str, QWidget], None]
+
+
+def everything(qtbot, window: MainWindow, look: Look) -> None:
+    """Show each bar, page and sheet, and look at it."""
+    commands = window.commands
+    window.tick()
+    look("start page", window)
+    window.start.show_all(True)
+    look("all examples", window.start)
+    window.session.alerts.put("one", "error", _("Nothing runs"), button=_("Try again"), action="panel:topics")
+    window.session.alerts.put("two", "error", _("Nothing runs"))
+    for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
+        commands.run(f"layout.{layout}")
+        window.tick()
+        window._show_facts()
+        window.toast.say(_("Nothing runs"), _("Undo"), lambda: None)
+        for view in views():
+            bar.show_view(view)
+            look(f"{layout}, {view.state}", window)
+    for name in OVER:
+        commands.run(name)
+        (sheet,) = [each for each in window.findChildren(Overlay) if each.isVisible()]
+        look(name, sheet)
+        sheet.shut()
+
+
+def test_the_window_says_every_word_in_the_chosen_language(qtbot, whole: MainWindow, tmp_path: Path) -> None:
+    found: set[str] = set()
+    paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(snapshots.folder(whole.session.settings)))
+    languages = [name for _code, name in i18n.offered()]  # each is called what it calls itself
+
+    def look(what: str, root: QWidget) -> None:
+        found.update(f"{what}: {each}" for each in forgotten(root, *paths, *languages))
+
+    everything(qtbot, whole, look)
+    assert "\n".join(sorted(found)) == ""
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (1100, 700)])
+def test_the_window_has_room_for_longer_words(qtbot, whole: MainWindow, size: tuple[int, int]) -> None:
+    whole.resize(*size)
+    faults: list[str] = []
+
+    def look(what: str, root: QWidget) -> None:
+        settle(qtbot)
+        faults.extend(f"{what}: {fault}" for fault in clipped(root))
+
+    everything(qtbot, whole, look)
+    assert "\n".join(faults) == ""
+
+
+def test_every_menu(qtbot, whole: MainWindow) -> None:
+    found: list[str] = []
+    for layout in ("start", "behaviour", "developer"):
+        if layout != "start":
+            whole.commands.run(f"layout.{layout}")
+        for menu in whole.findChildren(QMenu):
+            menu.aboutToShow.emit()
+            entries = [menu.title(), *(each.text().partition("\t")[0] for each in menu.actions())]
+            found += [f"{layout}, {menu.title()}: {each}" for each in entries if untranslated(each, *DATA)]
+            menu.aboutToHide.emit()
+    for dock in whole.benches["developer"].docks.values():
+        menu = dock.menu()
+        found += [each.text() for each in menu.actions() if untranslated(each.text())]
+        menu.deleteLater()
+    assert found == []
+
+
+def test_every_command_and_every_key(whole: MainWindow) -> None:
+    shown = whole.commands.shortcuts
+    said = [text for each in COMMANDS for text in (each.words, _(each.menu), _(each.tip))]
+    said += [whole.commands.actions.why_not(each.id) for each in COMMANDS]
+    said += [text for each in FIXED for text in (_(each.words), _(each.place))]
+    ctrl = Qt.KeyboardModifier.ControlModifier
+    for key in (
+        QKeyCombination(Qt.Key.Key_A),
+        QKeyCombination(Qt.Key.Key_F12),
+        QKeyCombination(ctrl, Qt.Key.Key_C),
+    ):
+        refusal = shown.refusal("file.new", key)
+        assert refusal
+        said.append(refusal)
+    assert [each for each in said if untranslated(each, *DATA)] == []
+    assert all("{" not in each for each in said)
+
+
+def test_what_is_said_while_a_command_is_sought_or_gets_a_key(qtbot, whole: MainWindow) -> None:
+    whole.commands.run("palette.open")
+    (palette,) = whole.findChildren(Palette)
+    for typed in ("", "ŕúñ", "nowhere"):
+        palette.field.setText(typed)
+        assert forgotten(palette, "nowhere") == []
+        assert untranslated(palette.foot.counted) == []
+    palette.shut()
+    assert untranslated(" ".join(_(said) for _keys, said in palette.foot.KEYS)) == []
+    whole.commands.run("help.shortcuts")
+    (sheet,) = whole.findChildren(ShortcutSheet)
+    told = []
+    for act in (sheet.record, sheet._take_away, sheet._reset, lambda: sheet._tell(sheet.said.text())):
+        act()
+        told.append(sheet.said.text())
+    sheet.open_for("file.new")
+    told.append(sheet.said.text())
+    assert [each for each in told if untranslated(each)] == []
+    assert forgotten(sheet) == []
+
+
+def test_the_earlier_versions(qtbot, whole: MainWindow, tmp_path: Path) -> None:
+    whole.commands.files.open(tmp_path / "Mine.nepb")
+    for block in "xy":
+        whole.session.document.edited(changed(block))
+        whole.commands.run("file.save")
+    whole.commands.run("file.earlier")
+    (sheet,) = whole.findChildren(VersionHistorySheet)
+    qtbot.waitUntil(lambda: sheet.read)
+    assert len(sheet.rows.lines.lines) == 2
+    assert forgotten(sheet) == []
+    assert untranslated(whole.toast.text, "Mine") == []
+
+
+def test_the_question_for_a_name(whole: MainWindow) -> None:
+    whole.commands.run("layout.developer")
+    whole.commands.run("layout.keep")
+    (sheet,) = whole.findChildren(NameSheet)
+    for name in ("", "x" * 50, _("Developer")):
+        sheet.field.setText(name)
+        sheet._done()
+        assert sheet.isVisible()
+        assert sheet.wrong.text()
+        assert forgotten(sheet) == []
+    sheet.field.setText("Mine")
+    sheet._done()
+    for act in ("layout.rename", "layout.delete"):
+        assert forgotten(whole.toast, "Mine") == []
+        whole.commands.run(act)
+        assert forgotten(sheet, "Mine") == []
+        sheet.shut()
+
+
+@pytest.mark.parametrize("here", [(), (("192.168.1.20", "wlan0"), ("10.8.0.2", "tun0"))])
+@pytest.mark.parametrize("address", ["127.0.0.1:7780", "192.168.1.9:7780"])
+def test_the_sheet_for_other_computers(qtbot, pseudo, tmp_path: Path, here, address: str) -> None:
+    own = tuple(OwnAddress(*each) for each in here)
+    reach = Reach(
+        address, Settings(tmp_path), Alerts(), print, ask=lambda _hosts, _address: None, here=lambda: own
+    )
+    window = QWidget()
+    window.resize(1100, 700)
+    qtbot.addWidget(window)
+    window.show()
+    sheet = NetworkAccessSheet(Theme("light"), window, reach)
+    sheet.open()
+    settle(qtbot)
+    assert forgotten(sheet) == []
+    assert clipped(sheet) == []
+    reach.close()
+
+
+def test_the_question_before_a_robot_moves(qtbot, pseudo, tmp_path: Path) -> None:
+    window = QWidget()
+    window.resize(1100, 700)
+    qtbot.addWidget(window)
+    window.show()
+    moving = Moving(Settings(tmp_path))
+    question = MotionQuestion(Theme("light"), window, moving, print)
+    moving.permits([(ROVER, ("move",))], lambda: None)
+    question.refresh()
+    settle(qtbot)
+    assert forgotten(question, "move") == []
+    assert clipped(question) == []
+
+
+@pytest.mark.parametrize(
+    "states",
+    [
+        (), ("ready",), ("busy",), ("ready", "busy"), ("stopping",), ("stopping", "stopping"), ("silent",),
+        ("silent", "ready"), ("silent", "silent"), ("not stopped",), ("not stopped", "not stopped"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("run", ["idle", "running", "paused"])
+def test_the_chip_of_robots(pseudo, states: tuple[str, ...], run: str) -> None:
+    links = [SimpleNamespace(name="Rover", state=state, silent="", state_words="") for state in states]
+    runs = SimpleNamespace(active=run != "idle", view=lambda: SimpleNamespace(state=run))
+    words, _status = robots_chip(SimpleNamespace(fleet=SimpleNamespace(links=links), runs=runs))  # type: ignore[arg-type]
+    assert words
+    assert untranslated(words, "Rover") == []
+
+
+@pytest.mark.parametrize("session", [fakes.Session, fakes.Session.full], ids=["empty", "full"])
+def test_the_facts_of_the_status_bar(pseudo, session) -> None:
+    facts = StatusFacts(session())
+    told = [facts.health(), facts.saved(), facts.topics(), facts.master(), facts.traffic()]
+    told += [facts.lost(), facts.shown(), facts.window()]
+    for alert in list(facts._session.alerts.active):
+        facts._session.alerts.cure(alert.id)
+    told.append(facts.health())
+    assert [words for _icon, words, _status in told if untranslated(words, "Pepper", "Master")] == []
+
+
+def test_what_is_said_of_files(whole: MainWindow, tmp_path: Path) -> None:
+    files, toast = whole.commands.files, whole.toast
+    alerts = whole.session.alerts
+    strange = [tmp_path / "a.png", tmp_path / "b.png"]
+    files.open_all(strange)
+    files.open(tmp_path / "gone.nepb")
+    for alert in alerts.active:
+        data = ("gone.nepb", "a.png", ".nepb", "No such file or directory")
+        assert untranslated(f"{alert.title} {alert.detail} {alert.button}", *data) == []
+    assert untranslated(strange_words(strange[:1]), "a.png", ".nepb") == []
+    files.reopen()
+    assert untranslated(toast.text) == []
+    files.open(tmp_path / "Mine.nepb")
+    whole.session.document.edited(changed("x"))
+    files.close(whole.session.document)
+    assert untranslated(toast.text, "Mine") == []
+    whole.commands.behaviours.forget_recent()
+    assert untranslated(toast.text) == []
+
+
+def test_what_is_said_where_no_window_can_open(pseudo) -> None:
+    data = ("DISPLAY", "WAYLAND_DISPLAY", "QTWEBENGINE_DISABLE_SANDBOX")
+    assert untranslated(why_not({}, "linux", 1000), *data) == []
+    assert untranslated(why_not({"DISPLAY": ":0"}, "linux", 0), *data) == []
+
+
+def test_what_stands_in_place_of_a_layout_or_a_panel(qtbot, whole: MainWindow) -> None:
+    for layout in ("behaviour", "developer"):
+        place = Placeholder(layout)
+        qtbot.addWidget(place)
+        assert forgotten(place) == []
+    bench = whole.show_layout("developer")
+    dock = bench.docks["topics"]
+    dock.body.fail("", dock.try_again)
+    assert forgotten(dock) == []
+    dock.body.show_panel()
+
+
+def test_the_words_of_qt_itself(qapp, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert translate_qt(qapp) is None, "English has no need of it"
+    monkeypatch.setattr("app.ui.application.language", lambda: "es")
+    translator = translate_qt(qapp)
+    assert translator is not None
+    try:
+        assert QCoreApplication.translate("QPlatformTheme", "Cancel") == "Cancelar"
+    finally:
+        qapp.removeTranslator(translator)
+    monkeypatch.setattr("app.ui.application.language", lambda: "qps")
+    assert translate_qt(qapp) is None, "Qt has none for a language that it does not know"
+
+
+@pytest.mark.parametrize("count", [1, *range(5, 13)])
+def test_the_link_to_all_examples(pseudo, count: int) -> None:
+    assert untranslated(all_words(count)) == []

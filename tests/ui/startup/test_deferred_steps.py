@@ -1,0 +1,155 @@
+"""What is done after the first paint: in order, one step in a turn, and without a paint a little later."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, QObject
+from PySide6.QtGui import QFont, QFontInfo
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.core.documents.journal import Journal
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from app.ui.application import Options, make_application, make_window
+from app.ui.panels.registry import PanelShelf
+from app.ui.startup.deferred import DeferredSteps
+from app.ui.theme import fonts
+from tests.ui.shell_parts import free_address
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_nothing_is_done_before_the_first_paint(qtbot: QtBot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    done: list[str] = []
+    soon = DeferredSteps(window, [lambda: done.append("panels"), lambda: done.append("editor")])
+    soon.put_first([lambda: done.append("begin"), lambda: done.append("meeting")])
+    qtbot.wait(50)
+    assert (done, soon.began) == ([], False)
+    window.show()
+    qtbot.waitUntil(lambda: soon.done)
+    assert done == ["begin", "meeting", "panels", "editor"]
+
+
+class Ear(QObject):
+    """Hears events that were posted to it, as a click is."""
+
+    def __init__(self, heard: list[str]) -> None:
+        super().__init__()
+        self._heard = heard
+
+    def event(self, event: QEvent) -> bool:
+        self._heard.append("click")
+        return True
+
+
+def test_a_click_comes_between_two_steps(qtbot: QtBot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    seen: list[str] = []
+    ear = Ear(seen)
+
+    def one() -> None:
+        seen.append("one")
+        QCoreApplication.postEvent(ear, QEvent(QEvent.Type.User))
+
+    soon = DeferredSteps(window, [one, lambda: seen.append("two")])
+    window.show()
+    qtbot.waitUntil(lambda: soon.done)
+    assert seen == ["one", "click", "two"]
+
+
+def test_a_window_that_is_not_painted_begins_a_little_later(qtbot: QtBot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    done: list[int] = []
+    soon = DeferredSteps(window, [lambda: done.append(1)])
+    qtbot.waitUntil(lambda: soon.done)
+    assert done == [1]
+
+
+def test_a_step_that_fails_stops_none_of_the_others(qtbot: QtBot, caplog: pytest.LogCaptureFixture) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    done: list[int] = []
+
+    def fail() -> None:
+        raise OSError("no such file")
+
+    soon = DeferredSteps(window, [fail, lambda: done.append(1)])
+    with caplog.at_level(logging.ERROR):
+        window.show()
+        qtbot.waitUntil(lambda: soon.done)
+    assert done == [1]
+    assert "no such file" in caplog.text
+
+
+def test_the_steps_find_every_panel() -> None:
+    shelf = PanelShelf()
+    for step in shelf.steps():
+        step()
+    assert {"behaviour", "console", "topics"} <= set(shelf)
+    assert len(shelf) == len(list(shelf)) >= 10
+    assert shelf["console"].name == "console"
+
+
+def test_the_window_is_built_without_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
+    """What the first paint needs: a line more here is time that every start takes."""
+    late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.doctor"]
+    late += ["app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
+    program = (
+        "import sys\n"
+        "from app.ui import application\n"
+        "from app.core.session import Session\n"
+        "application.make_application()\n"
+        "application.make_window(Session(start_companions=False), application.Options(new_window=True))\n"
+        f"print([name for name in {late} if name in sys.modules])\n"
+    )
+    environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "NEP_STUDIO_HOME": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environ,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=140,
+        check=True,
+    )
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("mode", ["light", "dark"])
+def test_everything_that_shows_first_has_our_fonts(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
+) -> None:
+    monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
+    monkeypatch.setenv("NEP_MASTER", free_address())
+    application = make_application()
+    fonts.load()
+    application.setStyleSheet("")
+    application.setFont(QFont("DejaVu Serif"))  # as the system gives it: nothing of ours is applied yet
+    journal = Journal(tmp_path / "journal")
+    journal.write("Walk", None, '{"blocks": {"blocks": [{"type": "x", "id": "a"}]}}', {})
+    monkeypatch.setattr("app.core.documents.journal._alive", lambda _pid, _born_s: False)
+    (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
+    window = make_window(Session(Settings(tmp_path), start_companions=False), Options())
+    qtbot.addWidget(window)
+    window.show()
+    assert window.banner.isVisible(), "unsaved work is offered"
+    shown = [each for each in window.findChildren(QWidget) if each.isVisible()]
+    strange = {
+        f"{type(each).__name__} {each.property('kind') or ''}"
+        for each in shown
+        if QFontInfo(each.font()).family() not in {"Inter", "JetBrains Mono"}
+    }
+    assert strange == set()
+    window.close()

@@ -1,0 +1,298 @@
+"""A second start hands its files to the window that runs."""
+
+from __future__ import annotations
+
+import os
+import socket as socket_module
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QObject
+from PySide6.QtNetwork import QLocalSocket
+from PySide6.QtWidgets import QApplication
+
+from app.core.storage.file_lock import Turn
+from app.ui.startup import single_instance
+from app.ui.startup.single_instance import (
+    SingleInstanceServer,
+    StartRequest,
+    found,
+    hand_over,
+    is_ours,
+    parse,
+    peer_of,
+    place,
+)
+
+WAIT_MS = 30_000
+SECOND = """
+import sys
+from pathlib import Path
+from app.ui.startup.single_instance import StartRequest, hand_over
+files = tuple(Path(each) for each in sys.argv[2:])
+sys.exit(0 if hand_over(sys.argv[1], StartRequest(files)) else 3)
+"""
+
+
+def meet(name: str, do: Callable[[StartRequest], object]) -> SingleInstanceServer:
+    """As Studio makes it: Qt owns it. One that only its connections keep goes in the midst of their end."""
+    return SingleInstanceServer(name, do, QApplication.instance())
+
+
+@pytest.fixture
+def name(tmp_path: Path) -> str:
+    return place(tmp_path)
+
+
+def second(name: str, *files: str, cwd: Path) -> subprocess.Popen[bytes]:
+    environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    return subprocess.Popen([sys.executable, "-c", SECOND, name, *files], cwd=cwd, env=environ)
+
+
+def test_nobody_there_means_a_window_of_its_own(name: str) -> None:
+    assert hand_over(name, StartRequest()) is False
+
+
+def test_another_process_hands_over_whole_paths(qtbot, name: str, tmp_path: Path) -> None:
+    asked: list[StartRequest] = []
+    meeting = meet(name, asked.append)
+    assert meeting.open
+    process = second(name, "a.nepb", str(tmp_path / "Grüße.nepb"), cwd=tmp_path)
+    qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
+    assert process.returncode == 0
+    assert asked == [StartRequest((tmp_path / "a.nepb", tmp_path / "Grüße.nepb"))]
+    meeting.close()
+    assert hand_over(name, StartRequest()) is False
+
+
+STARTING = """
+import sys
+from pathlib import Path
+from app.core.storage.file_lock import Turn
+from app.ui.startup.single_instance import StartRequest, found
+print("begun", flush=True)
+turn = Turn(Path(sys.argv[2]))
+there = found(sys.argv[1], StartRequest((Path("a.nepb"),)), turn, 60.0)
+print("found" if there else "first", flush=True)
+sys.stdin.read()
+"""
+
+
+def starting(name: str, turn: Path) -> subprocess.Popen[str]:
+    environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    return subprocess.Popen(
+        [sys.executable, "-c", STARTING, name, str(turn)],
+        env=environ,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_of_two_starts_at_once_the_second_waits_for_the_window_of_the_first(
+    qtbot, name: str, tmp_path: Path
+) -> None:
+    turn, asked = Turn(tmp_path / "starting"), []
+    assert not found(name, StartRequest(), turn)
+    process = starting(name, tmp_path / "starting")
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    meeting = meet(name, asked.append)
+    qtbot.waitUntil(lambda: bool(asked), timeout=12 * WAIT_MS)
+    assert process.communicate(timeout=60)[0] == "found\n"
+    meeting.close()
+    turn.leave()
+
+
+def test_a_start_that_dies_before_its_window_is_there_is_not_waited_for(name: str, tmp_path: Path) -> None:
+    turn = Turn(tmp_path / "starting")
+    process = starting(name, tmp_path / "starting")
+    assert process.stdout is not None
+    assert [process.stdout.readline() for _ in range(2)] == ["begun\n", "first\n"]
+    assert not turn.take()
+    process.kill()
+    process.communicate(timeout=60)
+    assert not found(name, StartRequest(), turn, 60.0)
+    assert not Turn(tmp_path / "starting").take(), "it has the turn"
+    turn.leave()
+
+
+def test_the_second_window_does_not_take_the_place_of_the_first(qtbot, name: str, tmp_path: Path) -> None:
+    asked: list[StartRequest] = []
+    first = meet(name, asked.append)
+    later = meet(name, asked.append)
+    assert (first.open, later.open) == (True, False)
+    process = second(name, cwd=tmp_path)
+    qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
+    assert asked == [StartRequest()]
+    first.close()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a named pipe goes with its process")
+def test_what_a_killed_studio_left_is_no_hindrance(qtbot, name: str) -> None:
+    code = "import sys; from app.ui.startup.single_instance import *; "
+    code += "m = SingleInstanceServer(sys.argv[1], print); print(m.open, flush=True); sys.stdin.read()"
+    environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environ
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"True\n"
+    process.kill()
+    process.communicate()
+    assert Path(name).exists(), "its socket is still there"
+    meeting = meet(name, lambda _asked: None)
+    assert meeting.open
+    meeting.close()
+
+
+def test_nonsense_is_no_start(qtbot, name: str) -> None:
+    asked: list[StartRequest] = []
+    meeting = meet(name, asked.append)
+    for data in (b"{\n", b"[]\n", b'{"files": "x"}\n', b"[" * 200_000 + b"\n", b"x" * 1_100_000):
+        socket = QLocalSocket()
+        socket.connectToServer(name)
+        assert socket.waitForConnected(WAIT_MS)
+        socket.write(data)
+        qtbot.waitUntil(lambda s=socket: s.state() == s.LocalSocketState.UnconnectedState, timeout=WAIT_MS)
+    assert asked == []
+    meeting.close()
+
+
+def test_only_this_user_reaches_the_window(qtbot, name: str) -> None:
+    meeting = meet(name, lambda _asked: None)
+    if os.name == "posix":
+        assert Path(name).stat().st_mode & 0o077 == 0
+    meeting.close()
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The user's runtime folder, as a login makes it: with a short name, for a socket's name is short."""
+    with tempfile.TemporaryDirectory(prefix="run") as made:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", made)
+        monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+        yield Path(made)
+
+
+needs_modes = pytest.mark.skipif(os.name != "posix", reason="Windows has pipes with rights")
+
+
+@needs_modes
+def test_it_lies_in_the_runtime_folder_one_for_each_folder_of_studio(runtime: Path, tmp_path: Path) -> None:
+    one, other = Path(place(tmp_path / "a")), Path(place(tmp_path / "b"))
+    assert one.parent == other.parent == runtime / "nep-studio"
+    assert one != other
+    assert one.parent.stat().st_mode & 0o777 == 0o700
+    deep = Path(place(tmp_path / ("x" * 120)))
+    assert deep.parent == one.parent
+
+
+@needs_modes
+@pytest.mark.parametrize("wrong", ["open", "linked", "missing", "relative"])
+def test_a_runtime_folder_that_others_reach_is_not_used(
+    runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: str
+) -> None:
+    home = runtime / "home"  # a short name: with several workers that of `tmp_path` is too long for a socket
+    if wrong == "open":
+        runtime.chmod(0o777)
+    elif wrong == "linked":
+        (tmp_path / "link").symlink_to(runtime)
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "link"))
+    else:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", "run" if wrong == "relative" else str(tmp_path / "none"))
+    found = Path(place(home))
+    assert found.parent == home
+    assert home.stat().st_mode & 0o777 == 0o700
+
+
+@needs_modes
+def test_no_private_folder_means_no_meeting_and_a_start_all_the_same(
+    runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stranger has made the folders before us."""
+    monkeypatch.setattr(os, "geteuid", lambda: 4242)
+    assert place(tmp_path) == ""
+    assert hand_over("", StartRequest()) is False
+    assert SingleInstanceServer("", lambda _asked: None).open is False
+
+
+@needs_modes
+def test_what_is_no_socket_of_ours_is_not_talked_to(qtbot, runtime: Path, tmp_path: Path) -> None:
+    name = place(tmp_path)
+    os.mkfifo(name)
+    assert hand_over(name, StartRequest()) is False
+    meeting = meet(name, lambda _asked: None)
+    assert meeting.open, "what is left in our own folder is ours to take away"
+    assert is_ours(name)
+    Path(name).parent.chmod(0o777)
+    assert hand_over(name, StartRequest()) is False
+    meeting.close()
+
+
+@needs_modes
+def test_another_user_at_the_other_end_is_not_served(
+    qtbot, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[StartRequest] = []
+    meeting = meet(name, asked.append)
+    monkeypatch.setattr(single_instance, "peer_of", lambda _descriptor: os.geteuid() + 1)
+    assert hand_over(name, StartRequest()) is False
+    socket = QLocalSocket()
+    socket.connectToServer(name)
+    socket.waitForConnected(WAIT_MS)
+    socket.write(b'{"files": [], "demo": true}\n')
+    qtbot.waitUntil(lambda: socket.state() == socket.LocalSocketState.UnconnectedState, timeout=WAIT_MS)
+    assert asked == []
+    meeting.close()
+
+
+@pytest.mark.skipif(sys.platform not in {"linux", "darwin"}, reason="the system does not tell")
+def test_the_system_tells_who_is_at_the_other_end(tmp_path: Path) -> None:
+    ours, theirs = socket_module.socketpair()
+    with ours, theirs:
+        assert peer_of(ours.fileno()) == os.geteuid()
+    with (tmp_path / "file").open("wb") as file:
+        assert peer_of(file.fileno()) is None
+
+
+@needs_modes
+def test_one_that_never_answers_does_not_hold_a_start_up(qtbot, name: str, monkeypatch) -> None:
+    monkeypatch.setattr(single_instance, "ANSWER_MS", 50)
+    code = "import socket, sys\ns = socket.socket(socket.AF_UNIX)\ns.bind(sys.argv[1])\ns.listen()\n"
+    code += "print('up', flush=True)\nc, _ = s.accept()\nsys.stdin.read()\n"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"up\n"
+    assert hand_over(name, StartRequest()) is False
+    process.kill()
+    process.communicate()
+
+
+def test_a_start_is_read() -> None:
+    assert parse(b'{"files": ["/a.nepb"], "demo": true}') == StartRequest((Path("/a.nepb"),), True)
+    assert parse(b"\xff") is None
+
+
+def test_a_window_that_goes_while_a_later_start_talks_to_it_raises_nothing(
+    qtbot, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Qt deletes the connection with the window, and says then that it is disconnected."""
+    raised: list[BaseException] = []
+    monkeypatch.setattr(sys, "excepthook", lambda _kind, error, _trace: raised.append(error))
+    window = QObject()
+    meeting = SingleInstanceServer(name, lambda _asked: None, window)
+    line = QLocalSocket()
+    line.connectToServer(name)
+    assert line.waitForConnected(WAIT_MS)
+    qtbot.waitUntil(lambda: bool(meeting._heard), timeout=WAIT_MS)
+    with qtbot.waitSignal(window.destroyed, timeout=WAIT_MS):
+        window.deleteLater()
+    qtbot.waitUntil(lambda: line.state() == QLocalSocket.LocalSocketState.UnconnectedState, timeout=WAIT_MS)
+    assert raised == []

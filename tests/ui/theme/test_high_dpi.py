@@ -1,0 +1,35 @@
+"""The window on screens of 1.25 and 1.5: Qt takes its scale once, so each has a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+LOOK = """
+import sys
+import pytest
+from PySide6.QtWidgets import QApplication
+
+application = QApplication(["nep-studio"])
+assert application.devicePixelRatio() == float(sys.argv[1]), application.devicePixelRatio()
+sys.exit(pytest.main(["-q", "tests/ui/theme/test_text_sizes.py::test_the_window_cuts_no_words"]))
+"""
+
+
+@pytest.mark.parametrize("scale", ["1.25", "1.5"])
+def test_the_window_cuts_no_words_between_whole_scales(scale: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOOK, scale],
+        cwd=Path(__file__).parents[3],
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_SCALE_FACTOR": scale},
+        capture_output=True,
+        text=True,
+        timeout=140,
+        check=False,
+    )
+    assert done.returncode == 0, f"{done.stdout[-3000:]}\n{done.stderr[-1000:]}"
+    assert "5 passed" in done.stdout
