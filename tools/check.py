@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
-MOST_WORKERS = 4
+MOST_WORKERS = 6
 
 
 class Check(NamedTuple):
@@ -53,11 +53,11 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: a process for each processor, four at most; tests/conftest.py groups tests.
+    """Options of pytest-xdist: one process more than processors, six at most; tests/conftest.py groups tests.
 
-    Most tests wait for processes and windows, so one process would leave a computer idle half of the time.
+    Most tests wait for processes and windows: with as many as processors, a computer idles a third of the time.
     """
-    workers = max(1, min(MOST_WORKERS, os.cpu_count() or 1))
+    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 1)
     return ("-n", str(workers), "--dist", "loadfile")
 
 
