@@ -201,7 +201,7 @@ class Theme(QObject):
         return self._tokens.status[name]
 
     def palette(self) -> QPalette:
-        """The Qt palette of UI.md §7."""
+        """The palette of the widgets that Qt paints, in this mode."""
         return _palette(self.colour)
 
     def style_sheet(self) -> str:

@@ -1,4 +1,4 @@
-// Zelos, plus the outlines that say what a block is doing (UI.md §4 "Block states").
+// Zelos, plus the outlines that say what a block is doing.
 import * as Blockly from 'blockly/core';
 
 export type BlockState = 'running' | 'stopped' | 'error';

@@ -1,4 +1,4 @@
-// From tokens to a Blockly theme and CSS variables (UI.md §8).
+// From tokens to a Blockly theme and CSS variables.
 import * as Blockly from 'blockly/core';
 import {SAME_STYLE, categories, colour, roles} from './tokens';
 

@@ -15,7 +15,7 @@ export interface Tokens {
   block: Record<string, {icon: string} & (BlockColours | Both<BlockColours>)>;
 }
 
-/** Blockly's own style names, and a few plurals, mean ours (UI.md §8). */
+/** Blockly's own style names, and a few plurals, mean ours. */
 export const SAME_STYLE: Readonly<Record<string, string>> = {
   logic_blocks: 'values', math_blocks: 'values', text_blocks: 'values', colour_blocks: 'values',
   loop_blocks: 'control', list_blocks: 'variables', variable_blocks: 'variables',

@@ -1,4 +1,4 @@
-// The toolbox of the design: tiles with icons, headings, robots (UI.md §8).
+// The toolbox of the design: tiles with icons, headings, robots.
 import * as Blockly from 'blockly/core';
 import {iconElement, iconName} from './icons';
 import {SEARCH, SearchItem} from './search_item';

@@ -1,7 +1,7 @@
 """How large the panels of a layout are until a person moves the lines between them.
 
 A column keeps its width and the last panel of a column its height, and so does one with only panels below it
-that come later; what a larger window gives goes to the others, as in the design (UI.md §2).
+that come later; what a larger window gives goes to the others.
 """
 
 from __future__ import annotations

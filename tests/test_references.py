@@ -1,0 +1,155 @@
+"""Files, modules, classes, decisions and links that a document, docstring or comment names are there."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+HOMES = ("nep", "app", "tests", "tools", "bench", "docs", "examples", "installers")
+FILES = ("README.md", "CONTRIBUTING.md", "dev.py", "hatch_build.py", "pyproject.toml")
+ELSEWHERE = frozenset({
+    "app/_resources/",  # where a wheel has them
+    "nep/locale/fr/LC_MESSAGES/nep-studio.po",  # an example of a language to begin
+    "nep/log",  # a type of messages
+    "tools/nothing.py",  # a test says that it is not there
+})  # fmt: skip
+
+_PATH = re.compile(rf"(?<![\w/.~-])(?:{'|'.join(HOMES)}|resources)/[\w./-]*\.(?:py|ts|mjs|md|sh|css|json)\b")
+_PLACE = re.compile(rf"(?:{'|'.join(HOMES)}|resources)/[\w./-]*")
+_DECISION = re.compile(r"(?:\bADR |docs/adr/)(\d{4})")
+_LINK = re.compile(r"\]\((?!\w+:)([^)#\s]+)")
+_QUOTED = re.compile(r"`+([^`\n]+)`+")
+_DOTTED = re.compile(r"(?:nep|app|tools|tests)(?:\.\w+)+")
+_NAME = re.compile(r"(?:[A-Z][a-z0-9]+){2,}(?:\.\w+)*|[A-Z]\w*(?:\.\w+)+")
+_WORD = re.compile(r"\w+")
+_FILE_NAME = re.compile(r".*\.(?:md|json|csv|dll|nepb)")
+
+
+@cache
+def _texts() -> dict[str, str]:
+    """Every source and document by its path from the root."""
+    found = [ROOT / name for name in FILES]
+    for home in HOMES:
+        found += [
+            path
+            for path in (ROOT / home).rglob("*")
+            if path.suffix in {".py", ".ts", ".mjs", ".md"} and "node_modules" not in path.parts
+        ]
+    own = Path(__file__)
+    return {
+        path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in found if path != own
+    }
+
+
+@cache
+def _module(name: str) -> Path | None:
+    place = ROOT / name.replace(".", "/")
+    options = (place.with_name(place.name + ".py"), place / "__init__.py")
+    return next((each for each in options if each.is_file()), None)
+
+
+@cache
+def _names_in(module: Path) -> frozenset[str]:
+    """What a module binds, and the members of its classes."""
+    tree = ast.parse(module.read_text(encoding="utf-8"))
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name):
+            names.add(node.id)
+        elif isinstance(node, ast.Attribute):
+            names.add(node.attr)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names |= {each.asname or each.name for each in node.names}
+    return frozenset(names)
+
+
+def _is_there(dotted: str) -> bool:
+    """A package, a module, what a module binds, or a public name of nep."""
+    parts = dotted.split(".")
+    for length in range(len(parts), 0, -1):
+        module = _module(".".join(parts[:length]))
+        if module is not None:
+            rest = parts[length:]
+            names = _names_in(module)
+            if module == ROOT / "nep" / "__init__.py":
+                names |= _names_in(ROOT / "nep" / "public.py")
+            return not rest or rest[0] in names
+    return False
+
+
+@cache
+def _words() -> frozenset[str]:
+    """Every word of the sources that stands outside of quotation by backticks."""
+    return frozenset(
+        word
+        for place, text in _texts().items()
+        if not place.endswith(".md")
+        for word in _WORD.findall(_QUOTED.sub(" ", text))
+    )
+
+
+def _quoted() -> Iterator[tuple[str, str]]:
+    """What stands in backticks, with the file that it stands in."""
+    for place, text in _texts().items():
+        if not place.endswith((".ts", ".mjs")):  # there they quote texts
+            for quoted in _QUOTED.findall(text):
+                yield place, quoted.removesuffix("()")
+
+
+def test_every_file_that_is_named_is_there() -> None:
+    named = {(place, path) for place, text in _texts().items() for path in _PATH.findall(text)}
+    named |= {(place, quoted) for place, quoted in _quoted() if _PLACE.fullmatch(quoted)}
+    assert len(named) > 150
+    missing = {(place, path) for place, path in named if not (ROOT / path).exists()}
+    assert {each for each in missing if each[1] not in ELSEWHERE} == set()
+
+
+def test_every_module_and_member_that_is_named_is_there() -> None:
+    named = [(place, quoted) for place, quoted in _quoted() if _DOTTED.fullmatch(quoted)]
+    assert len(named) > 50
+    assert {each for each in named if not _is_there(each[1])} == set()
+
+
+def test_every_class_that_is_named_is_known_to_the_sources() -> None:
+    named = [
+        (place, quoted)
+        for place, quoted in _quoted()
+        if _NAME.fullmatch(quoted) and not _FILE_NAME.fullmatch(quoted)
+    ]
+    assert len(named) > 150
+    assert {each for each in named if not _words().issuperset(each[1].split("."))} == set()
+
+
+def test_every_decision_that_is_named_is_there() -> None:
+    there = {path.name[:4] for path in (ROOT / "docs" / "adr").glob("*.md")}
+    named = {(place, number) for place, text in _texts().items() for number in _DECISION.findall(text)}
+    assert len(named) > 20
+    assert {each for each in named if each[1] not in there} == set()
+
+
+def test_every_link_of_a_document_leads_somewhere() -> None:
+    links = [
+        (place, link)
+        for place, text in _texts().items()
+        if place.endswith(".md") and "0000-template" not in place
+        for link in _LINK.findall(text)
+    ]
+    assert len(links) > 30
+    assert {each for each in links if not ((ROOT / each[0]).parent / each[1]).exists()} == set()
+
+
+def test_what_is_not_there_is_found() -> None:
+    assert _is_there("nep.masters.graph.Graph")
+    assert _is_there("nep.node")
+    assert not _is_there("nep.masters.graph.Nothing")
+    assert not _is_there("app.core.nothing")
+    assert not _words() & {"NoSuch" + "Class"}
+    assert _PATH.findall("see `app/core/gone.py`, ../app/core/gone.py and x/app/core/gone.py") == [
+        "app/core/gone.py"
+    ]
