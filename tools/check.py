@@ -55,7 +55,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 def side_by_side() -> tuple[str, ...]:
     """Options of pytest-xdist: one process more than processors, six at most; tests/conftest.py groups tests.
 
-    Most tests wait for processes and windows: with as many as processors, a computer idles a third of the time.
+    Most tests wait for processes and windows: with one each processor, a third of the time is idle.
     """
     workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 1)
     return ("-n", str(workers), "--dist", "loadfile")

@@ -1,4 +1,8 @@
-"""Blocks as data, and the compiler that turns a workspace into a Python program."""
+"""Blocks as data, and the compiler that turns a workspace into a Python program.
+
+What compiles a behaviour is exported here; programs import `app.blocks.commands`.
+`editor/` is the editor's page in TypeScript.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Widgets and the web view: the only package that imports PySide6."""
+"""Widgets and the web view: the only package that imports PySide6.
+
+`application` starts it. Rooms import downward: shell, panels, what several panels use, widgets, theme.
+"""
 
 from app.ui import overrides
 

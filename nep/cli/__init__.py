@@ -1,4 +1,7 @@
-"""The command `nep`."""
+"""The command `nep`.
+
+`app` puts the commands together; each is one module, such as `echo` for `nep topic echo`.
+"""
 
 from __future__ import annotations
 

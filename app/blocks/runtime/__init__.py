@@ -1,1 +1,4 @@
-"""A program while it runs, in a process of its own: scripts that take turns, robots, topics, values."""
+"""A program while it runs, in a process of its own: scripts that take turns, robots, topics, values.
+
+`child` is the process, `scheduler` decides whose turn it is, and only `network` has sockets.
+"""

@@ -1,1 +1,5 @@
-"""Running a behaviour: the program's own process, its pause and end, and what is said of it."""
+"""Running a behaviour: the program's own process, its pause and end, and what is said of it.
+
+`control` is Run, Pause, Step and Stop; `runner` talks with the process, whose other end is
+`app.blocks.runtime.child`.
+"""

@@ -1,1 +1,4 @@
-"""What is kept on the disk between starts: settings and files, written so that a crash leaves no half."""
+"""What is kept on the disk between starts: settings and files, written so that a crash leaves no half.
+
+Behaviours, journals and versions use it; it knows none of them.
+"""

@@ -1,1 +1,4 @@
-"""What a robot can do and tell: its W3C Thing Model, parsed once into typed values, and inputs checked."""
+"""What a robot can do and tell: its W3C Thing Model, parsed once into typed values, and inputs checked.
+
+`description.parse` is the way in, `validate` the sentences about what is wrong with a document.
+"""

@@ -1,1 +1,4 @@
-"""The panels of Studio: each module binds one ``PANEL``; a new one is one new file."""
+"""The panels of Studio: each module binds one ``PANEL``; a new one is one new file.
+
+`base` is what a panel is; a panel's own parts are in its folder, and it imports no other panel.
+"""

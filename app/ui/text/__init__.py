@@ -1,1 +1,4 @@
-"""Values as people read them: numbers, dates, a robot's sensors."""
+"""Values as people read them: numbers, dates, a robot's sensors.
+
+Words in a language come from `nep.i18n`; no widget is made here.
+"""

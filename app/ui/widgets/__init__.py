@@ -1,4 +1,7 @@
-"""The small painted widgets of the design (UI.md §4); each takes the theme first."""
+"""The small painted widgets that panels and the shell are made of; each takes the theme first.
+
+None knows the session or a panel; buttons, chips and labels come from here, the rest by full path.
+"""
 
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
-"""Behaviour: the block editor, its tabs, and the program that its blocks make."""
+"""Behaviour: the block editor, its tabs, and the program that its blocks make.
+
+`panel` is the whole, `tabs` and `tab` its head, `live_values` what sensors' blocks show.
+"""
 
 from app.ui.panels.behaviour.panel import PANEL as PANEL

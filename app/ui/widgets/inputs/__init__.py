@@ -1,1 +1,4 @@
-"""Widgets that hold a value: fields, segments, choice, slider, switch."""
+"""Widgets that hold a value: fields, segments, choice, slider, switch.
+
+Robots' forms, settings and filters use them; what they mean is their user's.
+"""
