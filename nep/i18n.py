@@ -31,6 +31,8 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from gettext import GNUTranslations
 
+    from typing_extensions import Self
+
 __all__ = [
     "DOMAIN",
     "EDITOR_WORDS",
@@ -55,6 +57,7 @@ __all__ = [
     "number",
     "offered",
     "pgettext",
+    "plazy",
     "system_language",
     "translate",
 ]
@@ -80,6 +83,19 @@ _MONTHS = (
     "July", "August", "September", "October", "November", "December",
 )  # fmt: skip
 _log = logging.getLogger(__name__)
+
+
+class _Meant(str):
+    """English that `_` looks up with its context."""
+
+    __slots__ = ("context",)
+
+    def __new__(cls, context: str, message: str) -> Self:
+        made = super().__new__(cls, message)
+        made.context = context
+        return made
+
+    context: str
 
 
 class _Words:
@@ -204,7 +220,7 @@ def language() -> str:
 
 def gettext(message: str) -> str:
     """This sentence in the language that is used now; fill its holes afterwards with ``format``."""
-    return _words().one(None, message)
+    return _words().one(message.context if isinstance(message, _Meant) else None, message)
 
 
 _ = gettext
@@ -228,6 +244,11 @@ def ngettext(singular: str, plural: str, count: int) -> str:
 def lazy(message: str) -> str:
     """Mark a constant for translators. It stays English: give it to `_` when it is shown."""
     return message
+
+
+def plazy(context: str, message: str) -> str:
+    """The same for a word that means several things, as with `pgettext`; it, too, is given to `_`."""
+    return _Meant(context, message)
 
 
 def listed(items: Sequence[str], kind: Literal["and", "or"] = "and") -> str:

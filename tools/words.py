@@ -38,6 +38,7 @@ KEYWORDS = {
     "_": None,
     "gettext": None,
     "lazy": None,
+    "plazy": ((1, "c"), 2),
     "t": None,
     "ngettext": (1, 2),
     "pgettext": ((1, "c"), 2),

@@ -4,10 +4,36 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Mapping
 
-from nep.i18n import number
+from nep.i18n import _, number, plazy
 
 MAC_KEYS = {"Ctrl": "⌘", "Alt": "⌥", "Shift": "⇧", "Meta": "⌃"}
+KEYS = {
+    "Alt": plazy("key", "Alt"),
+    "Backspace": plazy("key", "Backspace"),
+    "Ctrl": plazy("key", "Ctrl"),
+    "Del": plazy("key", "Del"),
+    "Delete": plazy("key", "Delete"),
+    "Down": plazy("key", "Down"),
+    "End": plazy("key", "End"),
+    "Enter": plazy("key", "Enter"),
+    "Esc": plazy("key", "Esc"),
+    "Home": plazy("key", "Home"),
+    "Ins": plazy("key", "Ins"),
+    "Left": plazy("key", "Left"),
+    "Meta": plazy("key", "Meta"),
+    "PgDown": plazy("key", "PgDown"),
+    "PgUp": plazy("key", "PgUp"),
+    "Return": plazy("key", "Return"),
+    "Right": plazy("key", "Right"),
+    "Shift": plazy("key", "Shift"),
+    "Space": plazy("key", "Space"),
+    "Tab": plazy("key", "Tab"),
+    "Up": plazy("key", "Up"),
+}
+"""What stands on keys, by what Qt calls them; letters and F12 are the same everywhere."""
+_KEY = re.compile(r"[A-Z][A-Za-z]+")
 THIN = "\u2009"  # a thin space between thousands
 
 
@@ -60,11 +86,6 @@ def grouped(count: int) -> str:
     return f"{count:,}".replace(",", THIN)
 
 
-def plural(count: int | None, word: str) -> str:
-    """1 topic, 13 topics."""
-    return f"{grouped(count or 0)} {word}{'' if count == 1 else 's'}"
-
-
 def seconds_words(value_s: float) -> str:
     """0.4 s, 14 s, 2 min: how long something took."""
     if value_s < 10:
@@ -74,14 +95,16 @@ def seconds_words(value_s: float) -> str:
 
 def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
     """A shortcut as it stands on keys: "Ctrl Shift S", "Ctrl +"; on a Mac, where Ctrl is Cmd, "⌘ ⇧ S"."""
-    words = re.sub(r"\+(?=.)", " ", shortcut)
-    if platform != "darwin":
-        return words
-    return " ".join(MAC_KEYS.get(word, word) for word in words.split(" "))
+    return _named_keys(re.sub(r"\+(?=.)", " ", shortcut), MAC_KEYS if platform == "darwin" else {})
 
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
     """A button's words with its key: "Save (Ctrl+S)"; on a Mac "Save (⌘ S)"."""
     if not shortcut:
         return tip
-    return f"{tip} ({spoken_key(shortcut, platform) if platform == 'darwin' else shortcut})"
+    return f"{tip} ({spoken_key(shortcut, platform) if platform == 'darwin' else _named_keys(shortcut, {})})"
+
+
+def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:
+    """The shortcut with the words that stand on its keys, or these signs instead of them."""
+    return _KEY.sub(lambda key: signs.get(key[0]) or _(KEYS.get(key[0], key[0])), shortcut)

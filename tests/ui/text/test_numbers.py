@@ -7,11 +7,13 @@ from app.ui.text.numbers import (
     bandwidth_words,
     grouped,
     latency_words,
-    plural,
     rate_words,
     seconds_words,
     size_words,
+    spoken_key,
+    tip_with_key,
 )
+from tests.pseudo import untranslated
 
 
 @pytest.mark.parametrize(
@@ -26,9 +28,20 @@ from app.ui.text.numbers import (
         "6 s"),
         (age_words(125), "2 min"), (age_words(7200), "2 h"),
         (latency_words(0.0006), "0.6 ms"), (latency_words(0.041), "41 ms"), (latency_words(1.24), "1.2 s"),
-        (grouped(18204), "18\u2009204"), (plural(1, "topic"), "1 topic"), (plural(0, "node"), "0 nodes"),
+        (grouped(18204), "18\u2009204"),
         (seconds_words(1.42), "1.4 s"), (seconds_words(14.3), "14 s"), (seconds_words(180), "3 min"),
     ],
 )  # fmt: skip
 def test_figures_in_words(made: str, words: str) -> None:
     assert made == words
+
+
+@pytest.mark.usefixtures("pseudo")
+def test_the_words_on_keys_are_translated_and_letters_stay() -> None:
+    said = [spoken_key("Ctrl+Shift+S"), spoken_key("Up, PgDown"), spoken_key("Meta+Tab", "darwin")]
+    assert untranslated(" ".join(said).replace("Ctrl", "ctrl")) == []
+    assert "Tab" not in said[2]
+    assert said[2].startswith("⌃ [")
+    assert said[0].endswith("] S")
+    assert spoken_key("F12") == "F12"
+    assert tip_with_key("x", "Ctrl+S", "linux") == f"x ({said[0].split(' [')[0]}+S)"

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from app.core.network.nodes import NodeEntry
 from app.ui.text.numbers import age_words
 from app.ui.widgets.table.model import Cell, Column, Order
-from nep.i18n import _, lazy, number, pgettext
+from nep.i18n import _, lazy, number, pgettext, plazy
 
 PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
@@ -172,7 +172,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
         lambda r: (r.node.is_original, r.node.generation), tip=_generation_tip,
     ),
     Column(
-        "language", lazy("Language"), 78, _of_node(lambda n: n.language, "textSecondary"),
+        "language", plazy("of a program", "Language"), 78, _of_node(lambda n: n.language, "textSecondary"),
         lambda r: r.node.language, yields=4,
     ),
     Column(

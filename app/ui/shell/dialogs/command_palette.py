@@ -10,6 +10,7 @@ from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from app.ui.shell.dialogs.overlay import Overlay
+from app.ui.text.numbers import spoken_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label, paint
@@ -42,7 +43,7 @@ class _Field(QLineEdit):
         font.setPixelSize(round(self._theme.scaled(17)))
         self.setFont(font)
         self.setFixedHeight(round(self._theme.scaled(FIELD)))
-        right = round(paint.key_width(self._theme, "Esc")) + 26
+        right = round(paint.key_width(self._theme, spoken_key("Esc"))) + 26
         self.setTextMargins(round(self._theme.scaled(20)) + 28, 0, right, 0)
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -51,7 +52,7 @@ class _Field(QLineEdit):
         middle, side = self.height() / 2, self._theme.scaled(20)
         square = QRectF(18, middle - side / 2, side, side)
         paint_icon(painter, square, "search", self._theme.colour("textSecondary"))
-        paint.key_cap(painter, self._theme, self.width() - 19, middle, "Esc")
+        paint.key_cap(painter, self._theme, self.width() - 19, middle, spoken_key("Esc"))
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()
 
@@ -62,7 +63,7 @@ class _Foot(QWidget):
     KEYS = (
         (("↑", "↓"), lazy("choose")),
         (("Enter",), lazy("run")),
-        (("Ctrl Enter",), lazy("change the shortcut")),
+        (("Ctrl+Enter",), lazy("change the shortcut")),
     )
 
     def __init__(self, theme: Theme) -> None:
@@ -82,11 +83,12 @@ class _Foot(QWidget):
         count = paint.width_of(font, self.counted)
         for keys, words in self.KEYS:
             said = _(words)
-            wide = sum(paint.key_width(theme, key) + 5 for key in keys) + paint.width_of(font, said)
+            caps = [spoken_key(key) for key in keys]
+            wide = sum(paint.key_width(theme, cap) + 5 for cap in caps) + paint.width_of(font, said)
             if left + wide > self.width() - count - 40:
                 break
-            for key in keys:
-                left = paint.key_cap(painter, theme, left + paint.key_width(theme, key), middle, key).right()
+            for cap in caps:
+                left = paint.key_cap(painter, theme, left + paint.key_width(theme, cap), middle, cap).right()
                 left += 5
             area = QRectF(left + 1, 0, 400, self.height())
             paint.words(painter, area, said, font, quiet)
