@@ -77,7 +77,7 @@ ACTIONS: dict[str, object] = {
     "go-home": _action(
         {"title": "go home"} | _block("Movement", "house", "%robot go home %with_song", None),
         [],
-        with_song={"title": "with a song", "type": "boolean", "default": False},
+        with_song={"title": "song", "type": "boolean", "default": False},
     ),
     "stop": _action({"title": "stop"} | _block("Control", "square", "%robot stop"), []),
 }

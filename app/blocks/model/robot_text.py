@@ -86,8 +86,11 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
         options.sort(key=lambda option: option[1] != default)
         return ChoiceField(name, tuple(options))
     if parameter.kind == "boolean":
-        yes, no = _yes_no(parameter.title or parameter.name)
-        options_yes = (yes, True), (no, False)
+        title = parameter.title or parameter.name
+        options_yes = (
+            (_("{what}: yes").format(what=title), True),
+            (_("{what}: no").format(what=title), False),
+        )
         return ChoiceField(name, options_yes if default is not False else options_yes[::-1])
     if parameter.kind == "colour":
         return ColourField(name, default if isinstance(default, str) else "#37b6ff")
@@ -109,12 +112,6 @@ def about(parameter: Parameter) -> str:
     if high is not None:
         return _("at most {number_and_unit}").format(number_and_unit=f"{high}{unit}")
     return pgettext("of a number", "in {unit}").format(unit=unit.strip()) if unit else ""
-
-
-def _yes_no(title: str) -> tuple[str, str]:
-    if title.startswith("with "):
-        return title, f"without {title[5:]}"
-    return _("{what}: yes").format(what=title), _("{what}: no").format(what=title)
 
 
 def _argument_name(name: str, taken: set[str]) -> str:

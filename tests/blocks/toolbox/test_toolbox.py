@@ -85,7 +85,7 @@ def test_fields_of_ours():
     newest = {argument["name"]: argument for argument in BLOCKS["messages_newest"]["args0"]}
     assert newest["TOPIC"] == {"type": "field_topic", "name": "TOPIC", "value": "/faces"}
     home = {argument["name"]: argument for argument in BLOCKS["robot_pepper_do_go_home"]["args0"]}
-    assert home["WITH_SONG"]["options"] == [["without a song", "false"], ["with a song", "true"]]
+    assert home["WITH_SONG"]["options"] == [["song: no", "false"], ["song: yes", "true"]]
 
 
 def test_the_toolbox():
