@@ -16,6 +16,7 @@ from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
+from app.ui.widgets import Choice
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -146,3 +147,22 @@ def test_the_language_is_kept_for_the_next_start(
     assert Settings(home).get("language", "") == "es"
     press(sheet.language, "en")
     assert not sheet.from_next_start.isVisible()
+
+
+def test_many_languages_are_a_list_to_open(
+    monkeypatch, window: MainWindow, commands: Commands, home: Path
+) -> None:
+    names = [("en", "English"), ("es", "Español"), ("fr", "Français"), ("ja", "日本語")]
+    monkeypatch.setattr("nep.i18n.offered", lambda: names)
+    window.show()
+    commands.run("settings.open")
+    sheet = window.findChild(SettingsSheet)
+    assert sheet is not None
+    language = sheet.language
+    assert isinstance(language, Choice)
+    assert [language.itemText(at) for at in range(language.count())] == [name for _code, name in names]
+    assert language.value == "en"
+    assert sheet.first() is language
+    QTest.keyClick(language, Qt.Key.Key_Down)
+    assert Settings(home).get("language", "") == "es"
+    assert sheet.from_next_start.isVisible()

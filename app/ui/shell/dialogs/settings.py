@@ -13,7 +13,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.system import WISHES
 from app.ui.theme.theme import MODES, Theme
-from app.ui.widgets import Button, Elided, IconButton, Segments, label
+from app.ui.widgets import Button, Choice, Elided, IconButton, Segments, label
 from app.ui.widgets.file_dialogs import show_free
 from nep import i18n
 from nep.i18n import _, lazy, pgettext
@@ -26,6 +26,8 @@ MODE_WORDS = {
 }
 WISH_WORDS = {"system": lazy("As the system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
+SIDE_BY_SIDE = 3
+"""So many languages stand side by side; more are a list to open."""
 
 
 class SettingsSheet(Overlay):
@@ -36,8 +38,7 @@ class SettingsSheet(Overlay):
     def __init__(self, theme: Theme, window: QWidget, state: WindowState, settings: Settings) -> None:
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings = state, settings
-        languages = [(code, name, None) for code, name in i18n.offered()]
-        self.language = Segments(theme, languages, check=True, size="form", name=_("Language"))
+        self.language = self._language_input()
         self.from_next_start = label(_("From the next start of Studio"), "body", role="textSecondary")
         modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
         look = pgettext("colours of the window", "Look")
@@ -51,7 +52,6 @@ class SettingsSheet(Overlay):
         self.shortcuts = Button(theme, _("Change the shortcuts"), "keyboard", size="form")
         self.folder = Elided("bodyLarge", "textSecondary")
         self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
-        self.language.changed.connect(self._language)
         self.mode.changed.connect(self._mode)
         self.text.changed.connect(lambda percent: self._changed(lambda: theme.set_text_percent(int(percent))))
         self.contrast.changed.connect(self._contrast)
@@ -59,6 +59,19 @@ class SettingsSheet(Overlay):
         self.choose.clicked.connect(self._choose)
         self._lay_out()
         theme.changed.connect(self._show)
+
+    def _language_input(self) -> Segments | Choice:
+        offered = i18n.offered()
+        if len(offered) > SIDE_BY_SIDE:
+            choice = Choice(self.theme, offered, name=_("Language"))
+            choice.activated.connect(lambda _index: self._language(choice.value))
+            return choice
+        segments = Segments(
+            self.theme, [(code, name, None) for code, name in offered],
+            check=True, size="form", name=_("Language"),
+        )  # fmt: skip
+        segments.changed.connect(self._language)
+        return segments
 
     def _lay_out(self) -> None:
         close = IconButton(self.theme, "x", _("Close"), "Esc")
@@ -110,6 +123,8 @@ class SettingsSheet(Overlay):
         column.addWidget(self._area, 1)
 
     def first(self) -> QWidget:
+        if isinstance(self.language, Choice):
+            return self.language
         return self.language.chosen_button() or self
 
     def wanted_size(self, room: QSize) -> QSize:
