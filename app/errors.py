@@ -37,13 +37,17 @@ class AppError(Exception):
 
 
 class DocumentError(AppError):
-    """A behaviour file can't be read or written; ``path`` names it, ``reason`` says why."""
+    """A behaviour file can't be read or written.
 
-    def __init__(self, path: Path | None, reason: str) -> None:
-        """Make the sentence from the file's name and the reason."""
+    ``path`` is the file, ``reason`` a whole sentence that names it, ``advice`` what to do, if that is known.
+    """
+
+    def __init__(self, path: Path | None, reason: str, advice: str = "") -> None:
+        """Make the sentence from the reason and the advice."""
         self.path = path
         self.reason = reason
-        super().__init__(f"'{path.name}': {reason}" if path is not None else reason)
+        self.advice = advice
+        super().__init__(f"{reason}; {advice}" if advice else reason)
 
 
 class CompileError(AppError):

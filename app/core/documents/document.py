@@ -20,6 +20,7 @@ from app.core.documents.background_compile import (
     compiled,
 )
 from app.core.documents.file_format import (
+    DIVIDE,
     TOO_DEEP,
     BehaviourFile,
     Descriptions,
@@ -136,7 +137,7 @@ class Document:
         """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError."""
         target = path if path is not None else self.path
         if target is None:
-            raise DocumentError(None, _("this behaviour has no file yet; choose one"))
+            raise DocumentError(None, _("this behaviour has no file yet"), _("choose one"))
         name = target.stem if path is not None else self.name
         write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
         self.path, self.name = target, name
@@ -298,7 +299,9 @@ class Document:
                 reason=error.strerror or error
             )
         except RecursionError:
-            self.journal_error = _("unsaved work can't be kept: {reason}").format(reason=_(TOO_DEEP))
+            self.journal_error = _("unsaved work can't be kept: {reason}; {advice}").format(
+                reason=_(TOO_DEEP), advice=_(DIVIDE)
+            )
         else:
             self.journal_error = None
 

@@ -18,7 +18,9 @@ from nep.i18n import _, lazy, number
 FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
-TOO_DEEP = lazy("more than 4000 blocks hang in one stack; divide it into several scripts")
+TOO_DEEP = lazy("more than 4000 blocks hang in one stack")
+FROM_BEFORE = lazy("open a copy from before")
+DIVIDE = lazy("divide it into several scripts")
 FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """What systems say of a disk, a file or a share of a disk that takes nothing more."""
 OURS = frozenset({"format", "version", "name", "workspace", "robots"})
@@ -37,42 +39,42 @@ class BehaviourFile:
     others: Mapping[str, object] = field(default_factory=dict)
 
 
-def read_file(path: Path) -> BehaviourFile:
-    """Read a behaviour's file. Raises DocumentError with what to do next."""
+def read_file(path: Path, name: str = "") -> BehaviourFile:
+    """Read a behaviour's file. Raises DocumentError with what to do next.
+
+    ``name`` is how the sentence calls it, if a person knows it by another name than the file's own.
+    """
+    name = name or path.name
     try:
         data = read_whole(path)
     except OSError as error:
-        raise DocumentError(
-            path, _("can't be read ({reason})").format(reason=error.strerror or error)
-        ) from error
+        words = _("{file} can't be read ({reason})")
+        raise DocumentError(path, words.format(file=name, reason=error.strerror or error)) from error
     except ValueError as error:  # letters that no file's name has here
-        raise DocumentError(path, _("can't be read (no file has such a name here)")) from error
-    return parse_file(data, path)
+        words = _("{file} can't be read (no file has such a name here)")
+        raise DocumentError(path, words.format(file=name)) from error
+    return parse_file(data, path, name)
 
 
-def parse_file(data: bytes, path: Path) -> BehaviourFile:
-    """The behaviour in a file's bytes; ``path`` is for the sentence. Raises DocumentError."""
+def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
+    """The behaviour in a file's bytes; ``path`` and ``name`` are for the sentence. Raises DocumentError."""
+    name = name or path.name
     try:
         content = deep_json.loads(data.decode("utf-8", "surrogatepass"))
     except (ValueError, RecursionError) as error:
-        raise DocumentError(path, _("is damaged or no behaviour; open a copy from before")) from error
+        damaged = _("{file} is damaged or no behaviour").format(file=name)
+        raise DocumentError(path, damaged, _(FROM_BEFORE)) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DocumentError(
-            path, _("is no behaviour; behaviours are files ending in {suffix}").format(suffix=SUFFIX)
-        )
+        raise DocumentError(path, _("{file} is no behaviour").format(file=name), what_behaviours_are())
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise DocumentError(path, _("does not say its version; open a copy from before"))
+        raise DocumentError(path, _("{file} does not say its version").format(file=name), _(FROM_BEFORE))
     if version > VERSION:
-        raise DocumentError(
-            path,
-            _(
-                "was made by a newer NEP Studio (version {version}) and is left as it is; update this one"
-            ).format(version=version),
-        )
+        newer = _("{file} was made by a newer NEP Studio (version {version}) and is left as it is")
+        raise DocumentError(path, newer.format(file=name, version=version), _("update this one"))
     workspace, robots = content.get("workspace"), content.get("robots", {})
     if not isinstance(workspace, dict) or not isinstance(robots, dict):
-        raise DocumentError(path, _("has no blocks in it; open a copy from before"))
+        raise DocumentError(path, _("{file} has no blocks in it").format(file=name), _(FROM_BEFORE))
     described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
     others = {name: value for name, value in content.items() if name not in OURS}
     return BehaviourFile(str(content.get("name") or path.stem), workspace, described, others)
@@ -95,18 +97,24 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         data = deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
         if len(data) > LARGEST_BYTES:
             size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
-            said = _("would have {size} MB; at most {most} MB are read, use smaller pictures").format(
-                size=number(size, ".1f"), most=number(most, ".0f")
-            )
-            raise DocumentError(path, said)
+            said = _("{file} would have {size} MB").format(file=path.name, size=number(size, ".1f"))
+            advice = _("at most {most} MB are read, use smaller pictures").format(most=number(most, ".0f"))
+            raise DocumentError(path, said, advice)
         write_atomically(path, data)
     except RecursionError as error:
-        raise DocumentError(path, _("can't be written: {reason}").format(reason=_(TOO_DEEP))) from error
+        words = _("{file} can't be written: {reason}").format(file=path.name, reason=_(TOO_DEEP))
+        raise DocumentError(path, words, _(DIVIDE)) from error
     except OSError as error:
         reason = error.strerror or str(error)
-        words = (
-            _("can't be written ({reason}); make room there or save it in another place")
+        words = _("{file} can't be written ({reason})").format(file=path.name, reason=reason)
+        advice = (
+            _("make room there or save it in another place")
             if error.errno in FULL
-            else _("can't be written ({reason}); save it in another place")
+            else _("save it in another place")
         )
-        raise DocumentError(path, words.format(reason=reason)) from error
+        raise DocumentError(path, words, advice) from error
+
+
+def what_behaviours_are() -> str:
+    """What to look for instead of a file that is no behaviour."""
+    return _("behaviours are files ending in {suffix}").format(suffix=SUFFIX)

@@ -53,7 +53,8 @@ class Earlier:
             reason = getattr(error, "strerror", None) or error
             raise DocumentError(
                 self.path,
-                _("can't be put back ({reason}); open {copy}").format(reason=reason, copy=self.copy),
+                _("{file} can't be put back ({reason})").format(file=self.path.name, reason=reason),
+                _("open {copy}").format(copy=self.copy),
             ) from error
 
 
@@ -78,9 +79,8 @@ def keep_earlier(
         os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
-        raise DocumentError(
-            path, _("was not saved: what it said before can't be kept ({reason})").format(reason=reason)
-        ) from error
+        words = _("{file} was not saved: what it said before can't be kept ({reason})")
+        raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
     with contextlib.suppress(OSError):  # another Studio was quicker
         _thin_out(where, _mark(path))
         _drop_oldest(where)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from PySide6.QtCore import QObject, QTimer
 
 from app.blocks.fixes.fixes import mend
 from app.core.documents.document import Document
-from app.core.documents.file_format import SUFFIX
+from app.core.documents.file_format import SUFFIX, what_behaviours_are
 from app.core.documents.journal import Unsaved
 from app.core.documents.versions import Earlier, free_path, keep_earlier, stamp_of
 from app.core.session import Session
@@ -224,7 +224,7 @@ class DocumentController:
             try:
                 keep_earlier(own)
             except DocumentError as error:
-                words = _("No earlier version: {error}").format(error=sentence_of(error))
+                words = _("No earlier version: {error}").format(error=error)
                 self._session.console.add("warn", "studio", words)
         return None, ""
 
@@ -233,7 +233,7 @@ class DocumentController:
         try:
             act()
         except AppError as error:
-            self._complain(sentence_of(error), "file.open", _("Open another file"))
+            self._complain(words_of(error), "file.open", _("Open another file"))
             return
         self._session.tabs.keep()
         self._session.alerts.cure("file")
@@ -296,33 +296,41 @@ class DocumentController:
             self._session.console.add("warn", "studio", str(error))
 
     def _cant_save(self, error: Exception) -> None:
-        self._complain(sentence_of(error), "file.save_as", _("Save somewhere else"))
+        self._complain(words_of(error), "file.save_as", _("Save somewhere else"))
 
-    def _complain(self, sentence: str, action: str, button: str, alert: str = "file") -> None:
-        what, _semicolon, then = sentence.partition("; ")
-        detail = f"{then[:1].upper()}{then[1:]}." if then else ""
-        self._session.alerts.put(alert, "error", f"{what}.", detail, button=button, action=action)
+    def _complain(self, words: Words, action: str, button: str, alert: str = "file") -> None:
+        self._session.alerts.put(alert, "error", words.title, words.detail, button=button, action=action)
 
 
-def sentence_of(error: Exception) -> str:
-    """What is wrong with a file, beginning with its name."""
-    if isinstance(error, DocumentError) and error.path is not None:
-        return f"{error.path.name} {error.reason}"
-    words = str(error)
-    return words[:1].upper() + words[1:]
+class Words(NamedTuple):
+    """What an alert says: what is wrong, and what to do."""
+
+    title: str
+    detail: str
 
 
-def strange_words(paths: Sequence[Path]) -> str:
-    """What is wrong with files that are no behaviours."""
+def words_of(error: Exception) -> Words:
+    """What is wrong with a file, and what to do."""
+    if not isinstance(error, DocumentError):
+        return Words(_sentence(str(error)), "")
+    named = error.path is not None and error.reason.startswith(error.path.name)  # a name stays as it is
+    title = f"{error.reason}." if named else _sentence(error.reason)
+    return Words(title, _sentence(error.advice))
+
+
+def strange_words(paths: Sequence[Path]) -> Words:
+    """What is wrong with files that are no behaviours, and what behaviours are."""
     names = [path.name or str(path) for path in paths]
-    words, others = _("{file} is no behaviour; behaviours are files ending in {suffix}"), len(names) - 1
+    words, others = _("{file} is no behaviour"), len(names) - 1
     if others:
         words = ngettext(
-            "{file} and {count} more are no behaviours; behaviours are files ending in {suffix}",
-            "{file} and {count} more are no behaviours; behaviours are files ending in {suffix}",
-            others,
+            "{file} and {count} more are no behaviours", "{file} and {count} more are no behaviours", others
         )
-    return words.format(file=names[0], count=others, suffix=SUFFIX)
+    return Words(f"{words.format(file=names[0], count=others)}.", _sentence(what_behaviours_are()))
+
+
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
 
 
 class FlushBeforeClose(QObject):

@@ -128,10 +128,10 @@ def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, ob
     full = told["full"]
     assert told["edit"] == f"unsaved work can't be kept ({full}); save the file now"
     assert told["save"] == (
-        f"DocumentError: 'Mine.nepb': can't be written ({full}); make room there or save it in another place"
+        f"DocumentError: Mine.nepb can't be written ({full}); make room there or save it in another place"
     )
     assert str(told["setting"]).startswith("SettingsError: ")
-    assert str(told["earlier"]).startswith("DocumentError: 'Mine.nepb': was not saved: what it said before")
+    assert str(told["earlier"]).startswith("DocumentError: Mine.nepb was not saved: what it said before")
     assert str(full) in str(told["snapshot"])
     assert told["dirty"] is True
     assert told["old"] is True, "the behaviour's file is what it was"

@@ -331,7 +331,7 @@ def test_what_is_said_of_files(whole: MainWindow, tmp_path: Path) -> None:
     for alert in alerts.active:
         data = ("gone.nepb", "a.png", ".nepb", "No such file or directory")
         assert untranslated(f"{alert.title} {alert.detail} {alert.button}", *data) == []
-    assert untranslated(strange_words(strange[:1]), "a.png", ".nepb") == []
+    assert untranslated(" ".join(strange_words(strange[:1])), "a.png", ".nepb") == []
     files.reopen()
     assert untranslated(toast.text) == []
     files.open(tmp_path / "Mine.nepb")

@@ -167,9 +167,10 @@ class VersionHistorySheet(Overlay):
         id = self._unread.popleft()
         note = reason = ""
         try:
-            note = difference_words(difference(read_file(self._versions[id].copy).workspace, self._now))
+            version = self._versions[id]
+            note = difference_words(difference(read_file(version.copy, version.name).workspace, self._now))
         except DocumentError as error:
-            reason = _("It {reason}").format(reason=error.reason.partition(";")[0])
+            reason = error.reason
         self.rows.tell(id, note, reason)
 
     @property
